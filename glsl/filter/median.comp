@@ -1,0 +1,69 @@
+// Median of a square window; beyond the border the nearest pixel stands in. Of distances: hits and misses vote, and where
+// hits win, the (lower) median of the hits, so that a pinhole is closed and no rim is drawn towards a miss.
+// variants: plane; slice SLICE; distance DISTANCE
+#version 460
+layout(constant_id = 0) const int RADIUS = 1;
+#extension GL_EXT_scalar_block_layout : require
+layout(scalar) uniform Params {
+    int slice;
+};
+#include "filter.glsl"
+
+void main() {
+    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 size = source_size();
+    if (any(greaterThanEqual(at, size))) return;
+    ivec2 last = size.xy - 1;
+
+    float low = MISS, high = -MISS;
+    int valid = 0;
+    for (int y = -RADIUS; y <= RADIUS; ++y) {
+        for (int x = -RADIUS; x <= RADIUS; ++x) {
+            float value = read_at(ivec3(clamp(at.xy + ivec2(x, y), ivec2(0), last), at.z));
+            if (!VALID(value)) continue;
+            low = min(low, value);
+            high = max(high, value);
+            ++valid;
+        }
+    }
+    int window = (2 * RADIUS + 1) * (2 * RADIUS + 1);
+    if (2 * valid <= window) {
+        write_at(at, MISS);
+        return;
+    }
+    // Selection by halving the value range (Torben's method): every round ends on values that are there, so the result is
+    // exact, and no window has to be held in registers.
+    int rank = (valid - 1) / 2;
+    float found = low;
+    while (low < high) {
+        float guess = 0.5 * low + 0.5 * high;
+        int below = 0, equal = 0;
+        float under = low, over = high;
+        for (int y = -RADIUS; y <= RADIUS; ++y) {
+            for (int x = -RADIUS; x <= RADIUS; ++x) {
+                float value = read_at(ivec3(clamp(at.xy + ivec2(x, y), ivec2(0), last), at.z));
+                if (!VALID(value)) continue;
+                if (value < guess) {
+                    ++below;
+                    under = max(under, value);
+                } else if (value == guess) {
+                    ++equal;
+                } else {
+                    over = min(over, value);
+                }
+            }
+        }
+        if (rank < below) {
+            high = under;
+            found = under;
+        } else if (rank < below + equal) {
+            low = guess;
+            high = guess;
+            found = guess;
+        } else {
+            low = over;
+            found = over;
+        }
+    }
+    write_at(at, found);
+}

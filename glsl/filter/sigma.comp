@@ -1,0 +1,53 @@
+// Lee's sigma filter: the mean of the neighbours within `range` of the centre; where no more than `few` are, the mean of
+// the four immediate neighbours. (Lee 1983; thesis 5.3.)
+// variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
+#version 460
+layout(constant_id = 0) const int RADIUS = 3;
+#extension GL_EXT_scalar_block_layout : require
+layout(scalar) uniform Params {
+    float range; // 2 sigma
+    float few;   // K
+    int slice;
+};
+#include "filter.glsl"
+
+void main() {
+    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 size = source_size();
+    if (any(greaterThanEqual(at, size))) return;
+    T centre = read_at(at);
+    if (!VALID(centre)) {
+        write_at(at, centre);
+        return;
+    }
+    // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
+    T sum = T(0.0);
+    T count = T(0.0);
+    ivec2 low = max(at.xy - RADIUS, ivec2(0)), high = min(at.xy + RADIUS, size.xy - 1);
+    for (int y = low.y; y <= high.y; ++y) {
+        for (int x = low.x; x <= high.x; ++x) {
+            T away = read_at(ivec3(x, y, at.z)) - centre;
+            T inside = WITHIN(away, range);
+            if (!VALID(away + centre)) inside = T(0.0);
+            sum += inside * min(away, T(range));
+            count += inside;
+        }
+    }
+    T near_sum = T(0.0);
+    float near_count = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 next = at.xy + ivec2((i & 1) * (i - 2), (1 - (i & 1)) * (i - 1));
+        if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next, size.xy))) continue;
+        T value = read_at(ivec3(next, at.z));
+        if (!VALID(value)) continue;
+        near_sum += value - centre;
+        near_count += 1.0;
+    }
+    T mean = sum / count;
+    T neighbours = near_count > 0.0 ? near_sum / near_count : T(0.0);
+#ifdef PICTURE
+    write_at(at, centre + mix(mean, neighbours, lessThanEqual(count, vec4(few))));
+#else
+    write_at(at, centre + (count <= few ? neighbours : mean));
+#endif
+}

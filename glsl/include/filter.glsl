@@ -1,0 +1,51 @@
+// What a filter reads and writes, by variant. T is what one texel holds.
+//   plane     2D to 2D, one channel            slices on their way
+//   slice     2D to one slice of a 3D texture  the last filter of stage 1
+//   volume    3D to 3D                         across slices
+//   distance  2D to 2D, one channel with misses
+//   picture   2D to 2D, colours, channel by channel
+#include "common.glsl"
+
+#ifdef PICTURE
+#define T vec4
+#define WITHIN(d, range) (vec4(lessThanEqual(abs(d), vec4(range))))
+#define STORED(v) (v)
+#define LOADED(v) (v)
+#else
+#define T float
+#define WITHIN(d, range) (abs(d) <= (range) ? 1.0 : 0.0)
+#define STORED(v) vec4(v, 0.0, 0.0, 0.0)
+#define LOADED(v) ((v).x)
+#endif
+
+#ifdef DISTANCE
+#define VALID(v) is_hit(v)
+#else
+#define VALID(v) true
+#endif
+
+#ifdef VOLUME
+uniform texture3D source;
+ivec3 source_size() { return textureSize(source, 0); }
+T read_at(ivec3 at) { return LOADED(texelFetch(source, at, 0)); }
+#else
+uniform texture2D source;
+ivec3 source_size() { return ivec3(textureSize(source, 0), 1); }
+T read_at(ivec3 at) { return LOADED(texelFetch(source, at.xy, 0)); }
+#endif
+
+#if defined(VOLUME) || defined(SLICE)
+uniform writeonly image3D target;
+#else
+uniform writeonly image2D target;
+#endif
+
+void write_at(ivec3 at, T value) {
+#if defined(VOLUME)
+    imageStore(target, at, STORED(value));
+#elif defined(SLICE)
+    imageStore(target, ivec3(at.xy, slice), STORED(value));
+#else
+    imageStore(target, at.xy, STORED(value));
+#endif
+}

@@ -1,0 +1,29 @@
+    // Rays, affine in the pixel's place.
+    vec3 origin;
+    vec3 origin_dx;
+    vec3 origin_dy;
+    vec3 direction;
+    vec3 direction_dx;
+    vec3 direction_dy;
+    // What is rendered, mm.
+    vec3 box_low;
+    vec3 box_high;
+    float step_length; // mm
+    float window_low;
+    float window_scale;
+    // Space to texture.
+    vec2 grid_origin;  // in-plane mm of pixel (0, 0)
+    vec2 grid_density; // pixels a mm
+    float slice_origin; // Cartesian: mm of slice 0
+    float slice_density;
+    // The sector: ranges in mm, lines as half tangents (curved) or mm (linear).
+    float range_low;
+    float range_high;
+    float line_low;
+    float line_high;
+    float axis_depth; // Y of the wobble axis, mm
+    // The sweep look-up table: slice position, as half tangent (fan) or mm, to slice index.
+    float sweep_low;
+    float sweep_density;
+    float line_density; // entries of the line look-up table
+    float advance;      // slices that the motor travels over the lines of a frame

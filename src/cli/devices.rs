@@ -1,0 +1,41 @@
+//! `echolume devices`.
+
+use super::{Failure, failed, say};
+use echolume::gpu::{Choice, context, select};
+
+#[derive(clap::Args)]
+pub struct Devices {}
+
+impl Devices {
+    pub fn run(&self) -> Result<(), Failure> {
+        let devices = context::list().map_err(failed)?;
+        let picked = select::choose(&devices, &Choice::Best);
+        for (i, device) in devices.iter().enumerate() {
+            say!(
+                "{i} {} ({}, Vulkan {}, {})",
+                device.name,
+                device.kind_name(),
+                device.api_version(),
+                device.driver.trim()
+            );
+            if !device.lacks.is_empty() {
+                say!("    cannot be used: lacks {}", device.lacks.join(", "));
+            }
+            for without in &device.without {
+                say!("    does without {without}");
+            }
+            match &picked {
+                Ok(n) if *n == i && device.is_software() => {
+                    say!("    picked: nothing else fits. It is software: the same pictures, slowly");
+                }
+                Ok(n) if *n == i => say!("    picked: the best that lacks nothing"),
+                _ if !device.lacks.is_empty() => {}
+                _ if device.is_software() => {
+                    say!("    not picked: software is the last choice; --device {i} asks for it")
+                }
+                _ => say!("    not picked: another one comes first; --device {i} asks for it"),
+            }
+        }
+        picked.map(drop).map_err(failed)
+    }
+}

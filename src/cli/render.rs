@@ -1,0 +1,192 @@
+//! `echolume render`.
+
+use super::{Failure, failed, input, say};
+use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::plan::Plan;
+use echolume::report::{dump, times};
+use echolume::scene::load::Layers;
+use echolume::scene::{Input, Scene};
+use echolume::source::Recording;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Settings come in layers: defaults, --preset, --scene, then flags and --set, each overriding the one \
+                        before.\n\nExamples:\n  \
+                        echolume render sweep.mha --preset fetal\n  \
+                        echolume render sweep.vol --mode vr --camera azimuth=30,zoom=1.5 -o view.png\n  \
+                        echolume render bone.mha --preset bone --roi depth=20:50 --explain"
+)]
+pub struct Render {
+    /// MetaImage (.mha, .mhd) or Kretz (.vol) file
+    input: PathBuf,
+    /// The picture to write (PNG)
+    #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
+    output: PathBuf,
+    /// vr (volume) or sr (surface)
+    #[arg(long)]
+    mode: Option<String>,
+    /// Settings in TOML
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Settings that suit a kind of picture: bone, fetal
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH")]
+    size: Option<String>,
+    /// azimuth, elevation, roll, fov (deg; 0 is parallel), zoom, target=lateral:depth:elevation (mm)
+    #[arg(long, value_name = "KEY=VALUE,...", allow_hyphen_values = true)]
+    camera: Option<String>,
+    /// What is rendered, mm: lateral=LOW:HIGH,depth=LOW:HIGH,elevation=LOW:HIGH
+    #[arg(long, value_name = "SIDE=LOW:HIGH,...", allow_hyphen_values = true)]
+    roi: Option<String>,
+    /// Any setting of a scene file, such as surface.threshold=0.1
+    #[arg(long, value_name = "KEY.PATH=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
+    /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the recording
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// Which volume of the recording, from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    volume: usize,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<Choice>,
+    /// Print the plan: passes, bytes, and why each is there or not; render nothing
+    #[arg(long)]
+    explain: bool,
+    /// Write every slot as a picture into this folder
+    #[arg(long, value_name = "DIR")]
+    dump: Option<PathBuf>,
+    /// Print the time of every pass
+    #[arg(long)]
+    timings: bool,
+    /// Run with Vulkan validation; any message is a failure
+    #[arg(long)]
+    validate: bool,
+    /// Compile the shaders from this folder instead of using the built-in ones
+    #[cfg(feature = "hot-reload")]
+    #[arg(long, value_name = "DIR")]
+    glsl: Option<PathBuf>,
+}
+
+impl Render {
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut recording = Recording::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        if self.volume >= recording.volumes() {
+            let there = recording.volumes();
+            return Err(input(format!(
+                "{}: --volume {}: the recording has {there}",
+                self.input.display(),
+                self.volume
+            )));
+        }
+        let geometry = recording.geometry(self.volume);
+        let samples = Input { stored: recording.stored_type(), range: recording.range() };
+        let scene = Scene::new(geometry, samples, self.settings()?).map_err(input)?;
+        if self.explain {
+            let plan = Plan::new(&scene);
+            say!("{}", plan.explain(&scene).trim_end());
+            return Ok(());
+        }
+
+        let device = self.device.clone().unwrap_or(Choice::Best);
+        let context = Context::new(&ContextOptions { device, validation: self.validate }).map_err(failed)?;
+        let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
+        say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
+        let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(failed)?;
+        self.send(&mut recording, &mut renderer)?;
+        let picture = renderer.picture().map_err(failed)?;
+        picture.save(&self.output).map_err(failed)?;
+        say!("picture: {}", self.output.display());
+        if self.timings {
+            let measured = renderer.take_times().map_err(failed)?;
+            say!("{}", times::table(&measured, renderer.scene()).trim_end());
+        }
+        if let Some(folder) = &self.dump {
+            self.write_dump(folder, &mut renderer)?;
+        }
+        drop(renderer);
+        match context.messages().first() {
+            None => Ok(()),
+            Some(first) => Err(failed(format!("validation: {first}"))),
+        }
+    }
+
+    fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
+        let mut layers = Layers::default();
+        if let Some(preset) = &self.preset {
+            layers.preset(preset).map_err(input)?;
+        }
+        if let Some(file) = &self.scene {
+            layers.file(file).map_err(input)?;
+        }
+        for assignment in self.flags()?.iter().chain(&self.set) {
+            layers.set(assignment).map_err(input)?;
+        }
+        layers.finish().map_err(input)
+    }
+
+    /// The flags as assignments.
+    fn flags(&self) -> Result<Vec<String>, Failure> {
+        let mut set = Vec::new();
+        set.extend(self.mode.as_ref().map(|mode| format!("mode={mode}")));
+        if let Some(size) = &self.size {
+            let edges = size.split_once('x').ok_or_else(|| input(format!("--size {size}: must read WIDTHxHEIGHT")))?;
+            set.push(format!("picture.size=[{},{}]", edges.0, edges.1));
+        }
+        for (flag, table, text) in [("--camera", "camera", &self.camera), ("--roi", "region", &self.roi)] {
+            for part in text.iter().flat_map(|t| t.split(',')) {
+                let pair = part.split_once('=');
+                let (key, value) = pair.ok_or_else(|| input(format!("{flag} {part}: must read key=value")))?;
+                let key = if key == "fov" { "field_of_view" } else { key };
+                let value = if value.contains(':') { format!("[{}]", value.replace(':', ",")) } else { value.into() };
+                set.push(format!("{table}.{key}={value}"));
+            }
+        }
+        Ok(set)
+    }
+
+    #[cfg(feature = "hot-reload")]
+    fn options(&self) -> Result<Options, Failure> {
+        let mut options = Options::default();
+        if let Some(folder) = &self.glsl {
+            options.shaders = echolume::gpu::hot_reload::compile(folder).map_err(input)?;
+        }
+        Ok(options)
+    }
+
+    #[cfg(not(feature = "hot-reload"))]
+    fn options(&self) -> Result<Options, Failure> {
+        Ok(Options::default())
+    }
+
+    /// Every frame of the volume through stage 1.
+    fn send(&self, recording: &mut Recording, renderer: &mut Renderer) -> Result<(), Failure> {
+        recording.skip_to_volume(self.volume).map_err(input)?;
+        let frames = recording.frames_per_volume();
+        let bar = indicatif::ProgressBar::new(frames as u64).with_message("frames");
+        for _ in 0..frames {
+            let Some(frame) = recording.next_frame().map_err(input)? else { break };
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        renderer.show(0);
+        Ok(())
+    }
+
+    fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {
+        let cannot = |e: std::io::Error| failed(format!("{}: cannot be written: {e}", folder.display()));
+        std::fs::create_dir_all(folder).map_err(cannot)?;
+        for slot in renderer.plan().slots.clone() {
+            let texels = renderer.read(slot).map_err(failed)?;
+            let drawn = dump::draw(slot, texels.as_ref(), renderer.scene());
+            let file = folder.join(format!("{}.png", slot.name()));
+            drawn.save(&file).map_err(failed)?;
+        }
+        say!("slots: {}", folder.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,270 @@
+//! Instance, device, queue, allocator and messenger. One `Arc` of it is held by everything made from it, and its one `Drop`
+//! is the order of destruction.
+
+use super::GpuError;
+use super::error::Doing;
+use super::faults::{Faults, Seam};
+use super::select::{self, Candidate, Choice};
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::collections::HashMap;
+use std::ffi::{CStr, CString, c_void};
+use std::sync::{Arc, Mutex};
+
+const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+#[derive(Clone, Debug)]
+pub struct ContextOptions {
+    pub device: Choice,
+    /// Core and synchronization validation; every message is kept in [`Context::messages`].
+    pub validation: bool,
+}
+
+pub struct Context {
+    /// Kept loaded as long as anything made from it lives.
+    _entry: ash::Entry,
+    instance: ash::Instance,
+    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Box<Mutex<Vec<String>>>,
+    pub candidate: Candidate,
+    pub limits: vk::PhysicalDeviceLimits,
+    pub device: ash::Device,
+    pub push_descriptor: ash::khr::push_descriptor::Device,
+    names: Option<ash::ext::debug_utils::Device>,
+    pub queue: vk::Queue,
+    /// Families that slots which cross queues are shared between; one here until a device offers more.
+    pub queue_families: Vec<u32>,
+    /// Taken in `drop`, before the device goes.
+    pub(super) allocator: Mutex<Option<Allocator>>,
+    formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
+    pub faults: Faults,
+}
+
+/// Loads Vulkan and lists the devices, for `echolume devices`.
+pub fn list() -> Result<Vec<Candidate>, GpuError> {
+    let entry = load()?;
+    let instance = create_instance(&entry, false, false)?;
+    let candidates = select::candidates(&instance);
+    // SAFETY: nothing made from the instance is left.
+    unsafe { instance.destroy_instance(None) };
+    candidates
+}
+
+fn load() -> Result<ash::Entry, GpuError> {
+    // SAFETY: loading libvulkan runs its initialisers; it is the system's own Vulkan loader.
+    unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
+}
+
+fn create_instance(entry: &ash::Entry, validation: bool, debug_utils: bool) -> Result<ash::Instance, GpuError> {
+    let application = vk::ApplicationInfo::default()
+        .application_name(c"echolume")
+        .engine_name(c"echolume")
+        .api_version(vk::API_VERSION_1_3);
+    let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
+    let extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let mut create = vk::InstanceCreateInfo::default()
+        .application_info(&application)
+        .enabled_layer_names(&layers)
+        .enabled_extension_names(&extensions);
+    if validation {
+        create = create.push_next(&mut features);
+    }
+    // SAFETY: every pointer in `create` outlives the call.
+    let instance = unsafe { entry.create_instance(&create, None) };
+    match instance {
+        // The loader says so when no driver is installed at all.
+        Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(GpuError::NoDevice),
+        other => other.doing(|| "create instance".into()),
+    }
+}
+
+impl Context {
+    /// # Errors
+    /// No loader, no device, a device that lacks what is required, or no validation layer when validation was asked for.
+    pub fn new(options: &ContextOptions) -> Result<Arc<Context>, GpuError> {
+        let entry = load()?;
+        // SAFETY: only reads the list of layers.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        if options.validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
+            return Err(GpuError::NoValidation);
+        }
+        // SAFETY: only reads the list of extensions.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+        let debug_utils = options.validation
+            || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
+        let instance = create_instance(&entry, options.validation, debug_utils)?;
+        let made = Context::on_instance(entry, &instance, options, debug_utils);
+        if made.is_err() {
+            // SAFETY: `on_instance` leaves nothing alive when it fails.
+            unsafe { instance.destroy_instance(None) };
+        }
+        made
+    }
+
+    fn on_instance(
+        entry: ash::Entry,
+        instance: &ash::Instance,
+        options: &ContextOptions,
+        debug_utils: bool,
+    ) -> Result<Arc<Context>, GpuError> {
+        let candidates = select::candidates(instance)?;
+        let candidate = candidates[select::choose(&candidates, &options.device)?].clone();
+        let device = create_device(instance, &candidate)?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.clone(),
+            device: device.clone(),
+            physical_device: candidate.handle,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(e) => {
+                // SAFETY: nothing made from the device is left.
+                unsafe { device.destroy_device(None) };
+                return Err(GpuError::Memory { doing: "create allocator".into(), fault: e.to_string() });
+            }
+        };
+        let messages = Box::new(Mutex::new(Vec::new()));
+        let messenger = options.validation.then(|| create_messenger(&entry, instance, &messages)).flatten();
+        Ok(Arc::new(Context {
+            push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
+            names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
+            // SAFETY: the device was created with one queue of this family.
+            queue: unsafe { device.get_device_queue(candidate.queue_family, 0) },
+            queue_families: vec![candidate.queue_family],
+            limits: candidate.limits,
+            instance: instance.clone(),
+            _entry: entry,
+            messenger,
+            messages,
+            candidate,
+            device,
+            allocator: Mutex::new(Some(allocator)),
+            formats: Mutex::default(),
+            faults: Faults::default(),
+        }))
+    }
+
+    /// What validation has said so far; silence is the pass mark.
+    pub fn messages(&self) -> Vec<String> {
+        self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// Features of a format in optimal tiling.
+    pub fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
+        *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
+    }
+
+    /// Names an object in captures and validation messages.
+    pub(super) fn name<T: vk::Handle>(&self, object: T, name: &str) {
+        let Some(names) = &self.names else { return };
+        let Ok(name) = CString::new(name) else { return };
+        let naming = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object is alive and the name outlives the call. A name that cannot be set is not worth an error.
+        let _ = unsafe { names.set_debug_utils_object_name(&naming) };
+    }
+
+    pub(super) fn begin_label(&self, commands: vk::CommandBuffer, label: &str) {
+        let Some(names) = &self.names else { return };
+        let Ok(label) = CString::new(label) else { return };
+        // SAFETY: the command buffer is being recorded; the label outlives the call.
+        unsafe { names.cmd_begin_debug_utils_label(commands, &vk::DebugUtilsLabelEXT::default().label_name(&label)) };
+    }
+
+    pub(super) fn end_label(&self, commands: vk::CommandBuffer) {
+        if let Some(names) = &self.names {
+            // SAFETY: ends the label that `begin_label` began on the same command buffer.
+            unsafe { names.cmd_end_debug_utils_label(commands) };
+        }
+    }
+
+    pub(super) fn submit(&self, submit: &vk::SubmitInfo2, doing: impl FnOnce() -> String) -> Result<(), GpuError> {
+        self.faults
+            .pass(Seam::Submit)
+            // SAFETY: the queue is used by one thread (a renderer is not shared); the command buffer in `submit` is recorded
+            // and what it names is alive until the timeline says it is done.
+            .and_then(|()| unsafe { self.device.queue_submit2(self.queue, &[*submit], vk::Fence::null()) })
+            .doing(doing)
+    }
+}
+
+fn create_device(instance: &ash::Instance, candidate: &Candidate) -> Result<ash::Device, GpuError> {
+    let priorities = [1.0];
+    let queues =
+        [vk::DeviceQueueCreateInfo::default().queue_family_index(candidate.queue_family).queue_priorities(&priorities)];
+    let extensions = [ash::khr::push_descriptor::NAME.as_ptr()];
+    let core = vk::PhysicalDeviceFeatures::default()
+        .shader_storage_image_extended_formats(true)
+        .shader_storage_image_write_without_format(true);
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .timeline_semaphore(true)
+        .host_query_reset(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
+    let create = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .enabled_features(&core)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    // SAFETY: `choose` made sure that everything asked for is there; every pointer outlives the call.
+    unsafe { instance.create_device(candidate.handle, &create, None) }
+        .doing(|| format!("create device '{}'", candidate.name))
+}
+
+fn create_messenger(
+    entry: &ash::Entry,
+    instance: &ash::Instance,
+    messages: &Mutex<Vec<String>>,
+) -> Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)> {
+    let debug = ash::ext::debug_utils::Instance::new(entry, instance);
+    let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+        // Not PERFORMANCE: it asks for transfer layouts, and images stay in GENERAL by design.
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+        .pfn_user_callback(Some(on_message))
+        .user_data(std::ptr::from_ref(messages).cast_mut().cast());
+    // SAFETY: `messages` is boxed in the context and dropped after the messenger.
+    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) }.ok()?;
+    Some((debug, messenger))
+}
+
+unsafe extern "system" fn on_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    if data.is_null() || messages.is_null() {
+        return vk::FALSE;
+    }
+    // SAFETY: Vulkan hands over valid data, and `messages` is the context's boxed mutex, which outlives the messenger.
+    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
+    // SAFETY: a message is null or a terminated string.
+    let text = unsafe { data.message_as_c_str() }.map_or(String::new(), |m| m.to_string_lossy().into_owned());
+    tracing::error!(target: "validation", "{text}");
+    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
+    vk::FALSE
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: everything made from this context held an `Arc` of it and is gone. The order is the one of creation reversed.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
+            self.device.destroy_device(None);
+            if let Some((debug, messenger)) = self.messenger.take() {
+                debug.destroy_debug_utils_messenger(messenger, None);
+            }
+            self.instance.destroy_instance(None);
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! What went wrong, and what was being done to what.
+
+use ash::vk;
+
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    #[error("no Vulkan loader: {0}; install one (Debian: apt-get install libvulkan1 mesa-vulkan-drivers)")]
+    NoLoader(String),
+    #[error("no Vulkan device; install a driver (Debian, software: apt-get install mesa-vulkan-drivers)")]
+    NoDevice,
+    #[error("no device fits: {0}")]
+    NoneFits(String),
+    #[error("device {wanted:?} is not there; there are: {there}")]
+    NoSuchDevice { wanted: String, there: String },
+    #[error(
+        "validation was asked for, but the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
+    )]
+    NoValidation,
+    #[error("{doing}: {}", describe(*.result))]
+    Vulkan { doing: String, result: vk::Result },
+    #[error("{doing}: {fault}")]
+    Memory { doing: String, fault: String },
+    #[error("{what}: needs {needed}, the device allows {allowed}")]
+    Limit { what: String, needed: u64, allowed: u64 },
+    #[error("{what}: the device cannot use {format} as {usage}")]
+    Format { what: String, format: String, usage: String },
+    #[error("{shader}: {fault}")]
+    Shader { shader: String, fault: String },
+    #[error("frame: {got} bytes arrived, the scene's frames have {expected}")]
+    FrameSize { got: usize, expected: usize },
+    #[error("frame for slice {slice}, the volume has {slices}")]
+    FrameSlice { slice: u32, slices: u32 },
+    #[error("the device did not finish within {seconds} s; last submitted: {doing}")]
+    TimedOut { seconds: u64, doing: String },
+}
+
+impl GpuError {
+    /// The device is gone: everything has to be built anew.
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. })
+    }
+}
+
+/// Turns a Vulkan result into an error that says what was being done.
+pub trait Doing<T> {
+    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError>;
+}
+
+impl<T> Doing<T> for Result<T, vk::Result> {
+    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError> {
+        self.map_err(|result| GpuError::Vulkan { doing: what(), result })
+    }
+}
+
+fn describe(result: vk::Result) -> String {
+    match result {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => "out of device memory".into(),
+        vk::Result::ERROR_OUT_OF_HOST_MEMORY => "out of host memory".into(),
+        vk::Result::ERROR_DEVICE_LOST => "the device was lost".into(),
+        other => format!("{other:?}"),
+    }
+}

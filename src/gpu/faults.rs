@@ -1,0 +1,39 @@
+//! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested.
+
+use ash::vk;
+use std::sync::Mutex;
+
+/// Where a call into the driver can be made to fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seam {
+    Allocate,
+    Submit,
+    Wait,
+}
+
+/// At most one planned failure.
+#[derive(Default)]
+pub struct Faults(Mutex<Option<(Seam, u32, vk::Result)>>);
+
+impl Faults {
+    /// The `after`-th call from now (0: the next) at this seam returns `result` instead of reaching the driver.
+    pub fn inject(&self, seam: Seam, after: u32, result: vk::Result) {
+        *self.0.lock().unwrap_or_else(|e| e.into_inner()) = Some((seam, after, result));
+    }
+
+    pub(super) fn pass(&self, seam: Seam) -> Result<(), vk::Result> {
+        let mut planned = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        match planned.as_mut() {
+            Some((at, 0, result)) if *at == seam => {
+                let result = *result;
+                *planned = None;
+                Err(result)
+            }
+            Some((at, left, _)) if *at == seam => {
+                *left -= 1;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}

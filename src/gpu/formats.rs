@@ -1,0 +1,75 @@
+//! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
+
+use super::{Context, GpuError};
+use crate::passes::Slot;
+use crate::passes::slots::{Format, Shape};
+use crate::plan::Plan;
+use crate::scene::{Sampling, Scene};
+use ash::vk;
+
+pub fn vulkan(format: Format) -> vk::Format {
+    match format {
+        Format::R8 => vk::Format::R8_UNORM,
+        Format::R16 => vk::Format::R16_UNORM,
+        Format::R16f => vk::Format::R16_SFLOAT,
+        Format::R32f | Format::Floats => vk::Format::R32_SFLOAT,
+        Format::Rg16f => vk::Format::R16G16_SFLOAT,
+        Format::Rg32f => vk::Format::R32G32_SFLOAT,
+        Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
+        Format::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+    }
+}
+
+/// What an image of this slot is used for.
+pub fn usage(slot: Slot) -> vk::ImageUsageFlags {
+    let read = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::TRANSFER_SRC;
+    match slot {
+        Slot::Frames | Slot::ScanLut => read,
+        _ => read | vk::ImageUsageFlags::STORAGE,
+    }
+}
+
+fn features(slot: Slot, scene: &Scene) -> vk::FormatFeatureFlags {
+    let mut features = vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::TRANSFER_DST;
+    if usage(slot).contains(vk::ImageUsageFlags::STORAGE) {
+        features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
+    }
+    if slot == Slot::Volume && scene.settings.ray.sampling == Sampling::Hardware {
+        features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+    }
+    features
+}
+
+/// Refuses a plan whose slots the device cannot hold, before anything is allocated.
+pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuError> {
+    let limits = &context.limits;
+    for &slot in &plan.slots {
+        let what = || format!("image '{}' ({:?} {:?})", slot.name(), slot.shape(scene), slot.format(scene));
+        let within = |needed: u32, allowed: u32| match needed <= allowed {
+            true => Ok(()),
+            false => Err(GpuError::Limit { what: what(), needed: needed.into(), allowed: allowed.into() }),
+        };
+        match slot.shape(scene) {
+            Shape::Buffer(bytes) => {
+                within(bytes, limits.max_storage_buffer_range)?;
+                continue;
+            }
+            Shape::Two([w, h]) => within(w.max(h), limits.max_image_dimension2_d)?,
+            Shape::Layers([w, h, n]) => {
+                within(w.max(h), limits.max_image_dimension2_d)?;
+                within(n, limits.max_image_array_layers)?;
+            }
+            Shape::Three([w, h, d]) => within(w.max(h).max(d), limits.max_image_dimension3_d)?,
+        }
+        let format = vulkan(slot.format(scene));
+        let needed = features(slot, scene);
+        if !context.format_features(format).contains(needed) {
+            return Err(GpuError::Format {
+                what: what(),
+                format: format!("{format:?}"),
+                usage: format!("{:?}", needed & !context.format_features(format)),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,23 @@
+//! The only folder that knows Vulkan, and the only one with unsafe code.
+//!
+//! [`context`] owns instance, device, queue and allocator; [`resources`] images and buffers; [`pipelines`] what a shader
+//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer with its barriers and time stamps;
+//! [`renderer`] the four stages; [`single`] one pass alone, for tests.
+
+pub mod context;
+pub mod error;
+pub mod faults;
+pub mod formats;
+pub mod pipelines;
+pub mod recorder;
+pub mod renderer;
+pub mod resources;
+pub mod select;
+pub mod single;
+pub mod slots;
+pub mod timing;
+
+pub use context::{Context, ContextOptions};
+pub use error::GpuError;
+pub use renderer::{Options, Renderer};
+pub use select::{Candidate, Choice};

@@ -1,0 +1,171 @@
+//! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
+
+use super::GpuError;
+use super::context::Context;
+use super::error::Doing;
+use crate::passes::{Pass, contract};
+use crate::scene::Scene;
+use crate::spirv::{self, Kind, Module};
+use ash::vk;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A compute pipeline and what it is bound by.
+pub struct Pipeline {
+    context: Arc<Context>,
+    pub module: Module,
+    set_layout: vk::DescriptorSetLayout,
+    pub layout: vk::PipelineLayout,
+    pub handle: vk::Pipeline,
+}
+
+type Key = (&'static str, Vec<(&'static str, i32)>);
+
+/// Where the words of a shader come from; embedded unless hot reload compiles them.
+pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
+
+/// Every pipeline made so far, by shader and constants: going back to an earlier setting compiles nothing.
+pub struct Pipelines {
+    context: Arc<Context>,
+    made: HashMap<Key, Arc<Pipeline>>,
+    shaders: Arc<Shaders>,
+    sampler: vk::Sampler,
+}
+
+/// The shaders that are part of the program.
+pub fn embedded() -> Arc<Shaders> {
+    Arc::new(|name| {
+        spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
+    })
+}
+
+pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
+    match kind {
+        Kind::Params => vk::DescriptorType::UNIFORM_BUFFER,
+        Kind::Sampled => vk::DescriptorType::SAMPLED_IMAGE,
+        Kind::Filtered => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+        Kind::Storage => vk::DescriptorType::STORAGE_IMAGE,
+        Kind::Buffer => vk::DescriptorType::STORAGE_BUFFER,
+    }
+}
+
+impl Pipelines {
+    pub fn new(context: &Arc<Context>, shaders: Arc<Shaders>) -> Result<Pipelines, GpuError> {
+        let create = vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR)
+            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
+        // SAFETY: the create structure is complete.
+        let sampler = unsafe { context.device.create_sampler(&create, None) }.doing(|| "create sampler".into())?;
+        context.name(sampler, "trilinear");
+        Ok(Pipelines { context: context.clone(), made: HashMap::new(), shaders, sampler })
+    }
+
+    /// The pipeline of a pass in a scene; made at its first use.
+    ///
+    /// # Errors
+    /// A shader that is not there, or that disagrees with the pass's declaration.
+    pub fn get(&mut self, pass: &Pass, scene: &Scene) -> Result<Arc<Pipeline>, GpuError> {
+        let key = ((pass.shader)(scene), (pass.constants)(scene));
+        if let Some(pipeline) = self.made.get(&key) {
+            return Ok(pipeline.clone());
+        }
+        let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
+        let words = (self.shaders)(key.0).map_err(at_fault)?;
+        let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
+        contract::check(pass, scene, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
+        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, &key, &words, module)?);
+        self.made.insert(key, pipeline.clone());
+        Ok(pipeline)
+    }
+}
+
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        self.made.clear();
+        // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
+        unsafe { self.context.device.destroy_sampler(self.sampler, None) };
+    }
+}
+
+impl Pipeline {
+    fn new(
+        context: &Arc<Context>,
+        sampler: vk::Sampler,
+        key: &Key,
+        words: &[u32],
+        module: Module,
+    ) -> Result<Pipeline, GpuError> {
+        let device = &context.device;
+        let doing = || format!("create pipeline '{}'", key.0);
+        let samplers = [sampler];
+        let bindings: Vec<_> = module
+            .bindings
+            .iter()
+            .map(|b| {
+                let binding = vk::DescriptorSetLayoutBinding::default()
+                    .binding(b.binding)
+                    .descriptor_type(descriptor_type(b.kind))
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE);
+                if b.kind == Kind::Filtered { binding.immutable_samplers(&samplers) } else { binding }
+            })
+            .collect();
+        let create = vk::DescriptorSetLayoutCreateInfo::default()
+            .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
+            .bindings(&bindings);
+        // SAFETY: the structures are complete and outlive the calls; a failure below drops `pipeline`, which frees what is made.
+        let set_layout = unsafe { device.create_descriptor_set_layout(&create, None) }.doing(doing)?;
+        let mut pipeline = Pipeline {
+            context: context.clone(),
+            module,
+            set_layout,
+            layout: vk::PipelineLayout::null(),
+            handle: vk::Pipeline::null(),
+        };
+        let layouts = [set_layout];
+        let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
+        // SAFETY: as above.
+        pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.doing(doing)?;
+        // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
+        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
+            .doing(doing)?;
+        context.name(shader, key.0);
+        let constants: Vec<(u32, i32)> = (pipeline.module.constants.iter())
+            .filter_map(|c| key.1.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
+            .collect();
+        let entries: Vec<_> = constants
+            .iter()
+            .enumerate()
+            .map(|(i, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * i as u32, size: 4 })
+            .collect();
+        let values: Vec<u8> = constants.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect();
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(shader)
+            .name(c"main")
+            .specialization_info(&specialization);
+        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
+        // SAFETY: as above; the shader module is alive until after the call.
+        let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
+        // SAFETY: a module may go once its pipelines are made.
+        unsafe { device.destroy_shader_module(shader, None) };
+        pipeline.handle = made.map_err(|(_, result)| result).doing(doing)?[0];
+        context.name(pipeline.handle, key.0);
+        Ok(pipeline)
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        // SAFETY: whoever drops the last reference has waited for the device; null handles are allowed.
+        unsafe {
+            self.context.device.destroy_pipeline(self.handle, None);
+            self.context.device.destroy_pipeline_layout(self.layout, None);
+            self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

@@ -1,0 +1,451 @@
+//! One command buffer: operations with the barriers they need, labels, time stamps, and their parameters.
+
+use super::GpuError;
+use super::context::Context;
+use super::error::Doing;
+use super::faults::Seam;
+use super::pipelines::{Pipeline, descriptor_type};
+use super::resources::{Buffer, Image, Purpose, WHOLE};
+use super::slots::{Resource, Slots};
+use super::timing::{self, Stamps};
+use crate::barriers::{self, Access, Barrier, Tracker, Worker, Workers};
+use crate::passes::{Part, Pass, PassTime, Slot, Turn, contract};
+use crate::scene::Scene;
+use crate::spirv::Kind;
+use ash::vk;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Room for the parameters of one command buffer.
+const PARAMS_BYTES: u64 = 64 << 10;
+const STAMPS: u32 = 128;
+/// A software device may need minutes for a picture of 16k pixels.
+const TIME_OUT: u64 = 600;
+
+/// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
+#[derive(Default)]
+pub struct Order {
+    pub tracker: Tracker,
+    pub barriers: u32,
+    /// Names of the passes dispatched, in order, while someone counts them.
+    pub dispatched: Option<Vec<&'static str>>,
+    /// Leaves out the n-th barrier, to show that something notices.
+    pub drop_barrier: Option<u32>,
+}
+
+/// One dispatch: a pass, and what it runs on.
+#[derive(Clone, Copy)]
+pub struct Work<'a> {
+    pub slots: &'a Slots,
+    pub pipeline: &'a Pipeline,
+    pub scene: &'a Scene,
+    pub pass: &'static Pass,
+    pub turn: &'a Turn,
+}
+
+/// Parts of a slot: layers of an array, slices of a 3D image; of one of the images that take turns.
+#[derive(Clone, Debug)]
+pub struct Place {
+    pub slot: Slot,
+    pub copy: u32,
+    pub parts: Range<u32>,
+}
+
+/// Done when the timeline has reached a value.
+pub struct Timeline {
+    context: Arc<Context>,
+    semaphore: vk::Semaphore,
+    pub submitted: u64,
+    doing: String,
+}
+
+pub struct Recorder {
+    context: Arc<Context>,
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    params: Buffer,
+    params_used: u64,
+    pub stamps: Option<Stamps>,
+    /// Value of the timeline at which the last submission is done.
+    done_at: u64,
+    /// The submission whose times were added last.
+    collected_to: u64,
+    label: &'static str,
+}
+
+impl Timeline {
+    pub fn new(context: &Arc<Context>) -> Result<Timeline, GpuError> {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the chain is complete and outlives the call.
+        let semaphore = unsafe { context.device.create_semaphore(&create, None) }.doing(|| "create timeline".into())?;
+        context.name(semaphore, "timeline");
+        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, doing: String::new() })
+    }
+
+    /// Blocks until a submission is done.
+    pub fn wait(&self, value: u64) -> Result<(), GpuError> {
+        let (semaphores, values) = ([self.semaphore], [value]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore is alive; the arrays outlive the call.
+        let result = self
+            .context
+            .faults
+            .pass(Seam::Wait)
+            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIME_OUT * 1_000_000_000) });
+        match result {
+            Err(vk::Result::TIMEOUT) => Err(GpuError::TimedOut { seconds: TIME_OUT, doing: self.doing.clone() }),
+            other => other.doing(|| format!("run {}", self.doing)),
+        }
+    }
+
+    pub fn wait_all(&self) -> Result<(), GpuError> {
+        self.wait(self.submitted)
+    }
+}
+
+impl Drop for Timeline {
+    fn drop(&mut self) {
+        // SAFETY: the owner waited for the device before it drops its timeline.
+        unsafe { self.context.device.destroy_semaphore(self.semaphore, None) };
+    }
+}
+
+impl Recorder {
+    pub fn new(context: &Arc<Context>, label: &'static str) -> Result<Recorder, GpuError> {
+        let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.candidate.queue_family);
+        let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
+        let stamps = Stamps::new(context, STAMPS)?;
+        // SAFETY: the create structure is complete.
+        let pool = unsafe { context.device.create_command_pool(&create, None) }.doing(|| "create commands".into())?;
+        context.name(pool, label);
+        let allocate = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        // SAFETY: the pool was just made; one buffer is asked for.
+        let commands = unsafe { context.device.allocate_command_buffers(&allocate) };
+        let mut recorder = Recorder {
+            context: context.clone(),
+            pool,
+            commands: vk::CommandBuffer::null(),
+            params,
+            params_used: 0,
+            stamps,
+            done_at: 0,
+            collected_to: 0,
+            label,
+        };
+        recorder.commands = commands.doing(|| "create commands".into())?[0];
+        context.name(recorder.commands, label);
+        Ok(recorder)
+    }
+
+    /// Waits until the last submission is done, then starts anew.
+    pub fn begin(&mut self, timeline: &Timeline) -> Result<(), GpuError> {
+        timeline.wait(self.done_at)?;
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the device is done with this pool's only command buffer.
+        unsafe {
+            self.context
+                .device
+                .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
+                .and_then(|()| self.context.device.begin_command_buffer(self.commands, &begin))
+        }
+        .doing(|| format!("record '{}'", self.label))?;
+        self.params_used = 0;
+        if let Some(stamps) = &mut self.stamps {
+            stamps.begin(self.commands);
+        }
+        Ok(())
+    }
+
+    /// Adds the times of the last submission, once, when it is done.
+    pub fn collect(&mut self, timeline: &Timeline, times: &mut Vec<PassTime>) -> Result<(), GpuError> {
+        if self.collected_to == self.done_at {
+            return Ok(());
+        }
+        timeline.wait(self.done_at)?;
+        self.collected_to = self.done_at;
+        if let Some(stamps) = &self.stamps {
+            timing::add(times, &stamps.read()?);
+        }
+        Ok(())
+    }
+
+    pub fn submit(&mut self, timeline: &mut Timeline) -> Result<(), GpuError> {
+        // SAFETY: the command buffer is being recorded.
+        unsafe { self.context.device.end_command_buffer(self.commands) }
+            .doing(|| format!("record '{}'", self.label))?;
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
+        let signal = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(timeline.semaphore)
+            .value(timeline.submitted + 1)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signal);
+        self.context.submit(&submit, || format!("submit '{}'", self.label))?;
+        timeline.submitted += 1;
+        timeline.doing = self.label.to_string();
+        self.done_at = timeline.submitted;
+        Ok(())
+    }
+
+    /// New images from UNDEFINED to GENERAL, and all their bits to zero: pixels outside the sector are never written again.
+    pub fn clear_new(&mut self, order: &mut Order, slots: &Slots, new: &[(Slot, u32)]) {
+        let images: Vec<(&Image, Slot, u32)> =
+            new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
+        let transitions: Vec<_> = images
+            .iter()
+            .map(|(image, ..)| {
+                vk::ImageMemoryBarrier2::default()
+                    .src_stage_mask(vk::PipelineStageFlags2::NONE)
+                    .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
+                    .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+                    .old_layout(vk::ImageLayout::UNDEFINED)
+                    .new_layout(vk::ImageLayout::GENERAL)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .image(image.handle)
+                    .subresource_range(WHOLE)
+            })
+            .collect();
+        let device = &self.context.device;
+        // SAFETY: the images are new, alive, and used by nothing yet.
+        unsafe {
+            device.cmd_pipeline_barrier2(
+                self.commands,
+                &vk::DependencyInfo::default().image_memory_barriers(&transitions),
+            );
+        }
+        for (image, slot, n) in images {
+            let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, Worker::Copy);
+            self.barrier(order, &[access]);
+            let zero = vk::ClearColorValue { float32: [0.0; 4] };
+            // SAFETY: the image is in GENERAL since the transition above.
+            unsafe {
+                device.cmd_clear_color_image(self.commands, image.handle, vk::ImageLayout::GENERAL, &zero, &[WHOLE]);
+            }
+        }
+    }
+
+    /// One dispatch of a pass.
+    pub fn dispatch(&mut self, order: &mut Order, work: &Work) -> Result<(), GpuError> {
+        let Work { pipeline, scene, pass, turn, .. } = *work;
+        self.barrier(order, &barriers::accesses(scene, pass, turn));
+        self.context.begin_label(self.commands, pass.name);
+        let block = contract::pack(&pipeline.module, &(pass.params)(scene, turn));
+        let offset = self.place_params(&block)?;
+        self.bind(work, offset, block.len() as u64);
+        let extent = (pass.extent)(scene);
+        let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
+        // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
+        unsafe {
+            self.context.device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle);
+            self.context.device.cmd_dispatch(self.commands, groups[0], groups[1], groups[2]);
+        }
+        self.context.end_label(self.commands);
+        if let Some(stamps) = &mut self.stamps {
+            stamps.end_of(self.commands, pass.name);
+        }
+        if let Some(dispatched) = &mut order.dispatched {
+            dispatched.push(pass.name);
+        }
+        Ok(())
+    }
+
+    fn place_params(&mut self, block: &[u8]) -> Result<u64, GpuError> {
+        let alignment = self.context.limits.min_uniform_buffer_offset_alignment.max(16);
+        let offset = self.params_used.next_multiple_of(alignment);
+        let end = offset + block.len() as u64;
+        if end > PARAMS_BYTES {
+            return Err(GpuError::Limit {
+                what: "parameters of one command buffer".into(),
+                needed: end,
+                allowed: PARAMS_BYTES,
+            });
+        }
+        self.params.bytes_mut()[offset as usize..end as usize].copy_from_slice(block);
+        self.params_used = end;
+        Ok(offset)
+    }
+
+    fn bind(&self, work: &Work, params_offset: u64, params_size: u64) {
+        let Work { slots, pipeline, scene, pass, turn } = *work;
+        let binds = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
+        let mut images = Vec::with_capacity(binds.len());
+        let mut buffers = Vec::with_capacity(binds.len());
+        // Which of the two lists a binding's entry went to, and where.
+        let mut places = Vec::with_capacity(binds.len());
+        for binding in &pipeline.module.bindings {
+            let bound = binds.iter().find(|b| b.name == binding.name);
+            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, turn.image)))) {
+                (Kind::Params, _) => {
+                    places.push((binding, false, buffers.len()));
+                    buffers.push([vk::DescriptorBufferInfo {
+                        buffer: self.params.handle,
+                        offset: params_offset,
+                        range: params_size,
+                    }]);
+                }
+                (_, Some((_, Resource::Buffer(buffer)))) => {
+                    places.push((binding, false, buffers.len()));
+                    buffers.push([vk::DescriptorBufferInfo {
+                        buffer: buffer.handle,
+                        offset: 0,
+                        range: vk::WHOLE_SIZE,
+                    }]);
+                }
+                (_, Some((bind, Resource::Image(image)))) => {
+                    let view = match bind.part {
+                        Part::Layer => image.layers[turn.layer as usize],
+                        _ => image.view,
+                    };
+                    places.push((binding, true, images.len()));
+                    images.push([vk::DescriptorImageInfo {
+                        sampler: vk::Sampler::null(),
+                        image_view: view,
+                        image_layout: vk::ImageLayout::GENERAL,
+                    }]);
+                }
+                // The contract of pass and shader was checked when the pipeline was made.
+                (_, None) => {}
+            }
+        }
+        let writes: Vec<_> = places
+            .iter()
+            .map(|(binding, is_image, at)| {
+                let write = vk::WriteDescriptorSet::default()
+                    .dst_binding(binding.binding)
+                    .descriptor_type(descriptor_type(binding.kind));
+                if *is_image { write.image_info(&images[*at]) } else { write.buffer_info(&buffers[*at]) }
+            })
+            .collect();
+        // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait.
+        unsafe {
+            self.context.push_descriptor.cmd_push_descriptor_set(
+                self.commands,
+                vk::PipelineBindPoint::COMPUTE,
+                pipeline.layout,
+                0,
+                &writes,
+            );
+        }
+    }
+
+    /// Bytes of a staging buffer into parts of an image: layers of an array, slices of a 3D image.
+    pub fn copy_in(&mut self, order: &mut Order, from: &Buffer, image: &Image, to: Place) {
+        let parts = to.parts.clone();
+        self.barrier(order, &[Access::of_slot(to.slot, to.copy, to.parts, true, Worker::Copy)]);
+        // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
+        unsafe {
+            self.context.device.cmd_copy_buffer_to_image(
+                self.commands,
+                from.handle,
+                image.handle,
+                vk::ImageLayout::GENERAL,
+                &[region(image, parts.start, parts.end - parts.start)],
+            );
+        }
+    }
+
+    /// A whole image into the readback buffer, made visible to the host.
+    pub fn copy_out(&mut self, order: &mut Order, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
+        let parts = image.shape.parts();
+        let read = Access::of_slot(slot, copy, 0..parts, false, Worker::Copy);
+        let resource = barriers::Resource::Readback;
+        let write = Access { resource, parts: 0..1, write: true, by: Worker::Copy };
+        self.barrier(order, &[read, write]);
+        // SAFETY: the buffer is as large as the image (its maker sized it so) and both live until the device is done.
+        unsafe {
+            self.context.device.cmd_copy_image_to_buffer(
+                self.commands,
+                image.handle,
+                vk::ImageLayout::GENERAL,
+                to.handle,
+                &[region(image, 0, parts)],
+            );
+        }
+        self.barrier(order, &[Access { resource, parts: 0..1, write: false, by: Worker::Host }]);
+    }
+
+    pub fn stamp(&mut self, name: &'static str) {
+        if let Some(stamps) = &mut self.stamps {
+            stamps.end_of(self.commands, name);
+        }
+    }
+
+    fn barrier(&self, order: &mut Order, accesses: &[Access]) {
+        let Some(Barrier { from, to }) = order.tracker.before(accesses) else { return };
+        order.barriers += 1;
+        if order.drop_barrier == Some(order.barriers) {
+            return;
+        }
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(stages(from))
+            .src_access_mask(writes(from))
+            .dst_stage_mask(stages(to))
+            .dst_access_mask(reads(to) | writes(to))];
+        // SAFETY: the command buffer is being recorded, outside any render pass.
+        unsafe {
+            let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+            self.context.device.cmd_pipeline_barrier2(self.commands, &dependency);
+        }
+    }
+}
+
+fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
+    let is_volume = image.extent.depth > 1 || matches!(image.shape, crate::passes::slots::Shape::Three(_));
+    let (layer, layers, z, depth) = if is_volume { (0, 1, part, parts) } else { (part, parts, 0, 1) };
+    vk::BufferImageCopy {
+        image_subresource: vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: layer,
+            layer_count: layers,
+        },
+        image_offset: vk::Offset3D { x: 0, y: 0, z: z as i32 },
+        image_extent: vk::Extent3D { depth, ..image.extent },
+        ..vk::BufferImageCopy::default()
+    }
+}
+
+fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: Workers, of: [(Worker, T); 3]) -> T {
+    of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
+}
+
+fn stages(workers: Workers) -> vk::PipelineStageFlags2 {
+    flags(
+        workers,
+        [
+            (Worker::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
+            (Worker::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
+            (Worker::Host, vk::PipelineStageFlags2::HOST),
+        ],
+    )
+}
+
+fn writes(workers: Workers) -> vk::AccessFlags2 {
+    flags(
+        workers,
+        [
+            (Worker::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
+            (Worker::Copy, vk::AccessFlags2::TRANSFER_WRITE),
+            (Worker::Host, vk::AccessFlags2::NONE),
+        ],
+    )
+}
+
+fn reads(workers: Workers) -> vk::AccessFlags2 {
+    flags(
+        workers,
+        [
+            (Worker::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
+            (Worker::Copy, vk::AccessFlags2::TRANSFER_READ),
+            (Worker::Host, vk::AccessFlags2::HOST_READ),
+        ],
+    )
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
+        unsafe { self.context.device.destroy_command_pool(self.pool, None) };
+    }
+}

@@ -1,0 +1,226 @@
+//! Images and buffers that own their memory and free themselves.
+
+use super::GpuError;
+use super::context::Context;
+use super::error::Doing;
+use super::faults::Seam;
+use super::formats;
+use crate::passes::Slot;
+use crate::passes::slots::{Format, Shape};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use std::sync::Arc;
+
+pub struct Image {
+    context: Arc<Context>,
+    pub handle: vk::Image,
+    /// All of it.
+    pub view: vk::ImageView,
+    /// Each layer of an array by itself: what a frame is read through.
+    pub layers: Vec<vk::ImageView>,
+    pub extent: vk::Extent3D,
+    pub shape: Shape,
+    pub format: Format,
+    allocation: Option<Allocation>,
+}
+
+pub struct Buffer {
+    context: Arc<Context>,
+    pub handle: vk::Buffer,
+    pub size: u64,
+    allocation: Option<Allocation>,
+}
+
+/// What a buffer is for, which decides where it lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// A table that shaders read.
+    Table,
+    /// Numbers of passes, written by the CPU.
+    Params,
+    /// Frames on their way in, written by the CPU.
+    Staging,
+    /// Results on their way out, read by the CPU.
+    Readback,
+}
+
+fn allocate(
+    context: &Context,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    location: MemoryLocation,
+    linear: bool,
+    doing: &dyn Fn() -> String,
+) -> Result<Allocation, GpuError> {
+    context.faults.pass(Seam::Allocate).doing(doing)?;
+    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
+    let Some(allocator) = allocator.as_mut() else {
+        return Err(GpuError::Memory { doing: doing(), fault: "the context is shutting down".into() });
+    };
+    allocator
+        .allocate(&AllocationCreateDesc {
+            name,
+            requirements,
+            location,
+            linear,
+            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        })
+        .map_err(|e| GpuError::Memory { doing: doing(), fault: e.to_string() })
+}
+
+fn free(context: &Context, allocation: Option<Allocation>) {
+    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
+    if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
+        // Freeing what this allocator made cannot fail; a Drop could not report it anyway.
+        let _ = allocator.free(allocation);
+    }
+}
+
+impl Image {
+    /// An image in layout UNDEFINED.
+    pub fn new(context: &Arc<Context>, slot: Slot, shape: Shape, format: Format) -> Result<Image, GpuError> {
+        let (kind, view_kind, [width, height, depth], layers) = match shape {
+            Shape::Two([w, h]) => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, [w, h, 1], 1),
+            Shape::Layers([w, h, n]) => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D_ARRAY, [w, h, 1], n),
+            Shape::Three(size) => (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D, size, 1),
+            Shape::Buffer(_) => {
+                return Err(GpuError::Memory {
+                    doing: format!("create image '{}'", slot.name()),
+                    fault: "is a buffer".into(),
+                });
+            }
+        };
+        let mebibytes = shape.texels() * format.texel_bytes() as u64 / (1 << 20);
+        let doing = || {
+            format!(
+                "create image '{}' ({width}x{height}x{} {format:?}, {mebibytes} MiB)",
+                slot.name(),
+                depth.max(layers)
+            )
+        };
+        let extent = vk::Extent3D { width, height, depth };
+        let mut create = vk::ImageCreateInfo::default()
+            .image_type(kind)
+            .format(formats::vulkan(format))
+            .extent(extent)
+            .mip_levels(1)
+            .array_layers(layers)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(formats::usage(slot));
+        if slot.crosses_queues() && context.queue_families.len() > 1 {
+            create = create.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(&context.queue_families);
+        }
+        let device = &context.device;
+        // SAFETY: the create structure is complete and its pointers live; limits and formats were checked for the plan.
+        let handle = unsafe { device.create_image(&create, None) }.doing(doing)?;
+        // From here on a failure is cleaned up by dropping `image`.
+        let mut image = Image {
+            context: context.clone(),
+            handle,
+            view: vk::ImageView::null(),
+            layers: Vec::new(),
+            extent,
+            shape,
+            format,
+            allocation: None,
+        };
+        // SAFETY: the image was just made by this device.
+        let requirements = unsafe { device.get_image_memory_requirements(handle) };
+        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &doing)?;
+        // SAFETY: the allocation fits the requirements and lives as long as the image.
+        let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
+        image.allocation = Some(allocation);
+        bound.doing(doing)?;
+        image.view = image.create_view(view_kind, 0, layers)?;
+        if let Shape::Layers(_) = shape {
+            for layer in 0..layers {
+                let view = image.create_view(vk::ImageViewType::TYPE_2D, layer, 1)?;
+                image.layers.push(view);
+            }
+        }
+        context.name(handle, slot.name());
+        Ok(image)
+    }
+
+    fn create_view(&self, kind: vk::ImageViewType, layer: u32, layers: u32) -> Result<vk::ImageView, GpuError> {
+        let range = vk::ImageSubresourceRange { base_array_layer: layer, layer_count: layers, ..WHOLE };
+        let create = vk::ImageViewCreateInfo::default()
+            .image(self.handle)
+            .view_type(kind)
+            .format(formats::vulkan(self.format))
+            .subresource_range(range);
+        // SAFETY: the image is bound to memory and alive.
+        unsafe { self.context.device.create_image_view(&create, None) }.doing(|| "create image view".into())
+    }
+}
+
+/// Every layer of the one mip level.
+pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: vk::REMAINING_ARRAY_LAYERS,
+};
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        // SAFETY: whoever drops an image has waited for the device to be done with it; null handles are allowed.
+        unsafe {
+            for view in self.layers.drain(..).chain([self.view]) {
+                self.context.device.destroy_image_view(view, None);
+            }
+            self.context.device.destroy_image(self.handle, None);
+        }
+        free(&self.context, self.allocation.take());
+    }
+}
+
+impl Buffer {
+    pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
+        let doing = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
+        let (usage, location) = match purpose {
+            Purpose::Table => (vk::BufferUsageFlags::STORAGE_BUFFER, MemoryLocation::CpuToGpu),
+            Purpose::Params => (vk::BufferUsageFlags::UNIFORM_BUFFER, MemoryLocation::CpuToGpu),
+            Purpose::Staging => (vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
+            Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
+        };
+        let create = vk::BufferCreateInfo::default().size(size.max(4)).usage(usage);
+        let device = &context.device;
+        // SAFETY: the create structure is complete.
+        let handle = unsafe { device.create_buffer(&create, None) }.doing(doing)?;
+        let mut buffer = Buffer { context: context.clone(), handle, size, allocation: None };
+        // SAFETY: the buffer was just made by this device.
+        let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+        let allocation = allocate(context, name, requirements, location, true, &doing)?;
+        // SAFETY: the allocation fits the requirements and lives as long as the buffer.
+        let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+        buffer.allocation = Some(allocation);
+        bound.doing(doing)?;
+        context.name(handle, name);
+        Ok(buffer)
+    }
+
+    /// The bytes, mapped as long as the buffer lives. Every purpose is visible to the host.
+    pub fn bytes(&self) -> &[u8] {
+        let bytes = self.allocation.as_ref().and_then(|a| a.mapped_slice()).unwrap_or(&[]);
+        &bytes[..bytes.len().min(self.size as usize)]
+    }
+
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        let size = self.size as usize;
+        let bytes = self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or(&mut []);
+        let end = bytes.len().min(size);
+        &mut bytes[..end]
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: whoever drops a buffer has waited for the device to be done with it.
+        unsafe { self.context.device.destroy_buffer(self.handle, None) };
+        free(&self.context, self.allocation.take());
+    }
+}

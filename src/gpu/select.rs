@@ -1,0 +1,208 @@
+//! Which device to use: what each one is, what it lacks, and why it was or was not picked.
+
+use super::GpuError;
+use ash::vk;
+use std::ffi::CStr;
+
+/// A device as the user names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The best that lacks nothing.
+    Best,
+    /// By its number in `echolume devices`.
+    Number(usize),
+    /// By a part of its name, in any case.
+    Name(String),
+}
+
+impl std::str::FromStr for Choice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Choice, Self::Err> {
+        Ok(text.parse().map_or_else(|_| Choice::Name(text.to_string()), Choice::Number))
+    }
+}
+
+/// A physical device.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    pub handle: vk::PhysicalDevice,
+    pub name: String,
+    pub kind: vk::PhysicalDeviceType,
+    pub driver: String,
+    pub version: u32,
+    /// What is required and not there.
+    pub lacks: Vec<&'static str>,
+    /// What is optional and not there.
+    pub without: Vec<&'static str>,
+    pub queue_family: u32,
+    pub valid_bits: u32,
+    pub limits: vk::PhysicalDeviceLimits,
+}
+
+impl Candidate {
+    pub fn is_software(&self) -> bool {
+        self.kind == vk::PhysicalDeviceType::CPU
+    }
+
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
+            vk::PhysicalDeviceType::CPU => "software",
+            _ => "other",
+        }
+    }
+
+    fn rank(&self) -> u32 {
+        match self.kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => 0,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => 1,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => 2,
+            vk::PhysicalDeviceType::CPU => 4,
+            _ => 3,
+        }
+    }
+
+    pub fn api_version(&self) -> String {
+        let v = self.version;
+        format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
+    }
+}
+
+/// Every device of an instance, in the driver's order.
+pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
+    // SAFETY: the instance is alive; the call only reads.
+    let handles = unsafe { instance.enumerate_physical_devices() }
+        .map_err(|result| GpuError::Vulkan { doing: "list devices".into(), result })?;
+    Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
+}
+
+fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+    // SAFETY: `handle` comes from this instance; the chain is on the stack and outlives the call.
+    unsafe { instance.get_physical_device_properties2(handle, &mut properties) };
+    let properties = properties.properties;
+    let text = |c: Result<&CStr, _>| c.map(|c| c.to_string_lossy().into_owned()).unwrap_or_default();
+
+    // SAFETY: as above; both calls only read.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
+    // SAFETY: as above.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }.unwrap_or_default();
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+
+    let mut lacks = Vec::new();
+    let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name));
+    need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
+    need(has(ash::khr::push_descriptor::NAME), "VK_KHR_push_descriptor");
+    if properties.api_version >= vk::API_VERSION_1_3 {
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+        // SAFETY: as above.
+        unsafe { instance.get_physical_device_features2(handle, &mut features) };
+        let core = features.features;
+        need(core.shader_storage_image_extended_formats == vk::TRUE, "shaderStorageImageExtendedFormats");
+        need(core.shader_storage_image_write_without_format == vk::TRUE, "shaderStorageImageWriteWithoutFormat");
+        need(v12.scalar_block_layout == vk::TRUE, "scalarBlockLayout");
+        need(v12.timeline_semaphore == vk::TRUE, "timelineSemaphore");
+        need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
+        need(v13.synchronization2 == vk::TRUE, "synchronization2");
+        need(v13.maintenance4 == vk::TRUE, "maintenance4");
+    }
+    let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+    need(family.is_some(), "a compute queue");
+    let valid_bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
+    let mut without = Vec::new();
+    if valid_bits == 0 {
+        without.push("time stamps: no times are printed");
+    }
+    if !has(ash::ext::memory_budget::NAME) {
+        without.push("VK_EXT_memory_budget");
+    }
+    Candidate {
+        handle,
+        name: text(properties.device_name_as_c_str()),
+        kind: properties.device_type,
+        driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+        version: properties.api_version,
+        lacks,
+        without,
+        queue_family: family.unwrap_or(0) as u32,
+        valid_bits,
+        limits: properties.limits,
+    }
+}
+
+/// The number of the chosen device.
+pub fn choose(candidates: &[Candidate], choice: &Choice) -> Result<usize, GpuError> {
+    let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
+    if candidates.is_empty() {
+        return Err(GpuError::NoDevice);
+    }
+    let missing = |wanted: String| GpuError::NoSuchDevice { wanted, there: names() };
+    let index = match choice {
+        Choice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
+        Choice::Name(name) => {
+            let part = name.to_lowercase();
+            let found = candidates.iter().position(|c| c.name.to_lowercase().contains(&part));
+            found.ok_or_else(|| missing(name.clone()))?
+        }
+        Choice::Best => {
+            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.lacks.is_empty());
+            let best = fitting.min_by_key(|(_, c)| c.rank()).map(|(i, _)| i);
+            best.ok_or_else(|| GpuError::NoneFits(all_lacks(candidates)))?
+        }
+    };
+    match candidates[index].lacks.is_empty() {
+        true => Ok(index),
+        false => Err(GpuError::NoneFits(all_lacks(&candidates[index..=index]))),
+    }
+}
+
+fn all_lacks(candidates: &[Candidate]) -> String {
+    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.lacks.join(", "))).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(name: &str, kind: vk::PhysicalDeviceType, lacks: Vec<&'static str>) -> Candidate {
+        Candidate {
+            handle: vk::PhysicalDevice::null(),
+            name: name.into(),
+            kind,
+            driver: String::new(),
+            version: vk::API_VERSION_1_3,
+            lacks,
+            without: vec![],
+            queue_family: 0,
+            valid_bits: 64,
+            limits: vk::PhysicalDeviceLimits::default(),
+        }
+    }
+
+    #[test]
+    fn the_best_device_is_a_gpu_that_lacks_nothing_and_software_comes_last() {
+        let devices = [
+            device("llvmpipe", vk::PhysicalDeviceType::CPU, vec![]),
+            device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"]),
+            device("Small", vk::PhysicalDeviceType::INTEGRATED_GPU, vec![]),
+        ];
+        assert_eq!(choose(&devices, &Choice::Best).ok(), Some(2));
+        assert_eq!(choose(&devices[..2], &Choice::Best).ok(), Some(0));
+        assert_eq!(choose(&devices, &Choice::Name("PIPE".into())).ok(), Some(0));
+    }
+
+    #[test]
+    fn a_refusal_names_what_is_missing_or_what_is_there() {
+        let devices = [device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"])];
+        assert!(choose(&devices, &Choice::Best).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &Choice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &Choice::Number(7)).unwrap_err().to_string().contains("0 Old"));
+        assert!(matches!(choose(&[], &Choice::Best), Err(GpuError::NoDevice)));
+    }
+}

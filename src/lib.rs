@@ -1,0 +1,26 @@
+//! Echolume renders the polar frames of a mechanically wobbling ultrasound probe as volumes, on bare Vulkan.
+//!
+//! The tour, in the order in which a frame travels:
+//!
+//! - [`source`] reads recordings into frames; [`probe`] says where their samples lie in space, in f64.
+//! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
+//! - [`passes`] declares every compute pass in one place: its slots, parameters, constants, tolerance and f64 reference.
+//!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
+//! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
+//!   order between them; [`spirv`] reflects the shaders. All of these are pure and tested without a GPU.
+//! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it.
+
+#![deny(unsafe_code)]
+
+pub mod barriers;
+#[allow(unsafe_code)]
+pub mod gpu;
+pub mod passes;
+pub mod picture;
+pub mod plan;
+pub mod probe;
+pub mod report;
+pub mod scene;
+pub mod shader_source;
+pub mod source;
+pub mod spirv;

@@ -1,0 +1,118 @@
+//! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
+
+use super::slots::Shape;
+use super::{Bind, Params, Part, Pass, Turn, Value};
+use crate::scene::Scene;
+use crate::spirv::{Access, Dimension, Kind, Member, Module};
+
+/// The first disagreement, naming both sides.
+pub fn check(pass: &Pass, scene: &Scene, module: &Module) -> Result<(), String> {
+    let turn = Turn::default();
+    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+    for bind in &reads {
+        check_bind(scene, module, bind, Access::Read)?;
+    }
+    for bind in &writes {
+        check_bind(scene, module, bind, Access::Write)?;
+    }
+    for binding in module.bindings.iter().filter(|b| b.kind != Kind::Params) {
+        if !reads.iter().chain(&writes).any(|b| b.name == binding.name) {
+            return Err(format!("glsl declares '{}', the pass neither reads nor writes it", binding.name));
+        }
+    }
+    check_params(module, &(pass.params)(scene, &turn))?;
+    let constants = (pass.constants)(scene);
+    for (name, _) in &constants {
+        if !module.constants.iter().any(|c| c.name == *name) {
+            return Err(format!("the pass sets constant '{name}', glsl has none of that name"));
+        }
+    }
+    for constant in &module.constants {
+        if !constants.iter().any(|(name, _)| *name == constant.name) {
+            return Err(format!("glsl has constant '{}', the pass does not set it", constant.name));
+        }
+    }
+    match module.local_size[0] % 8 {
+        0 => Ok(()),
+        _ => Err(format!("workgroup width {} is no multiple of 8", module.local_size[0])),
+    }
+}
+
+fn check_bind(scene: &Scene, module: &Module, bind: &Bind, access: Access) -> Result<(), String> {
+    let verb = if access == Access::Read { "reads" } else { "writes" };
+    let Some(binding) = module.bindings.iter().find(|b| b.name == bind.name) else {
+        return Err(format!("the pass {verb} '{}', glsl declares nothing of that name", bind.name));
+    };
+    if binding.access != access {
+        return Err(format!("glsl declares '{}' {:?}, the pass {verb} it", bind.name, binding.access));
+    }
+    let declared = binding.dimension;
+    let there = match (bind.slot.shape(scene), bind.part) {
+        (Shape::Two(_), _) | (Shape::Layers(_), Part::Layer) => Dimension::Two,
+        (Shape::Layers(_), _) => Dimension::Layers,
+        (Shape::Three(_), _) => Dimension::Three,
+        (Shape::Buffer(_), _) => Dimension::None,
+    };
+    match declared == there {
+        true => Ok(()),
+        false => Err(format!("glsl declares '{}' {declared:?}, slot '{}' is {there:?}", bind.name, bind.slot.name())),
+    }
+}
+
+fn check_params(module: &Module, params: &Params) -> Result<(), String> {
+    for (i, (name, _)) in params.0.iter().enumerate() {
+        if params.0[..i].iter().any(|(n, _)| n == name) {
+            return Err(format!("the pass sets parameter '{name}' twice"));
+        }
+        // A block that a variant does not use at all is optimised away.
+        if !module.params.is_empty() && !module.params.iter().any(|m| m.name == *name) {
+            return Err(format!("the pass sets parameter '{name}', glsl has none of that name"));
+        }
+    }
+    for member in &module.params {
+        let Some((_, value)) = params.0.iter().find(|(name, _)| *name == member.name) else {
+            return Err(format!("glsl has parameter '{}', the pass does not set it", member.name));
+        };
+        if !fits(member, value) {
+            return Err(format!("glsl declares '{}' as {}, the pass sets {value:?}", member.name, type_name(member)));
+        }
+    }
+    Ok(())
+}
+
+fn fits(member: &Member, value: &Value) -> bool {
+    match value {
+        Value::F32(_) => member.is_float && member.components == 1,
+        Value::I32(_) => !member.is_float && member.is_signed && member.components == 1,
+        Value::Vec2(_) => member.is_float && member.components == 2,
+        Value::Vec3(_) => member.is_float && member.components == 3,
+    }
+}
+
+fn type_name(member: &Member) -> String {
+    let scalar = if member.is_float {
+        "float"
+    } else if member.is_signed {
+        "int"
+    } else {
+        "uint"
+    };
+    if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
+}
+
+/// The parameter block as the shader lays it out.
+pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
+    let mut block = vec![0; module.params_size as usize];
+    for member in &module.params {
+        let Some((_, value)) = params.0.iter().find(|(name, _)| *name == member.name) else { continue };
+        let words: &[u8] = match value {
+            Value::F32(v) => bytemuck::bytes_of(v),
+            Value::I32(v) => bytemuck::bytes_of(v),
+            Value::Vec2(v) => bytemuck::bytes_of(v),
+            Value::Vec3(v) => bytemuck::bytes_of(v),
+        };
+        let at = member.offset as usize;
+        block[at..at + words.len()].copy_from_slice(words);
+    }
+    block
+}

@@ -1,0 +1,76 @@
+//! Bilateral filter of the distance map (Tomasi and Manduchi 1998), repeated if asked. Misses stay and weigh nothing.
+
+use crate::passes::chain::distance_link;
+use crate::passes::*;
+use crate::scene::{Bilateral, Scene};
+
+const NAME: &str = "bilateral_distance";
+
+pub const DISTANCE: Pass = Pass {
+    name: NAME,
+    stage: Stage::Shade,
+    when: When::Picture,
+    shader: |_| "filter/bilateral.distance",
+    needed: |s| match (s.is_surface(), s.settings.distance.bilateral) {
+        (false, _) => Err("no distance map in this mode"),
+        (true, None) => Err("not asked for"),
+        _ => Ok("asked for"),
+    },
+    reads: |s, t| vec![whole("source", distance_link(s, NAME, t).0)],
+    writes: |s, t| vec![whole("target", distance_link(s, NAME, t).1)],
+    extent: picture_extent,
+    repeat: |s| settings(s).repeat,
+    params: |s, t| {
+        let b = settings(s);
+        Params::default()
+            .f32("place_narrowness", 0.5 / (b.pixels * b.pixels))
+            .f32("distance_narrowness", 0.5 / (b.distance * b.distance))
+            .i32("slice", t.slice)
+    },
+    constants: |s| vec![("RADIUS", radius(s) as i32)],
+    tolerance: Tolerance {
+        absolute: 2e-5,
+        relative: 1e-6,
+        outliers: 0.0,
+        why: "sums of differences from the centre in f32, whose weights are off by a few ulp; then f32's own rounding of mm",
+    },
+    reference: |scene, _, reads, writes| {
+        let b = settings(scene);
+        let source = reads.get("source");
+        let target = writes.get_mut("target");
+        let [width, height, _] = source.size;
+        let radius = radius(scene) as usize;
+        for y in 0..height {
+            for x in 0..width {
+                let centre = source.one(x, y, 0);
+                if !is_hit(centre) {
+                    target.set([x, y, 0], &[centre]);
+                    continue;
+                }
+                let (mut sum, mut weight) = (0.0, 0.0);
+                for j in y.saturating_sub(radius)..=(y + radius).min(height - 1) {
+                    for i in x.saturating_sub(radius)..=(x + radius).min(width - 1) {
+                        let value = source.one(i, j, 0);
+                        if is_hit(value) {
+                            let place = (i as f64 - x as f64).powi(2) + (j as f64 - y as f64).powi(2);
+                            let away = ((value - centre) / b.distance).powi(2);
+                            let w = (-0.5 * (place / (b.pixels * b.pixels) + away)).exp();
+                            sum += w * value;
+                            weight += w;
+                        }
+                    }
+                }
+                target.set([x, y, 0], &[sum / weight]);
+            }
+        }
+    },
+};
+
+fn settings(scene: &Scene) -> Bilateral {
+    scene.settings.distance.bilateral.unwrap_or(Bilateral { pixels: 1.0, distance: 1.0, repeat: 1 })
+}
+
+/// Two standard deviations hold 95 % of the weight.
+fn radius(scene: &Scene) -> u32 {
+    (2.0 * settings(scene).pixels).ceil() as u32
+}

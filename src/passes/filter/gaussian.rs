@@ -1,0 +1,94 @@
+//! 3D Gaussian in texture space (lateral, depth, elevation), one axis a pass. The two in-plane axes are filtered on each
+//! slice as it arrives; the third when its neighbours are there.
+
+use crate::passes::chain::{slice_link, writes_volume};
+use crate::passes::*;
+use crate::scene::gaussian_radius;
+
+const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
+const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
+
+pub const LATERAL: Pass = Pass {
+    name: "gaussian_lateral",
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s| if writes_volume(s, "gaussian_lateral") { "filter/gaussian.slice" } else { "filter/gaussian.plane" },
+    needed: |s| asked(s, 0),
+    reads: |s, t| vec![whole("source", slice_link(s, "gaussian_lateral", t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, "gaussian_lateral", t).1)],
+    extent: slice_extent,
+    repeat: once,
+    params: |s, t| params(s, 0, t),
+    constants: |s| constants(s, 0),
+    tolerance: TOLERANCE,
+    reference: |s, t, reads, writes| reference(s, 0, t, reads, writes),
+};
+
+pub const DEPTH: Pass = Pass {
+    name: "gaussian_depth",
+    shader: |s| if writes_volume(s, "gaussian_depth") { "filter/gaussian.slice" } else { "filter/gaussian.plane" },
+    needed: |s| asked(s, 1),
+    reads: |s, t| vec![whole("source", slice_link(s, "gaussian_depth", t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, "gaussian_depth", t).1)],
+    params: |s, t| params(s, 1, t),
+    constants: |s| constants(s, 1),
+    reference: |s, t, reads, writes| reference(s, 1, t, reads, writes),
+    ..LATERAL
+};
+
+pub const ELEVATION: Pass = Pass {
+    name: "gaussian_elevation",
+    stage: Stage::Preprocess,
+    when: When::Volume,
+    shader: |_| "filter/gaussian.volume",
+    needed: |s| asked(s, 2),
+    reads: |_, _| vec![whole("source", Slot::SharpVolume)],
+    writes: |_, _| vec![whole("target", Slot::Volume)],
+    extent: |s| s.volume_size(),
+    repeat: once,
+    params: |s, t| params(s, 2, t),
+    constants: |s| constants(s, 2),
+    tolerance: TOLERANCE,
+    reference: |s, t, reads, writes| reference(s, 2, t, reads, writes),
+};
+
+fn asked(scene: &Scene, axis: usize) -> Need {
+    if scene.smoothing()[axis] > 0.0 { Ok("asked for") } else { Err("not asked for") }
+}
+
+fn params(scene: &Scene, axis: usize, turn: &Turn) -> Params {
+    let deviation = scene.smoothing()[axis];
+    Params::default().f32("narrowness", 0.5 / (deviation * deviation)).i32("slice", turn.slice)
+}
+
+fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
+    vec![("RADIUS", gaussian_radius(scene.smoothing()[axis]) as i32), ("AXIS", axis as i32)]
+}
+
+fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+    let source = reads.get("source");
+    let target = writes.get_mut("target");
+    let deviation = scene.smoothing()[axis];
+    let radius = i64::from(gaussian_radius(deviation));
+    for z in 0..source.size[2] {
+        for y in 0..source.size[1] {
+            for x in 0..source.size[0] {
+                let centre = [x, y, z];
+                let (mut sum, mut weight) = (0.0, 0.0);
+                for i in -radius..=radius {
+                    let along = centre[axis] as i64 + i;
+                    if along < 0 || along >= source.size[axis] as i64 {
+                        continue;
+                    }
+                    let mut tap = centre;
+                    tap[axis] = along as usize;
+                    let w = (-0.5 * (i as f64 / deviation).powi(2)).exp();
+                    sum += w * source.one(tap[0], tap[1], tap[2]);
+                    weight += w;
+                }
+                let z = if axis < 2 && target.size[2] > 1 { turn.slice as usize } else { z };
+                target.set([x, y, z], &[sum / weight]);
+            }
+        }
+    }
+}

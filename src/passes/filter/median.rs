@@ -1,0 +1,66 @@
+//! Median of a square window, on slices (3x3) and on distance maps.
+
+use crate::passes::chain::{distance_link, slice_link, writes_volume};
+use crate::passes::*;
+
+pub const SLICE: Pass = Pass {
+    name: "median_slice",
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s| if writes_volume(s, "median_slice") { "filter/median.slice" } else { "filter/median.plane" },
+    needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
+    reads: |s, t| vec![whole("source", slice_link(s, "median_slice", t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, "median_slice", t).1)],
+    extent: slice_extent,
+    repeat: once,
+    params: |_, t| Params::default().i32("slice", t.slice),
+    constants: |_| vec![("RADIUS", 1)],
+    tolerance: Tolerance {
+        absolute: 5e-4,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "a value that is there, chosen exactly; only storing in R16F rounds",
+    },
+    reference: |_, turn, reads, writes| reference(1, turn, reads, writes, |_| true),
+};
+
+pub const DISTANCE: Pass = Pass {
+    name: "median_distance",
+    stage: Stage::Shade,
+    when: When::Picture,
+    shader: |_| "filter/median.distance",
+    needed: |s| match (s.is_surface(), s.settings.distance.median) {
+        (false, _) => Err("no distance map in this mode"),
+        (true, 0) => Err("not asked for"),
+        _ => Ok("asked for"),
+    },
+    reads: |s, t| vec![whole("source", distance_link(s, "median_distance", t).0)],
+    writes: |s, t| vec![whole("target", distance_link(s, "median_distance", t).1)],
+    extent: picture_extent,
+    repeat: once,
+    params: |_, t| Params::default().i32("slice", t.slice),
+    constants: |s| vec![("RADIUS", (s.settings.distance.median / 2) as i32)],
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a value that is there, chosen exactly" },
+    reference: |s, turn, reads, writes| reference(s.settings.distance.median / 2, turn, reads, writes, is_hit),
+};
+
+/// The middle of the sorted window; of an even number, the lower. Hits and misses vote first: a tie is a miss.
+fn reference(radius: u32, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
+    let source = reads.get("source");
+    let target = writes.get_mut("target");
+    let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+    let radius = i64::from(radius);
+    for y in 0..source.size[1] {
+        for x in 0..source.size[0] {
+            let mut window = Vec::new();
+            for j in -radius..=radius {
+                window.extend((-radius..=radius).map(|i| source.clamped(x as i64 + i, y as i64 + j, 0)));
+            }
+            let all = window.len();
+            window.retain(|v| valid(*v));
+            window.sort_by(f64::total_cmp);
+            let median = if 2 * window.len() <= all { MISS } else { window[(window.len() - 1) / 2] };
+            target.set([x, y, z], &[median]);
+        }
+    }
+}

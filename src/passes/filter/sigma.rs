@@ -1,0 +1,125 @@
+//! Lee's sigma filter on slices, distance maps and pictures (Lee 1983; thesis 5.3): the mean of the pixels of a window that
+//! lie within two sigma of the centre; where no more than K do, the mean of the four immediate neighbours.
+
+use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
+use crate::passes::*;
+use crate::scene;
+
+const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel at exactly 2 sigma may fall on either side; the slice's \
+                   R16F stores 1 to 4.9e-4";
+
+pub const SLICE: Pass = Pass {
+    name: "sigma_slice",
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s| if writes_volume(s, "sigma_slice") { "filter/sigma.slice" } else { "filter/sigma.plane" },
+    needed: |s| asked(s.settings.slices.sigma),
+    reads: |s, t| vec![whole("source", slice_link(s, "sigma_slice", t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, "sigma_slice", t).1)],
+    extent: slice_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.slices.sigma, t),
+    constants: |s| constants(s.settings.slices.sigma),
+    tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 1e-3, why: WHY },
+    reference: |s, t, reads, writes| reference(s.settings.slices.sigma, t, reads, writes, |_| true),
+};
+
+pub const DISTANCE: Pass = Pass {
+    name: "sigma_distance",
+    stage: Stage::Shade,
+    when: When::Picture,
+    shader: |_| "filter/sigma.distance",
+    needed: |s| if s.is_surface() { asked(s.settings.distance.sigma) } else { Err("no distance map in this mode") },
+    reads: |s, t| vec![whole("source", distance_link(s, "sigma_distance", t).0)],
+    writes: |s, t| vec![whole("target", distance_link(s, "sigma_distance", t).1)],
+    extent: picture_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.distance.sigma, t),
+    constants: |s| constants(s.settings.distance.sigma),
+    tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 1e-3, why: WHY },
+    reference: |s, t, reads, writes| reference(s.settings.distance.sigma, t, reads, writes, is_hit),
+};
+
+pub const PICTURE: Pass = Pass {
+    name: "sigma_picture",
+    stage: Stage::Postprocess,
+    when: When::Picture,
+    shader: |_| "filter/sigma.picture",
+    needed: |s| asked(s.settings.post.sigma),
+    reads: |s, t| vec![whole("source", picture_link(s, "sigma_picture", t).0)],
+    writes: |s, t| vec![whole("target", picture_link(s, "sigma_picture", t).1)],
+    extent: picture_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.post.sigma, t),
+    constants: |s| constants(s.settings.post.sigma),
+    tolerance: Tolerance { absolute: 6e-4, relative: 1e-3, outliers: 1e-3, why: WHY },
+    reference: |s, t, reads, writes| reference(s.settings.post.sigma, t, reads, writes, |_| true),
+};
+
+/// A sigma of 0 keeps every pixel: no pass.
+fn asked(sigma: Option<scene::Sigma>) -> Need {
+    match sigma {
+        Some(s) if s.sigma > 0.0 => Ok("asked for"),
+        Some(_) => Err("a sigma of 0 changes nothing"),
+        None => Err("not asked for"),
+    }
+}
+
+/// K: fewer than 4 at 7x7, fewer than 3 at 5x5 (thesis 5.3), and in proportion elsewhere.
+fn few(window: u32) -> u32 {
+    window.saturating_sub(1) / 2
+}
+
+fn params(sigma: Option<scene::Sigma>, turn: &Turn) -> Params {
+    let sigma = sigma.unwrap_or_default();
+    Params::default()
+        .f32("range", 2.0 * sigma.sigma)
+        .f32("few", if sigma.sigma > 0.0 { f64::from(few(sigma.window)) } else { 0.0 })
+        .i32("slice", turn.slice)
+}
+
+fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
+    vec![("RADIUS", (sigma.unwrap_or_default().window / 2) as i32)]
+}
+
+fn reference(sigma: Option<scene::Sigma>, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
+    let sigma = sigma.unwrap_or_default();
+    // The range as the shader gets it, so that a pixel at its very edge counts on both sides.
+    let range = f64::from((2.0 * sigma.sigma).min(f64::from(f32::MAX)) as f32);
+    let radius = i64::from(sigma.window / 2);
+    let source = reads.get("source");
+    let target = writes.get_mut("target");
+    let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+    let [width, height, _] = source.size;
+    let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width as i64 && y < height as i64;
+    for y in 0..height as i64 {
+        for x in 0..width as i64 {
+            let centre = source.get([x as usize, y as usize, 0]).to_vec();
+            let filtered: Vec<f64> = (0..source.channels)
+                .map(|c| {
+                    let at = |x: i64, y: i64| source.get([x as usize, y as usize, 0])[c];
+                    if !valid(centre[c]) {
+                        return centre[c];
+                    }
+                    let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
+                    let close: Vec<f64> = window
+                        .filter(|&(i, j)| inside(i, j))
+                        .map(|(i, j)| at(i, j))
+                        .filter(|v| valid(*v) && (v - centre[c]).abs() <= range)
+                        .collect();
+                    if close.len() as u32 > few(sigma.window) || sigma.sigma == 0.0 {
+                        return close.iter().sum::<f64>() / close.len() as f64;
+                    }
+                    let near: Vec<f64> = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)]
+                        .into_iter()
+                        .filter(|&(i, j)| inside(i, j))
+                        .map(|(i, j)| at(i, j))
+                        .filter(|v| valid(*v))
+                        .collect();
+                    if near.is_empty() { centre[c] } else { near.iter().sum::<f64>() / near.len() as f64 }
+                })
+                .collect();
+            target.set([x as usize, y as usize, z], &filtered);
+        }
+    }
+}

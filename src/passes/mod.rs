@@ -1,0 +1,247 @@
+//! The passes: each declared in one file with its parameters and its f64 reference, and all of them listed, in the order in
+//! which they run, in [`PASSES`]. Everything else (bindings, barriers, time stamps, labels, tests) follows from these.
+
+pub mod chain;
+pub mod contract;
+pub mod slots;
+pub mod texels;
+
+pub mod preprocess {
+    pub mod load_slice;
+    pub mod scan_convert;
+}
+pub mod filter {
+    pub mod bilateral;
+    pub mod gaussian;
+    pub mod median;
+    pub mod sigma;
+}
+pub mod raycast {
+    pub mod ray;
+    pub mod surface;
+    pub mod volume;
+}
+pub mod shade {
+    pub mod light;
+}
+pub mod postprocess {
+    pub mod tone;
+}
+
+pub use slots::Slot;
+pub use texels::{Arrays, Texels};
+
+use crate::scene::Scene;
+use glam::DVec3;
+
+/// A distance that hit nothing: the largest finite float, so that no shader has to keep infinities.
+pub const MISS: f64 = f32::MAX as f64;
+
+pub fn is_hit(distance: f64) -> bool {
+    distance < 3e38
+}
+
+/// All passes in the order in which they run.
+pub const PASSES: &[Pass] = &[
+    preprocess::load_slice::PASS,
+    preprocess::scan_convert::PASS,
+    filter::median::SLICE,
+    filter::sigma::SLICE,
+    filter::gaussian::LATERAL,
+    filter::gaussian::DEPTH,
+    filter::gaussian::ELEVATION,
+    raycast::volume::PASS,
+    raycast::surface::PASS,
+    filter::median::DISTANCE,
+    filter::bilateral::DISTANCE,
+    filter::sigma::DISTANCE,
+    shade::light::PASS,
+    filter::sigma::PICTURE,
+    postprocess::tone::PASS,
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    Preprocess,
+    Raycast,
+    Shade,
+    Postprocess,
+}
+
+impl Stage {
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Preprocess => "preprocess",
+            Stage::Raycast => "raycast",
+            Stage::Shade => "shade",
+            Stage::Postprocess => "postprocess",
+        }
+    }
+}
+
+/// What makes a pass run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// Each frame that arrives.
+    Frame,
+    /// A volume whose frames have all arrived.
+    Volume,
+    /// Each picture.
+    Picture,
+}
+
+/// The numbers that differ between two dispatches of the same pass and scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turn {
+    /// Layer of the frame array that holds the frame.
+    pub layer: u32,
+    /// Slice that the frame becomes.
+    pub slice: u32,
+    /// 0.. of a pass that repeats.
+    pub iteration: u32,
+    /// Which of the volume images that take turns.
+    pub image: u32,
+}
+
+/// The part of a slot that one dispatch touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    Whole,
+    /// The turn's slice of a 3D texture.
+    Slice,
+    /// The turn's layer of the frame array.
+    Layer,
+}
+
+/// A slot under the name that the shader gives it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bind {
+    pub name: &'static str,
+    pub slot: Slot,
+    pub part: Part,
+}
+
+pub fn whole(name: &'static str, slot: Slot) -> Bind {
+    Bind { name, slot, part: Part::Whole }
+}
+
+/// One slice of a 3D texture, or all of a plane.
+pub fn slice(name: &'static str, slot: Slot) -> Bind {
+    let part = if matches!(slot, Slot::Volume | Slot::SharpVolume) { Part::Slice } else { Part::Whole };
+    Bind { name, slot, part }
+}
+
+pub fn layer(name: &'static str, slot: Slot) -> Bind {
+    Bind { name, slot, part: Part::Layer }
+}
+
+/// Whether a scene needs a pass, and why (or why not), for `--explain`.
+pub type Need = Result<&'static str, &'static str>;
+
+/// Largest error against the reference on the test inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// Absolute, in the units of the output.
+    pub absolute: f64,
+    /// Relative to the expected value; the larger of the two holds.
+    pub relative: f64,
+    /// Share of texels that may be further off, where a branch flips.
+    pub outliers: f64,
+    pub why: &'static str,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    F32(f32),
+    I32(i32),
+    Vec2([f32; 2]),
+    Vec3([f32; 3]),
+}
+
+/// Numbers of one dispatch, by the names that the shader gives them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Params(pub Vec<(&'static str, Value)>);
+
+impl Params {
+    /// Clamped to what is finite: shaders need not keep infinities.
+    pub fn f32(mut self, name: &'static str, value: f64) -> Params {
+        let finite = value.clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
+        self.0.push((name, Value::F32(finite as f32)));
+        self
+    }
+
+    pub fn i32(mut self, name: &'static str, value: u32) -> Params {
+        self.0.push((name, Value::I32(value as i32)));
+        self
+    }
+
+    pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
+        self.0.push((name, Value::Vec2(value.map(|v| v as f32))));
+        self
+    }
+
+    pub fn vec3(mut self, name: &'static str, value: impl Into<DVec3>) -> Params {
+        self.0.push((name, Value::Vec3(value.into().as_vec3().to_array())));
+        self
+    }
+}
+
+/// One compute dispatch: the only place where it is described.
+pub struct Pass {
+    /// Debug label, time stamp and test case; unique.
+    pub name: &'static str,
+    pub stage: Stage,
+    pub when: When,
+    /// Path below glsl/ and variant.
+    pub shader: fn(&Scene) -> &'static str,
+    pub needed: fn(&Scene) -> Need,
+    pub reads: fn(&Scene, &Turn) -> Vec<Bind>,
+    pub writes: fn(&Scene, &Turn) -> Vec<Bind>,
+    /// Invocations, not workgroups.
+    pub extent: fn(&Scene) -> [u32; 3],
+    /// Dispatches in a row, with [`Turn::iteration`] counting.
+    pub repeat: fn(&Scene) -> u32,
+    /// Numbers: they move while a picture lives.
+    pub params: fn(&Scene, &Turn) -> Params,
+    /// Structure: a change of it is another pipeline.
+    pub constants: fn(&Scene) -> Vec<(&'static str, i32)>,
+    pub tolerance: Tolerance,
+    /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched.
+    pub reference: fn(&Scene, &Turn, &Arrays, &mut Arrays),
+}
+
+impl Pass {
+    pub fn is_needed(&self, scene: &Scene) -> bool {
+        (self.needed)(scene).is_ok()
+    }
+}
+
+/// Time of one pass over a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    pub name: &'static str,
+    pub runs: u32,
+    /// ns, all runs together.
+    pub total: f64,
+}
+
+/// The pass of that name.
+pub fn by_name(name: &str) -> Option<&'static Pass> {
+    PASSES.iter().find(|p| p.name == name)
+}
+
+pub fn once(_: &Scene) -> u32 {
+    1
+}
+
+pub fn no_constants(_: &Scene) -> Vec<(&'static str, i32)> {
+    Vec::new()
+}
+
+pub fn slice_extent(scene: &Scene) -> [u32; 3] {
+    [scene.grid.size[0], scene.grid.size[1], 1]
+}
+
+pub fn picture_extent(scene: &Scene) -> [u32; 3] {
+    [scene.picture_size()[0], scene.picture_size()[1], 1]
+}

@@ -1,0 +1,155 @@
+//! SR: the first surface on each ray (thesis 4-3). At sample i, with steps of s, the difference is
+//! D = mean(v[i], v[i-s], v[i-2s], v[i-3s]) - mean(v[i-4s] ... v[i-7s]): (2/n) (newer half - older half) for a ring of n = 8.
+
+use super::ray;
+use crate::passes::*;
+use crate::scene::{Place, RING, Sign};
+
+pub const PASS: Pass = Pass {
+    name: "raycast_surface",
+    stage: Stage::Raycast,
+    when: When::Picture,
+    shader: |s| ray::variant!(s, "raycast/surface"),
+    needed: |s| if s.is_surface() { Ok("mode is surface") } else { Err("mode is volume") },
+    reads: |s, _| ray::reads(s),
+    writes: |_, _| vec![whole("distance_map", Slot::Distance), whole("surface", Slot::Surface)],
+    extent: picture_extent,
+    repeat: once,
+    params: |s, _| {
+        let surface = &s.settings.surface;
+        ray::params(s)
+            .f32("threshold", surface.threshold)
+            .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
+            .f32("polarity", polarity(s))
+    },
+    constants: |s| {
+        let mut constants = ray::constants(s);
+        constants.push(("ROUGH", s.settings.surface.rough as i32));
+        constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));
+        constants
+    },
+    tolerance: Tolerance {
+        absolute: 2e-3,
+        relative: 1e-5,
+        outliers: 2e-2,
+        why: "a parabola through three differences that are off by 1e-6 moves by 1e-3 of a step; a difference within that of \
+              the threshold, two equal peaks, or a sample at the border of the sector may go either way and move the place",
+    },
+    reference: |scene, _, reads, writes| {
+        let volume = reads.get("volume");
+        let size = writes.get("distance_map").size;
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+                let (enter, leave) = ray::span(scene, origin, direction);
+                let count = ((leave - enter) / scene.step).max(0.0).floor() as usize;
+                let at = |i: usize| enter + (i as f64 + 0.5) * scene.step;
+                let samples: Vec<Option<f64>> =
+                    (0..count).map(|i| ray::sample(scene, volume, origin + direction * at(i))).collect();
+                let (distance, surface) = match detect(scene, &samples) {
+                    Some((place, echo)) => (enter + (place + 0.5) * scene.step, [echo, 1.0]),
+                    None => (MISS, [0.0, 0.0]),
+                };
+                writes.get_mut("distance_map").set([x, y, 0], &[distance]);
+                writes.get_mut("surface").set([x, y, 0], &surface);
+            }
+        }
+    },
+};
+
+fn polarity(scene: &Scene) -> f64 {
+    match scene.settings.surface.sign {
+        Sign::Bright => 1.0,
+        Sign::Dark => -1.0,
+    }
+}
+
+/// Place of the surface in samples, and the echo behind it.
+fn detect(scene: &Scene, samples: &[Option<f64>]) -> Option<(f64, f64)> {
+    let surface = &scene.settings.surface;
+    let ring = RING as usize;
+    let rough = surface.rough as usize;
+    let rough_threshold = surface.rough_threshold.unwrap_or(surface.threshold);
+    let mean = |i: usize, stride: usize, from: usize| -> Option<f64> {
+        (from..from + ring / 2).map(|n| samples[i - n * stride]).sum::<Option<f64>>().map(|sum| sum / (ring / 2) as f64)
+    };
+    // The difference at i, once a full ring since `since` is behind it and none of it lies outside.
+    let difference = |i: usize, stride: usize, since: usize| -> Option<f64> {
+        (i < samples.len() && i >= since + (ring - 1) * stride)
+            .then(|| Some(polarity(scene) * (mean(i, stride, 0)? - mean(i, stride, ring / 2)?)))
+            .flatten()
+    };
+    let mut since = 0;
+    let mut i = 0;
+    'rough: while i < samples.len() {
+        if samples[i].is_none() {
+            i += rough;
+            since = i;
+            continue;
+        }
+        let (start, limit) = if rough > 1 {
+            match difference(i, rough, since) {
+                Some(d) if d > rough_threshold => (i.saturating_sub(ring * rough).max(since), i + ring),
+                _ => {
+                    i += rough;
+                    continue;
+                }
+            }
+        } else {
+            (since, usize::MAX)
+        };
+        // The fine search: forwards from where the rough ring began. A gap sends it back to the rough one behind the gap.
+        let mut from = start;
+        let mut at = start;
+        loop {
+            if at >= samples.len() {
+                return None;
+            }
+            if samples[at].is_none() {
+                if rough > 1 {
+                    i = at + rough;
+                    since = i;
+                    continue 'rough;
+                }
+                from = at + 1;
+            } else if let Some(d) = difference(at, 1, from).filter(|d| *d > surface.threshold) {
+                return Some(place(scene, &difference, &|i| mean(i, 1, 0), at, d, from));
+            } else if at >= limit {
+                i = limit - (ring - 2) * rough;
+                since = i;
+                continue 'rough;
+            }
+            at += 1;
+        }
+    }
+    None
+}
+
+/// The largest difference within the ring's length after the crossing, refined by a parabola through its neighbours, minus
+/// half a ring: the middle of the edge. Or the crossing itself.
+fn place(
+    scene: &Scene,
+    difference: &dyn Fn(usize, usize, usize) -> Option<f64>,
+    echo: &dyn Fn(usize) -> Option<f64>,
+    crossing: usize,
+    crossing_difference: f64,
+    since: usize,
+) -> (f64, f64) {
+    if scene.settings.surface.place == Place::FirstCrossing {
+        return (crossing as f64, echo(crossing).unwrap_or(0.0));
+    }
+    let (mut best, mut best_at) = (crossing_difference, crossing);
+    for i in crossing + 1..crossing + RING as usize {
+        match difference(i, 1, since) {
+            Some(d) if d > best => (best, best_at) = (d, i),
+            Some(_) => {}
+            None => break,
+        }
+    }
+    let before = difference(best_at - 1, 1, since).unwrap_or(best);
+    let after = difference(best_at + 1, 1, since).unwrap_or(best);
+    let bend = before - 2.0 * best + after;
+    let peaked = bend < 0.0 && before < best && after < best;
+    let shift = if peaked { 0.5 * (before - after) / bend } else { 0.0 };
+    (best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at).unwrap_or(0.0))
+}

@@ -1,0 +1,147 @@
+//! Arrays of the f64 references.
+
+use super::slots::Format;
+use half::f16;
+
+/// Texels with `channels` values each; x fastest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texels {
+    pub size: [usize; 3],
+    pub channels: usize,
+    pub values: Vec<f64>,
+}
+
+impl Texels {
+    /// All values NaN: what a reference leaves so is not written by the pass either.
+    pub fn untouched(size: [usize; 3], channels: usize) -> Texels {
+        Texels { size, channels, values: vec![f64::NAN; size.iter().product::<usize>() * channels] }
+    }
+
+    pub fn from_fn(size: [usize; 3], channels: usize, f: impl Fn([usize; 3], usize) -> f64) -> Texels {
+        let mut texels = Texels::untouched(size, channels);
+        for z in 0..size[2] {
+            for y in 0..size[1] {
+                for x in 0..size[0] {
+                    for c in 0..channels {
+                        let at = texels.index([x, y, z]) + c;
+                        texels.values[at] = f([x, y, z], c);
+                    }
+                }
+            }
+        }
+        texels
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        ((z * self.size[1] + y) * self.size[0] + x) * self.channels
+    }
+
+    pub fn get(&self, at: [usize; 3]) -> &[f64] {
+        let i = self.index(at);
+        &self.values[i..i + self.channels]
+    }
+
+    /// First channel.
+    pub fn one(&self, x: usize, y: usize, z: usize) -> f64 {
+        self.values[self.index([x, y, z])]
+    }
+
+    /// First channel of the nearest texel.
+    pub fn clamped(&self, x: i64, y: i64, z: i64) -> f64 {
+        let at = |i: i64, n: usize| i.clamp(0, n as i64 - 1) as usize;
+        self.one(at(x, self.size[0]), at(y, self.size[1]), at(z, self.size[2]))
+    }
+
+    pub fn set(&mut self, at: [usize; 3], value: &[f64]) {
+        let i = self.index(at);
+        self.values[i..i + self.channels].copy_from_slice(value);
+    }
+
+    /// First channel between texels, beyond the border that of the nearest.
+    pub fn trilinear(&self, at: [f64; 3]) -> f64 {
+        let low = at.map(f64::floor);
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let mut weight = 1.0;
+            let mut tap = [0i64; 3];
+            for axis in 0..3 {
+                let share = at[axis] - low[axis];
+                let upper = corner >> axis & 1;
+                weight *= if upper == 1 { share } else { 1.0 - share };
+                tap[axis] = low[axis] as i64 + upper;
+            }
+            sum += weight * self.clamped(tap[0], tap[1], tap[2]);
+        }
+        sum
+    }
+
+    /// The bytes that a slot of this format stores, each value rounded as a driver rounds: to nearest, ties to even.
+    pub fn encode(&self, format: Format) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.values.len() * format.channel_bytes());
+        for &v in &self.values {
+            match format {
+                Format::R8 | Format::Rgba8 => bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8),
+                Format::R16 => {
+                    bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
+                }
+                Format::R16f | Format::Rg16f | Format::Rgba16f => bytes.extend(f16::from_f64(v).to_le_bytes()),
+                Format::R32f | Format::Rg32f | Format::Floats => bytes.extend((v as f32).to_le_bytes()),
+            }
+        }
+        bytes
+    }
+
+    pub fn decode(size: [usize; 3], format: Format, bytes: &[u8]) -> Texels {
+        let two = |b: &[u8]| [b[0], b[1]];
+        let values = bytes.chunks_exact(format.channel_bytes()).map(|b| match format {
+            Format::R8 | Format::Rgba8 => f64::from(b[0]) / 255.0,
+            Format::R16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
+            Format::R16f | Format::Rg16f | Format::Rgba16f => f64::from(f16::from_le_bytes(two(b))),
+            Format::R32f | Format::Rg32f | Format::Floats => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        });
+        Texels { size, channels: format.channels(), values: values.collect() }
+    }
+
+    /// The distance between neighbouring values that the format stores near `value`.
+    pub fn spacing(format: Format, value: f64) -> f64 {
+        match format {
+            Format::R8 | Format::Rgba8 => 1.0 / 255.0,
+            Format::R16 => 1.0 / 65535.0,
+            Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
+            Format::R32f | Format::Rg32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
+        }
+    }
+}
+
+/// The arrays of one pass by the names that its shader gives them.
+#[derive(Clone, Debug, Default)]
+pub struct Arrays(Vec<(&'static str, Texels)>);
+
+impl Arrays {
+    pub fn insert(&mut self, name: &'static str, texels: Texels) {
+        self.0.retain(|(n, _)| *n != name);
+        self.0.push((name, texels));
+    }
+
+    /// # Panics
+    /// When the pass did not declare the name: the declaration and its reference disagree.
+    pub fn get(&self, name: &str) -> &Texels {
+        match self.0.iter().find(|(n, _)| *n == name) {
+            Some((_, texels)) => texels,
+            None => panic!("reference reads '{name}', which its pass does not declare"),
+        }
+    }
+
+    /// # Panics
+    /// As [`Arrays::get`].
+    pub fn get_mut(&mut self, name: &str) -> &mut Texels {
+        match self.0.iter_mut().find(|(n, _)| *n == name) {
+            Some((_, texels)) => texels,
+            None => panic!("reference writes '{name}', which its pass does not declare"),
+        }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, &Texels)> {
+        self.0.iter().map(|(n, t)| (*n, t))
+    }
+}

@@ -1,0 +1,168 @@
+//! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
+
+use crate::passes::slots::Filled;
+use crate::passes::{PASSES, Pass, Slot, Turn, When};
+use crate::scene::Scene;
+use std::fmt::Write as _;
+
+/// One dispatch of a plan; a pass that repeats has several.
+#[derive(Clone, Copy)]
+pub struct Step {
+    pub pass: &'static Pass,
+    pub iteration: u32,
+}
+
+/// What a scene needs, in the order in which it runs.
+pub struct Plan {
+    pub steps: Vec<Step>,
+    pub slots: Vec<Slot>,
+}
+
+/// What a change of scene makes run again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Rerun {
+    /// Slots or pipelines differ: the plan is built anew, and frames have to arrive again.
+    Everything,
+    /// Frames have to go through stage 1 again.
+    Frames,
+    /// These steps of the volume and the picture, by their index in [`Plan::steps`], and these slots made from the scene.
+    Steps { steps: Vec<usize>, slots: Vec<Slot> },
+}
+
+impl Plan {
+    pub fn new(scene: &Scene) -> Plan {
+        let mut steps = Vec::new();
+        for pass in PASSES.iter().filter(|p| p.is_needed(scene)) {
+            steps.extend((0..(pass.repeat)(scene)).map(|iteration| Step { pass, iteration }));
+        }
+        let mut slots: Vec<Slot> = steps.iter().flat_map(|s| s.slots(scene)).collect();
+        slots.sort();
+        slots.dedup();
+        Plan { steps, slots }
+    }
+
+    pub fn steps_of(&self, when: When) -> impl Iterator<Item = (usize, &Step)> {
+        self.steps.iter().enumerate().filter(move |(_, s)| s.pass.when == when)
+    }
+
+    /// What the passes of this plan keep on the device, bytes; volume images that take turns counted once.
+    pub fn bytes(&self, scene: &Scene) -> u64 {
+        self.slots.iter().map(|s| s.bytes(scene)).sum()
+    }
+
+    /// Passes, bytes, and why each pass is there or not.
+    pub fn explain(&self, scene: &Scene) -> String {
+        let mut text = String::new();
+        let mut stage = None;
+        for pass in PASSES {
+            if stage != Some(pass.stage) {
+                stage = Some(pass.stage);
+                let _ = writeln!(text, "stage {}: {}", pass.stage as u32 + 1, pass.stage.name());
+            }
+            match (pass.needed)(scene) {
+                Ok(why) => {
+                    let [x, y, z] = (pass.extent)(scene);
+                    let each = match pass.when {
+                        When::Frame => "each frame",
+                        When::Volume => "each volume",
+                        When::Picture => "each picture",
+                    };
+                    let times = match (pass.repeat)(scene) {
+                        1 => String::new(),
+                        n => format!(", {n} times"),
+                    };
+                    let _ = writeln!(text, "  + {:<19} {x} x {y} x {z}, {each}{times}: {why}", pass.name);
+                    let names = |slots: Vec<crate::passes::Bind>| {
+                        slots.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
+                    };
+                    let turn = Turn::default();
+                    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+                    let _ = writeln!(
+                        text,
+                        "    {:<19} {}: {} -> {}",
+                        "",
+                        (pass.shader)(scene),
+                        names(reads),
+                        names(writes)
+                    );
+                }
+                Err(why) => {
+                    let _ = writeln!(text, "  - {:<19} {why}", pass.name);
+                }
+            }
+        }
+        let _ = writeln!(text, "slots");
+        for slot in &self.slots {
+            let shape = format!("{:?} {:?}", slot.shape(scene), slot.format(scene));
+            let _ = writeln!(text, "    {:<15} {:>12} bytes  {shape}", slot.name(), slot.bytes(scene));
+        }
+        let _ = writeln!(text, "    {:<15} {:>12} bytes", "in all", self.bytes(scene));
+        text
+    }
+
+    /// What has to run after `old` became `new`, this being the plan of `new`. Nothing here knows what a camera or a light is:
+    /// steps are compared by their numbers, structure and slots, and what reads a changed slot changes too.
+    pub fn rerun(&self, old: &Scene, new: &Scene) -> Rerun {
+        let before = Plan::new(old);
+        let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
+            let slots = plan.steps.iter().filter(|s| s.pass.when != When::Picture).flat_map(|s| s.slots(scene));
+            slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
+        };
+        if stored(&before, old) != stored(self, new) || old.geometry != new.geometry || old.input != new.input {
+            return Rerun::Everything;
+        }
+        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| made_differently(*s, old, new)).collect();
+        let mut changed = slots.clone();
+        let mut steps = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
+            let same = before.steps.iter().any(|s| s.is(step) && s.same_work(step, old, new));
+            let reads = (step.pass.reads)(new, &step.turn());
+            if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
+                continue;
+            }
+            if step.pass.when == When::Frame {
+                return Rerun::Frames;
+            }
+            changed.extend((step.pass.writes)(new, &step.turn()).iter().map(|b| b.slot));
+            steps.push(i);
+        }
+        Rerun::Steps { steps, slots }
+    }
+}
+
+impl Step {
+    pub fn turn(&self) -> Turn {
+        Turn { iteration: self.iteration, ..Turn::default() }
+    }
+
+    fn slots(&self, scene: &Scene) -> Vec<Slot> {
+        let reads = (self.pass.reads)(scene, &self.turn());
+        let writes = (self.pass.writes)(scene, &self.turn());
+        reads.iter().chain(&writes).map(|b| b.slot).collect()
+    }
+
+    fn is(&self, other: &Step) -> bool {
+        self.pass.name == other.pass.name && self.iteration == other.iteration
+    }
+
+    fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {
+        let (a, b) = (self.pass, other.pass);
+        let turn = self.turn();
+        (a.shader)(old) == (b.shader)(new)
+            && (a.constants)(old) == (b.constants)(new)
+            && (a.params)(old, &turn) == (b.params)(new, &turn)
+            && (a.extent)(old) == (b.extent)(new)
+            && (a.reads)(old, &turn) == (b.reads)(new, &turn)
+            && (a.writes)(old, &turn) == (b.writes)(new, &turn)
+    }
+}
+
+/// Whether a slot that the CPU makes from the scene has other content now.
+fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
+    let Filled::ByScene(make) = slot.filled() else { return false };
+    if slot == Slot::Transfer {
+        return make(old) != make(new);
+    }
+    // The rest follow from the geometry, and their content is too long to compare.
+    (&old.geometry, old.grid, old.apron) != (&new.geometry, new.grid, new.apron)
+}

@@ -1,0 +1,125 @@
+//! Positions of the scan lines of a frame, or of the slices of a sweep, along their axis.
+
+/// Strictly increasing positions: angles in rad or places in mm, one an index.
+///
+/// An even axis has the closed inverse `(v - first) / pitch`; a table is inverted by bracketing and interpolating,
+/// which is what uneven Kretz tables need.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Axis {
+    Even { first: f64, pitch: f64, count: usize },
+    Table(Vec<f64>),
+}
+
+impl Axis {
+    /// `count` positions centred on zero.
+    pub fn centred(pitch: f64, count: usize) -> Axis {
+        let first = -pitch * (count.saturating_sub(1)) as f64 / 2.0;
+        Axis::Even { first, pitch, count }
+    }
+
+    /// A table, or the even axis it is to within 1e-9 of its span: readers hand over tables that are even in all but name.
+    pub fn from_table(table: Vec<f64>) -> Axis {
+        let count = table.len();
+        if count < 2 {
+            return Axis::Even { first: table.first().copied().unwrap_or(0.0), pitch: 1.0, count };
+        }
+        let (first, last) = (table[0], table[count - 1]);
+        let pitch = (last - first) / (count - 1) as f64;
+        let even =
+            table.iter().enumerate().all(|(i, v)| (v - first - pitch * i as f64).abs() <= 1e-9 * (last - first).abs());
+        if even { Axis::Even { first, pitch, count } } else { Axis::Table(table) }
+    }
+
+    pub fn len(&self) -> usize {
+        match self {
+            Axis::Even { count, .. } => *count,
+            Axis::Table(table) => table.len(),
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub fn first(&self) -> f64 {
+        self.at(0.0)
+    }
+
+    pub fn last(&self) -> f64 {
+        self.at(self.len().saturating_sub(1) as f64)
+    }
+
+    /// Mean distance between neighbours; 0 for a single position.
+    pub fn pitch(&self) -> f64 {
+        match self {
+            Axis::Even { pitch, count, .. } if *count > 1 => *pitch,
+            Axis::Table(table) if table.len() > 1 => (self.last() - self.first()) / (table.len() - 1) as f64,
+            _ => 0.0,
+        }
+    }
+
+    /// Position at a fractional index; continued in a straight line beyond both ends.
+    pub fn at(&self, index: f64) -> f64 {
+        match self {
+            Axis::Even { first, pitch, .. } => first + pitch * index,
+            Axis::Table(table) if table.len() < 2 => table.first().copied().unwrap_or(0.0),
+            Axis::Table(table) => {
+                let i = (index.floor().max(0.0) as usize).min(table.len() - 2);
+                table[i] + (table[i + 1] - table[i]) * (index - i as f64)
+            }
+        }
+    }
+
+    /// Fractional index of a position: the inverse of [`Axis::at`]. NaN in, NaN out.
+    pub fn index_of(&self, position: f64) -> f64 {
+        match self {
+            Axis::Even { first, pitch, .. } => (position - first) / pitch,
+            Axis::Table(table) if table.len() < 2 => position - self.first(),
+            Axis::Table(table) => {
+                let i = table.partition_point(|v| *v <= position).clamp(1, table.len() - 1) - 1;
+                i as f64 + (position - table[i]) / (table[i + 1] - table[i])
+            }
+        }
+    }
+
+    /// Finite and strictly increasing.
+    pub fn is_valid(&self) -> bool {
+        match self {
+            Axis::Even { first, pitch, count } => {
+                first.is_finite() && self.last().is_finite() && *count > 0 && (*count == 1 || *pitch > 0.0)
+            }
+            Axis::Table(table) => {
+                !table.is_empty() && table.iter().all(|v| v.is_finite()) && table.windows(2).all(|w| w[0] < w[1])
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_uneven_table_is_inverted_at_and_between_its_entries() {
+        let axis = Axis::from_table(vec![-1.0, -0.2, 0.1, 2.0]);
+        for i in -4..24 {
+            let index = i as f64 / 4.0 - 0.5;
+            assert!((axis.index_of(axis.at(index)) - index).abs() < 1e-12, "{index}");
+        }
+    }
+
+    #[test]
+    fn an_even_table_becomes_an_even_axis() {
+        let axis = Axis::from_table((0..9).map(|i| 0.1 * i as f64 - 0.4).collect());
+        assert!(matches!(axis, Axis::Even { .. }));
+        assert!((axis.at(8.0) - 0.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn falling_or_repeated_positions_are_not_valid() {
+        assert!(!Axis::from_table(vec![0.0, 1.0, 1.0]).is_valid());
+        assert!(!Axis::from_table(vec![0.0, f64::NAN, 1.0]).is_valid());
+        assert!(!Axis::Even { first: 0.0, pitch: -1.0, count: 3 }.is_valid());
+        assert!(Axis::Even { first: 0.0, pitch: 0.0, count: 1 }.is_valid());
+    }
+}

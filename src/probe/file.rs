@@ -1,0 +1,315 @@
+//! The probe file: a TOML that says where the scan lines and frames of a recording lie. Lengths in mm, angles in degrees.
+//!
+//! Numbers of samples, lines and frames are not in it: they come from the recording.
+
+mod tables;
+
+use super::{Advance, Array, Axis, Motion, Probe, Volumes};
+use crate::source::InputError;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use tables::{ArrayKind, Direction, MotionKind, Tables};
+
+/// Longest probe file, in bytes.
+const LONGEST: u64 = 1 << 20;
+/// Thickness of the slab that a lone frame is drawn as, mm.
+pub(crate) const SLAB: f64 = 1.0;
+
+/// A probe file as written. `tests/data/*/probe.toml` are commented examples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbeFile {
+    path: PathBuf,
+    tables: Tables,
+}
+
+impl ProbeFile {
+    /// Reads and checks all that can be checked without the recording.
+    pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
+        let unreadable = |e| InputError::unreadable(path, &e);
+        let file = File::open(path).map_err(unreadable)?;
+        let mut text = String::new();
+        file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
+        if text.len() as u64 > LONGEST {
+            return Err(InputError::new(path, "file", "is longer than 1 MiB, which no probe file is"));
+        }
+        ProbeFile::parse(path, &text)
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
+        let tables = toml::from_str::<Tables>(text).map_err(|e| {
+            let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
+            let line = before.matches('\n').count() + 1;
+            InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))
+        })?;
+        let probe_file = ProbeFile { path: path.into(), tables };
+        probe_file.check()?;
+        Ok(probe_file)
+    }
+
+    /// The probe file beside a recording: `<stem>.probe.toml`, which is for this recording alone, or else `probe.toml`,
+    /// which is for all in its folder.
+    pub fn beside(recording: &Path) -> Option<PathBuf> {
+        let own = recording.file_stem().map(|stem| {
+            let mut name = stem.to_os_string();
+            name.push(".probe.toml");
+            recording.with_file_name(name)
+        });
+        own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Sample values that are to be shown as 0 and 1, in the recording's own units.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        self.tables.samples.range
+    }
+
+    fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+        Err(InputError::new(&self.path, field, fault))
+    }
+
+    fn check(&self) -> Result<(), InputError> {
+        let (lines, motion) = (&self.tables.lines, &self.tables.motion);
+        let curved = self.tables.array.kind == ArrayKind::Curved;
+        let (fan, translated) = (motion.kind == MotionKind::Fan, motion.kind == MotionKind::Translated);
+        // Field, its value, may it be zero, does it belong to this kind of probe.
+        let numbers = [
+            ("array.radius_mm", self.tables.array.radius_mm, true, curved),
+            ("lines.sector_angle_deg", lines.sector_angle_deg, false, curved),
+            ("lines.width_mm", lines.width_mm, false, !curved),
+            ("depth.start_mm", Some(self.tables.depth.start_mm), true, true),
+            ("depth.sample_pitch_mm", self.tables.depth.sample_pitch_mm, false, true),
+            ("depth.end_mm", self.tables.depth.end_mm, false, true),
+            ("motion.wobble_radius_mm", motion.wobble_radius_mm, true, fan),
+            ("motion.fan_angle_deg", motion.fan_angle_deg, true, fan),
+            ("motion.pitch_mm", motion.pitch_mm, false, translated),
+            ("motion.thickness_mm", motion.thickness_mm, false, true),
+            ("motion.speed_ratio", Some(motion.speed_ratio), true, true),
+            ("sound.speed_m_per_s", Some(self.tables.sound.speed_m_per_s), false, true),
+        ];
+        for (field, value, zero, belongs) in numbers {
+            let Some(value) = value else { continue };
+            if !belongs {
+                return self.fault(field, "does not belong to this kind of array or motion");
+            }
+            if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero) {
+                let least = if zero { "of at least 0" } else { "above 0" };
+                return self.fault(field, format!("is {value}, must be a finite number {least}"));
+            }
+        }
+        let tables = [
+            ("lines.angles_deg", &lines.angles_deg, curved),
+            ("lines.positions_mm", &lines.positions_mm, !curved),
+            ("motion.frame_angles_deg", &motion.frame_angles_deg, fan),
+            ("motion.frame_positions_mm", &motion.frame_positions_mm, translated),
+        ];
+        for (field, table, belongs) in tables {
+            if table.is_some() && !belongs {
+                return self.fault(field, "does not belong to this kind of array or motion");
+            }
+        }
+        if motion.speed_ratio > 1.0 {
+            return self.fault("motion.speed_ratio", format!("is {}, must be 0 to 1", motion.speed_ratio));
+        }
+        if motion.kind == MotionKind::Still && motion.frames_per_volume > 1 {
+            return self.fault("motion.frames_per_volume", "must be 1 when the probe is still");
+        }
+        match self.range() {
+            Some([low, high]) if !(low < high && (high - low).is_finite()) => {
+                self.fault("samples.range", format!("is [{low}, {high}], must be two rising finite numbers"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The probe, swept forwards without [`Advance`], and the volumes of a recording of so many samples a line, lines a
+    /// frame, and frames. See [`Volumes::advance`] for what the motion adds to each volume.
+    pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
+        let volumes = self.volumes(frames)?;
+        let (motion, slices) = self.motion(volumes.frames)?;
+        let (array, lines) = self.lines(lines)?;
+        let depth = &self.tables.depth;
+        let sample_pitch = match (depth.sample_pitch_mm, depth.end_mm) {
+            (Some(pitch), None) => pitch,
+            (None, Some(end)) => (end - depth.start_mm) / (samples.max(2) - 1) as f64,
+            _ => return self.fault("depth", "must have either sample_pitch_mm or end_mm"),
+        };
+        let probe = Probe {
+            array,
+            lines,
+            start_depth: depth.start_mm,
+            sample_pitch,
+            samples,
+            motion,
+            slices,
+            advance: Advance::None,
+            sound_speed: self.tables.sound.speed_m_per_s,
+        };
+        probe.check().map_err(|e| InputError::geometry(&self.path, &e))?;
+        for volume in 0..volumes.count.min(2) {
+            let advance = volumes.advance(volume, &probe.slices);
+            let moving = Probe { advance, ..probe.clone() };
+            moving.check().map_err(|e| InputError::geometry(&self.path, &e))?;
+        }
+        Ok((probe, volumes))
+    }
+
+    fn volumes(&self, frames: usize) -> Result<Volumes, InputError> {
+        let motion = &self.tables.motion;
+        let each = match (motion.kind, motion.frames_per_volume) {
+            (MotionKind::Still, _) => 1,
+            (_, 0) => frames,
+            (_, each) => each,
+        };
+        if frames == 0 || each > frames {
+            return self.fault("motion.frames_per_volume", format!("is {each}, but the recording has {frames} frames"));
+        }
+        Ok(Volumes {
+            frames: each,
+            count: frames / each,
+            left_over: frames % each,
+            both_ways: motion.both_ways,
+            first_backward: motion.first_direction == Direction::Backward,
+            speed_ratio: motion.speed_ratio,
+        })
+    }
+
+    fn motion(&self, frames: usize) -> Result<(Motion, Axis), InputError> {
+        let motion = &self.tables.motion;
+        let slab = Motion::Still { thickness: motion.thickness_mm.unwrap_or(SLAB) };
+        let (kind, slices) = match motion.kind {
+            MotionKind::Still => (slab, Axis::centred(1.0, 1)),
+            MotionKind::Translated => {
+                let slices = match (motion.pitch_mm, &motion.frame_positions_mm) {
+                    (Some(pitch), None) => Axis::centred(pitch, frames),
+                    (None, Some(table)) => self.table("motion.frame_positions_mm", table, frames, "frames")?,
+                    _ => return self.fault("motion", "must have either pitch_mm or frame_positions_mm"),
+                };
+                (Motion::Translated, slices)
+            }
+            MotionKind::Fan => {
+                let Some(wobble_radius) = motion.wobble_radius_mm else {
+                    return self.fault("motion.wobble_radius_mm", "is missing");
+                };
+                let slices = match (motion.fan_angle_deg, &motion.frame_angles_deg) {
+                    (Some(angle), None) => spread(angle.to_radians(), frames),
+                    (None, Some(table)) => {
+                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
+                        self.table("motion.frame_angles_deg", &table, frames, "frames")?
+                    }
+                    _ => return self.fault("motion", "must have either fan_angle_deg or frame_angles_deg"),
+                };
+                (Motion::Fan { wobble_radius }, slices)
+            }
+        };
+        // One frame has no sweep to lie in: it is drawn as a slab.
+        if frames == 1 { Ok((slab, Axis::centred(1.0, 1))) } else { Ok((kind, slices)) }
+    }
+
+    fn lines(&self, count: usize) -> Result<(Array, Axis), InputError> {
+        let lines = &self.tables.lines;
+        match (self.tables.array.kind, self.tables.array.radius_mm) {
+            (ArrayKind::Curved, None) => self.fault("array.radius_mm", "is missing"),
+            (ArrayKind::Curved, Some(radius)) => {
+                let axis = match (lines.sector_angle_deg, &lines.angles_deg) {
+                    (Some(angle), None) => spread(angle.to_radians(), count),
+                    (None, Some(table)) => {
+                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
+                        self.table("lines.angles_deg", &table, count, "lines")?
+                    }
+                    _ => return self.fault("lines", "must have either sector_angle_deg or angles_deg"),
+                };
+                Ok((Array::Curved { radius }, axis))
+            }
+            (ArrayKind::Linear, _) => {
+                let axis = match (lines.width_mm, &lines.positions_mm) {
+                    (Some(width), None) => spread(width, count),
+                    (None, Some(table)) => self.table("lines.positions_mm", table, count, "lines")?,
+                    _ => return self.fault("lines", "must have either width_mm or positions_mm"),
+                };
+                Ok((Array::Linear, axis))
+            }
+        }
+    }
+
+    fn table(&self, field: &str, table: &[f64], count: usize, of: &str) -> Result<Axis, InputError> {
+        if table.len() != count {
+            return self.fault(field, format!("has {} entries, but there are {count} {of}", table.len()));
+        }
+        let axis = Axis::from_table(table.to_vec());
+        if axis.is_valid() {
+            Ok(axis)
+        } else {
+            self.fault(field, "must be finite numbers that rise from one to the next")
+        }
+    }
+}
+
+/// `count` positions over `span`, first to last, centred on zero. One position lies in the middle.
+fn spread(span: f64, count: usize) -> Axis {
+    if count < 2 { Axis::centred(1.0, 1) } else { Axis::centred(span / (count - 1) as f64, count) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAN: &str = "[array]\nkind = 'curved'\nradius_mm = 40\n[lines]\nsector_angle_deg = 70\n[depth]\nend_mm = 159\n\
+                       [motion]\nkind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60\n";
+
+    fn parse(text: &str) -> Result<ProbeFile, InputError> {
+        ProbeFile::parse(Path::new("probe.toml"), text)
+    }
+
+    #[test]
+    fn the_end_depth_is_that_of_the_last_sample() {
+        let (probe, volumes) = parse(FAN).unwrap().geometry(160, 71, 31).unwrap();
+        assert!((probe.sample_pitch - 1.0).abs() < 1e-12);
+        assert!((probe.last_range() - 199.0).abs() < 1e-9);
+        assert!((probe.lines.last().to_degrees() - 35.0).abs() < 1e-9);
+        assert!((probe.slices.first().to_degrees() + 30.0).abs() < 1e-9);
+        assert_eq!(volumes, Volumes::forward(31, 1));
+    }
+
+    #[test]
+    fn frames_after_the_last_whole_volume_are_not_a_volume() {
+        let file = parse(&format!("{FAN}frames_per_volume = 10\nboth_ways = true\nspeed_ratio = 0.5\n")).unwrap();
+        let (_, volumes) = file.geometry(160, 71, 39).unwrap();
+        assert_eq!((volumes.count, volumes.left_over, volumes.backward(1)), (3, 9, true));
+        assert!(file.geometry(160, 71, 9).is_err());
+    }
+
+    #[test]
+    fn one_frame_of_a_fan_is_a_slab() {
+        let (probe, _) = parse(FAN).unwrap().geometry(160, 71, 1).unwrap();
+        assert_eq!(probe.motion, Motion::Still { thickness: SLAB });
+        assert!(parse(FAN).unwrap().geometry(160, 1, 1).is_ok(), "a single line is a probe too");
+    }
+
+    #[test]
+    fn every_fault_is_one_line_that_names_file_and_field() {
+        let faults = [
+            ("radius_mm = 40", "radius_mm = nan", "array.radius_mm"),
+            ("radius_mm = 40", "radus_mm = 40", "radus_mm"),
+            ("radius_mm = 40", "radius_mm = 40\n\"a\\nb\" = 1", "line 4"),
+            ("radius_mm = 40", "", "array.radius_mm"),
+            ("end_mm = 159", "end_mm = 159\nsample_pitch_mm = 1", "depth"),
+            ("end_mm = 159", "end_mm = -159", "depth.end_mm"),
+            ("fan_angle_deg = 60", "frame_angles_deg = [1, 2, 3]", "motion.frame_angles_deg"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\npitch_mm = 1", "motion.pitch_mm"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nspeed_ratio = 1.5", "motion.speed_ratio"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\n[samples]\nrange = [1, 1]", "samples.range"),
+            ("sector_angle_deg = 70", "sector_angle_deg = 190", "sector angle"),
+            ("wobble_radius_mm = 25", "wobble_radius_mm = 1", "wobble radius"),
+            ("kind = 'fan'", "kind = 'helix'", "helix"),
+        ];
+        for (from, to, named) in faults {
+            let error = parse(&FAN.replace(from, to)).and_then(|f| f.geometry(160, 71, 31)).unwrap_err().to_string();
+            assert!(error.starts_with("probe.toml: ") && error.contains(named), "{error}");
+            assert_eq!(error.lines().count(), 1);
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! The maps between (sample, line, slice) indices and places in space, in f64: the definition every pass is held to.
+//!
+//! Space is (X lateral, Y depth, Z elevation) in mm with the origin at the in-plane apex of the array (at the face of a
+//! linear array) and Y pointing away from the probe. Equations: in-plane map and sweep map of the thesis, 4.4.2.
+
+use super::axis::Axis;
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// How the transducer elements lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Array {
+    /// Elements on an arc of `radius` mm (Ra, apex to face); 0 is a phased array. Lines are angles in rad.
+    Curved { radius: f64 },
+    /// Elements on a straight line. Lines are lateral places in mm.
+    Linear,
+}
+
+/// How the frames of a sweep lie to one another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// The array turns about an axis `wobble_radius` mm (Rw) behind the face. Slices are angles in rad.
+    Fan { wobble_radius: f64 },
+    /// The array is moved sideways. Slices are elevations in mm.
+    Translated,
+    /// One frame: a slab of `thickness` mm.
+    Still { thickness: f64 },
+}
+
+/// How far the motor travels while a frame is acquired line by line, in units of the slice axis, signed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Advance {
+    None,
+    /// The same for every slice: one direction, even pitch.
+    Same(f64),
+    /// One entry a slice: mixed directions, or an uneven sweep.
+    Each(Vec<f64>),
+}
+
+/// Everything that places a sample in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Probe {
+    pub array: Array,
+    /// One position a scan line: rad or mm.
+    pub lines: Axis,
+    /// Distance from the face to the first sample (d0), mm.
+    pub start_depth: f64,
+    /// Distance between samples (dr), mm.
+    pub sample_pitch: f64,
+    pub samples: usize,
+    pub motion: Motion,
+    /// Position of each slice when its line 0 was taken, in geometric order: rad or mm.
+    pub slices: Axis,
+    pub advance: Advance,
+    /// m/s.
+    pub sound_speed: f64,
+}
+
+/// Fractional indices into a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Indices {
+    pub sample: f64,
+    pub line: f64,
+    pub slice: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("probe geometry: {field}: {fault}")]
+pub struct GeometryError {
+    pub field: &'static str,
+    pub fault: String,
+}
+
+fn fault<T>(field: &'static str, fault: impl Into<String>) -> Result<T, GeometryError> {
+    Err(GeometryError { field, fault: fault.into() })
+}
+
+impl Probe {
+    /// Range of the first sample: from the apex of a curved array, from the face of a linear one. mm.
+    pub fn first_range(&self) -> f64 {
+        self.start_depth + self.array_radius()
+    }
+
+    pub fn last_range(&self) -> f64 {
+        self.first_range() + self.sample_pitch * (self.samples - 1) as f64
+    }
+
+    pub fn array_radius(&self) -> f64 {
+        match self.array {
+            Array::Curved { radius } => radius,
+            Array::Linear => 0.0,
+        }
+    }
+
+    /// Y of the wobble axis: Ra - Rw. 0 without a fan.
+    pub fn axis_depth(&self) -> f64 {
+        match self.motion {
+            Motion::Fan { wobble_radius } => self.array_radius() - wobble_radius,
+            _ => 0.0,
+        }
+    }
+
+    /// In-plane place (x, y) of a fractional (sample, line).
+    pub fn plane_point(&self, sample: f64, line: f64) -> (f64, f64) {
+        let range = self.first_range() + sample * self.sample_pitch;
+        let at = self.lines.at(line);
+        match self.array {
+            Array::Curved { .. } => (range * at.sin(), range * at.cos()),
+            Array::Linear => (at, range),
+        }
+    }
+
+    /// Fractional (sample, line) of an in-plane place: the inverse of [`Probe::plane_point`].
+    pub fn plane_indices(&self, x: f64, y: f64) -> (f64, f64) {
+        let (range, at) = match self.array {
+            // atan2(0, 0) is 0 here; on some GPUs it is not, so shaders test the range first.
+            Array::Curved { .. } => (x.hypot(y), x.atan2(y)),
+            Array::Linear => (y, x),
+        };
+        ((range - self.first_range()) / self.sample_pitch, self.lines.index_of(at))
+    }
+
+    /// Position of a slice when the given line was taken: rad or mm.
+    pub fn slice_position(&self, line: f64, slice: f64) -> f64 {
+        self.slices.at(slice) + self.advance_at(slice) * line / self.lines.len() as f64
+    }
+
+    fn advance_at(&self, slice: f64) -> f64 {
+        match &self.advance {
+            Advance::None => 0.0,
+            Advance::Same(a) => *a,
+            Advance::Each(table) if table.len() < 2 => table.first().copied().unwrap_or(0.0),
+            Advance::Each(table) => {
+                let k = (slice.floor().max(0.0) as usize).min(table.len() - 2);
+                table[k] + (table[k + 1] - table[k]) * (slice - k as f64)
+            }
+        }
+    }
+
+    /// Place of fractional indices in space: the in-plane map, then the sweep map.
+    pub fn to_space(&self, at: Indices) -> DVec3 {
+        let (x, y) = self.plane_point(at.sample, at.line);
+        let position = self.slice_position(at.line, at.slice);
+        self.swept(x, y, position)
+    }
+
+    /// The sweep map of an in-plane place at a slice position.
+    pub fn swept(&self, x: f64, y: f64, position: f64) -> DVec3 {
+        match self.motion {
+            Motion::Fan { .. } => {
+                let axis = self.axis_depth();
+                DVec3::new(x, axis + (y - axis) * position.cos(), (y - axis) * position.sin())
+            }
+            Motion::Translated => DVec3::new(x, y, position),
+            Motion::Still { .. } => DVec3::new(x, y, 0.0),
+        }
+    }
+
+    /// In-plane place (x, y) and slice position of a place in space: the inverse of [`Probe::swept`].
+    pub fn unswept(&self, place: DVec3) -> (f64, f64, f64) {
+        match self.motion {
+            Motion::Fan { .. } => {
+                let beyond = place.y - self.axis_depth();
+                (place.x, beyond.hypot(place.z) + self.axis_depth(), place.z.atan2(beyond))
+            }
+            Motion::Translated => (place.x, place.y, place.z),
+            Motion::Still { .. } => (place.x, place.y, 0.0),
+        }
+    }
+
+    /// Fractional indices of a place in space. Exact, not iterated: the line does not depend on the slice.
+    pub fn to_indices(&self, place: DVec3) -> Indices {
+        let (x, y, position) = self.unswept(place);
+        let (sample, line) = self.plane_indices(x, y);
+        Indices { sample, line, slice: self.slice_index(position, line) }
+    }
+
+    /// Fractional slice index of a slice position, seen at a line.
+    pub fn slice_index(&self, position: f64, line: f64) -> f64 {
+        let share = line / self.lines.len() as f64;
+        match &self.advance {
+            _ if self.slices.len() == 1 => 0.0,
+            Advance::None => self.slices.index_of(position),
+            Advance::Same(advance) => self.slices.index_of(position - advance * share),
+            Advance::Each(table) => {
+                let at = |k: usize| self.slices.at(k as f64) + table[k] * share;
+                let mut k = 0;
+                while k + 2 < table.len() && at(k + 1) <= position {
+                    k += 1;
+                }
+                k as f64 + (position - at(k)) / (at(k + 1) - at(k))
+            }
+        }
+    }
+
+    /// Corners of the smallest in-plane rectangle (x, y) that holds every sample.
+    pub fn plane_bounds(&self) -> ([f64; 2], [f64; 2]) {
+        let (r0, r1) = (self.first_range(), self.last_range());
+        let (first, last) = (self.lines.first(), self.lines.last());
+        match self.array {
+            Array::Linear => ([first, r0], [last, r1]),
+            Array::Curved { .. } => {
+                let widest = first.abs().max(last.abs());
+                let straight = if first <= 0.0 && last >= 0.0 { 0.0 } else { first.abs().min(last.abs()) };
+                let low_x = if first < 0.0 { r1 * first.sin() } else { r0 * first.sin() };
+                let high_x = if last > 0.0 { r1 * last.sin() } else { r0 * last.sin() };
+                ([low_x, r0 * widest.cos()], [high_x, r1 * straight.cos()])
+            }
+        }
+    }
+
+    /// Lowest and highest slice position of any line.
+    pub fn slice_bounds(&self) -> (f64, f64) {
+        let last_line = (self.lines.len() - 1) as f64;
+        let last_slice = (self.slices.len() - 1) as f64;
+        let ends = [(0.0, 0.0), (last_line, 0.0), (0.0, last_slice), (last_line, last_slice)];
+        let ends = ends.map(|(line, slice)| self.slice_position(line, slice));
+        (ends.iter().copied().fold(f64::MAX, f64::min), ends.iter().copied().fold(f64::MIN, f64::max))
+    }
+
+    /// Corners of a box in space that holds the insonified region.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let (low, high) = self.plane_bounds();
+        let (first, last) = self.slice_bounds();
+        match self.motion {
+            Motion::Translated => (DVec3::new(low[0], low[1], first), DVec3::new(high[0], high[1], last)),
+            Motion::Still { thickness } => {
+                (DVec3::new(low[0], low[1], -thickness / 2.0), DVec3::new(high[0], high[1], thickness / 2.0))
+            }
+            Motion::Fan { .. } => {
+                let axis = self.axis_depth();
+                let (near, far) = (low[1] - axis, high[1] - axis);
+                let widest = first.abs().max(last.abs());
+                let straight = if first <= 0.0 && last >= 0.0 { 0.0 } else { first.abs().min(last.abs()) };
+                let low_z = if first < 0.0 { far * first.sin() } else { near * first.sin() };
+                let high_z = if last > 0.0 { far * last.sin() } else { near * last.sin() };
+                let (low_y, high_y) = (axis + near * widest.cos(), axis + far * straight.cos());
+                (DVec3::new(low[0], low_y, low_z), DVec3::new(high[0], high_y, high_z))
+            }
+        }
+    }
+
+    /// The time in s that sound needs for one volume: a line takes 2 d / c (thesis 4.3). No renderer is faster than this.
+    pub fn acquisition_time(&self) -> f64 {
+        let depth = (self.start_depth + self.sample_pitch * (self.samples - 1) as f64) * 1e-3;
+        (self.slices.len() * self.lines.len()) as f64 * 2.0 * depth / self.sound_speed
+    }
+
+    /// Refuses what no map can place.
+    pub fn check(&self) -> Result<(), GeometryError> {
+        // What lies beyond is no probe, and would be infinite in f32.
+        let positive = |field, value: f64| match (1e-6..=1e6).contains(&value) {
+            true => Ok(()),
+            false => fault(field, format!("is {value}, must lie in 1e-6..=1e6")),
+        };
+        let not_negative = |field, value: f64| match (0.0..=1e6).contains(&value) {
+            true => Ok(()),
+            false => fault(field, format!("is {value}, must lie in 0..=1e6")),
+        };
+        positive("sample pitch", self.sample_pitch)?;
+        positive("sound speed", self.sound_speed)?;
+        not_negative("start depth", self.start_depth)?;
+        not_negative("array radius", self.array_radius())?;
+        if self.samples < 2 {
+            return fault("samples", format!("{} a line, at least 2 are needed", self.samples));
+        }
+        if self.lines.len() < 2 {
+            return fault("scan lines", format!("{} a frame, at least 2 are needed", self.lines.len()));
+        }
+        let outermost = self.lines.first().abs().max(self.lines.last().abs());
+        if !self.lines.is_valid() || outermost > 1e6 {
+            return fault("scan lines", "positions must be finite and rise from line to line");
+        }
+        let outermost = self.slices.first().abs().max(self.slices.last().abs());
+        if !self.slices.is_valid() || outermost > 1e6 {
+            return fault("frames", "positions must be finite and rise from slice to slice");
+        }
+        if let Array::Curved { .. } = self.array {
+            let widest = self.lines.first().abs().max(self.lines.last().abs());
+            if widest >= PI / 2.0 {
+                return fault("sector angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
+            }
+        }
+        match &self.advance {
+            Advance::None => {}
+            Advance::Same(a) if a.is_finite() => {}
+            Advance::Each(t) if t.len() == self.slices.len() && t.iter().all(|a| a.is_finite()) => {}
+            _ => return fault("motion", "one finite advance a slice is needed"),
+        }
+        // A forward slice beside a backward one: past half a pitch of travel their last lines would cross.
+        let last_line = (self.lines.len() - 1) as f64;
+        let at = |k: usize| self.slice_position(last_line, k as f64);
+        if (1..self.slices.len()).any(|k| at(k) <= at(k - 1)) {
+            return fault("motion", "the motor travels so far within a frame that neighbouring slices cross");
+        }
+        match self.motion {
+            Motion::Still { thickness } => {
+                positive("slice thickness", thickness)?;
+                if self.slices.len() != 1 {
+                    return fault("frames", "a still probe has one frame a volume");
+                }
+            }
+            Motion::Translated => {}
+            Motion::Fan { wobble_radius } => {
+                not_negative("wobble radius", wobble_radius)?;
+                let (first, last) = self.slice_bounds();
+                let widest = first.abs().max(last.abs());
+                if widest >= PI / 2.0 {
+                    return fault("fan angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
+                }
+                let nearest = self.plane_bounds().0[1];
+                if self.slices.len() > 1 && nearest <= self.axis_depth() {
+                    return fault(
+                        "wobble radius",
+                        format!(
+                            "the sector reaches up to y = {nearest:.2} mm but the wobble axis lies at {:.2} mm: \
+                             all of the sector must lie beyond the axis",
+                            self.axis_depth()
+                        ),
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+}

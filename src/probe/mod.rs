@@ -1,0 +1,13 @@
+//! The probe: where its scan lines and frames lie ([`geometry`]), and how a TOML file says so ([`mod@file`]).
+
+pub mod axis;
+pub mod file;
+pub mod geometry;
+pub mod grid;
+pub mod volumes;
+
+pub use axis::Axis;
+pub use file::ProbeFile;
+pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe};
+pub use grid::{Geometry, Grid};
+pub use volumes::Volumes;

@@ -1,0 +1,4 @@
+//! What came of a run, in words and pictures.
+
+pub mod dump;
+pub mod times;

@@ -1,0 +1,32 @@
+//! The time of every pass as a table, and the floor that acquisition sets.
+
+use crate::passes::{PassTime, by_name};
+use crate::scene::Scene;
+use std::fmt::Write as _;
+
+/// One line a pass, and the sum. Without time stamps no time is printed.
+pub fn table(measured: &[PassTime], scene: &Scene) -> String {
+    let mut text = String::new();
+    if measured.is_empty() {
+        text.push_str("times: this device has no time stamps\n");
+    } else {
+        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {:>10}", "stage", "pass", "runs", "ms a run", "ms in all");
+        for time in measured {
+            let stage = by_name(time.name).map_or("", |p| p.stage.name());
+            let all = time.total * 1e-6;
+            let each = all / f64::from(time.runs.max(1));
+            let _ = writeln!(text, "{stage:<12} {:<19} {:>5} {each:>10.3} {all:>10.3}", time.name, time.runs);
+        }
+        let sum = measured.iter().map(|t| t.total).sum::<f64>() * 1e-6;
+        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {sum:>10.3}", "", "sum", "", "");
+    }
+    if let Some(probe) = scene.probe() {
+        let floor = probe.acquisition_time() * 1e3;
+        let _ = writeln!(
+            text,
+            "sound itself needs {floor:.1} ms for this volume ({} m/s): no display is faster",
+            probe.sound_speed
+        );
+    }
+    text
+}

@@ -1,0 +1,136 @@
+//! The camera as rays: every pixel's origin and direction are affine in the pixel's place, in parallel and perspective alike.
+
+use super::Settings;
+use glam::DVec3;
+
+/// Ray of the pixel with its centre at (px, py): origin + px origin_dx + py origin_dy, and the direction likewise, then
+/// normalised. Distances along a ray are in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rays {
+    pub origin: DVec3,
+    pub origin_dx: DVec3,
+    pub origin_dy: DVec3,
+    pub direction: DVec3,
+    pub direction_dx: DVec3,
+    pub direction_dy: DVec3,
+    /// Camera axes in space, unit length.
+    pub right: DVec3,
+    pub up: DVec3,
+    pub forward: DVec3,
+}
+
+impl Rays {
+    /// Origin and unit direction of a pixel's ray; (0.5, 0.5) is the centre of the upper left pixel.
+    pub fn at(&self, px: f64, py: f64) -> (DVec3, DVec3) {
+        let origin = self.origin + self.origin_dx * px + self.origin_dy * py;
+        let direction = self.direction + self.direction_dx * px + self.direction_dy * py;
+        (origin, direction.normalize())
+    }
+
+    /// A direction given in the camera's axes (right, up, towards the viewer), in space.
+    pub fn from_camera(&self, v: DVec3) -> DVec3 {
+        self.right * v.x + self.up * v.y - self.forward * v.z
+    }
+}
+
+/// Frames the box (`low`, `high`) as the settings say. `depth_offset` turns depths below the face into Y.
+/// A single frame is looked at from the side, as a B-mode picture is, with the probe on top.
+pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, still: bool) -> Rays {
+    let camera = &settings.camera;
+    let azimuth = camera.azimuth.to_radians();
+    let elevation = (camera.elevation + if still { 90.0 } else { 0.0 }).to_radians();
+    let forward = DVec3::new(azimuth.sin() * elevation.cos(), azimuth.cos() * elevation.cos(), elevation.sin());
+    let right = DVec3::new(azimuth.cos(), -azimuth.sin(), 0.0);
+    let up = right.cross(forward);
+    let (sin, cos) = camera.roll.to_radians().sin_cos();
+    let (right, up) = (right * cos + up * sin, up * cos - right * sin);
+
+    let half = (high - low) / 2.0;
+    let target = match camera.target {
+        Some([lateral, depth, elevation]) => DVec3::new(lateral, depth + depth_offset, elevation),
+        None => (low + high) / 2.0,
+    };
+    // Half extents of the box along the camera's axes.
+    let along = |axis: DVec3| axis.abs().dot(half);
+    let [width, height] = settings.picture.size.map(f64::from);
+    let fit = (along(up) / height).max(along(right) / width);
+    // mm a pixel where the target is.
+    let pixel = 2.0 * fit / camera.zoom;
+    let away = along(forward) * 1.05 + 1.0;
+
+    // The picture's upper left corner, as seen from its middle, in pixels.
+    let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
+    if camera.field_of_view > 0.0 {
+        let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
+        let distance = pixel / spread + if camera.zoom >= 1.0 { along(forward) } else { 0.0 };
+        Rays {
+            origin: target - forward * distance,
+            origin_dx: DVec3::ZERO,
+            origin_dy: DVec3::ZERO,
+            direction: forward + corner(right, up) * spread,
+            direction_dx: right * spread,
+            direction_dy: -up * spread,
+            right,
+            up,
+            forward,
+        }
+    } else {
+        Rays {
+            origin: target - forward * away + corner(right, up) * pixel,
+            origin_dx: right * pixel,
+            origin_dy: -up * pixel,
+            direction: forward,
+            direction_dx: DVec3::ZERO,
+            direction_dy: DVec3::ZERO,
+            right,
+            up,
+            forward,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(change: impl Fn(&mut Settings)) -> Rays {
+        let mut settings = Settings::default();
+        settings.picture.size = [200, 100];
+        change(&mut settings);
+        rays(&settings, DVec3::new(-40.0, 10.0, -20.0), DVec3::new(40.0, 60.0, 20.0), 0.0, false)
+    }
+
+    #[test]
+    fn the_view_from_the_probe_is_not_mirrored() {
+        let rays = view(|_| {});
+        let (left, direction) = rays.at(0.5, 50.0);
+        let (right, _) = rays.at(199.5, 50.0);
+        let (top, _) = rays.at(100.0, 0.5);
+        assert!((direction - DVec3::Y).length() < 1e-12);
+        assert!(right.x > left.x && top.z > left.z);
+        assert!((rays.right.cross(rays.up) + rays.forward).length() < 1e-12, "the camera is right-handed");
+    }
+
+    #[test]
+    fn the_middle_of_the_picture_looks_at_the_target_in_both_projections() {
+        for field_of_view in [0.0, 40.0] {
+            let rays = view(|s| {
+                s.camera.field_of_view = field_of_view;
+                (s.camera.azimuth, s.camera.elevation, s.camera.roll) = (30.0, -20.0, 70.0);
+                s.camera.target = Some([5.0, 30.0, -3.0]);
+            });
+            let (origin, direction) = rays.at(100.0, 50.0);
+            let target = DVec3::new(5.0, 30.0, -3.0);
+            assert!((target - origin).cross(direction).length() < 1e-9);
+            assert!((target - origin).dot(direction) > 0.0);
+        }
+    }
+
+    #[test]
+    fn the_box_fits_into_the_picture_at_zoom_one() {
+        let rays = view(|_| {});
+        let (left, _) = rays.at(0.0, 50.0);
+        let (right, _) = rays.at(200.0, 50.0);
+        assert!(right.x - left.x >= 80.0 - 1e-9);
+    }
+}

@@ -1,0 +1,332 @@
+//! Everything that determines a picture: the probe's geometry, the kind of samples, and the user's [`Settings`], checked
+//! and resolved into what the passes ask for. Pure data, no Vulkan.
+
+pub mod camera;
+pub mod load;
+pub mod settings;
+pub mod transfer;
+
+pub use camera::Rays;
+pub use settings::*;
+
+use crate::probe::{Geometry, Motion, Probe};
+use crate::source::StoredType;
+use glam::DVec3;
+
+/// Largest edge of a picture, pixels.
+pub const MAX_PICTURE: u32 = 16384;
+/// Ring of the surface detector, samples (n of thesis 4-3).
+pub const RING: u32 = 8;
+/// Widest window of a filter, pixels.
+pub const MAX_WINDOW: u32 = 63;
+
+/// How the arriving samples are stored and what they mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    pub stored: StoredType,
+    /// Stored values that become 0 and 1.
+    pub range: [f64; 2],
+}
+
+/// The pixel lattice of a slice: pixel (0, 0) has its centre at `origin`, in-plane (x, y) in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceGrid {
+    pub size: [u32; 2],
+    pub origin: [f64; 2],
+    pub pitch: [f64; 2],
+}
+
+impl SliceGrid {
+    pub fn place(&self, column: f64, row: f64) -> (f64, f64) {
+        (self.origin[0] + column * self.pitch[0], self.origin[1] + row * self.pitch[1])
+    }
+}
+
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub geometry: Geometry,
+    pub input: Input,
+    pub settings: Settings,
+    pub grid: SliceGrid,
+    /// Corners of what is rendered, mm in space: the insonified box within the region of interest and below the start depth.
+    pub low: DVec3,
+    pub high: DVec3,
+    pub rays: Rays,
+    /// Distance between samples on a ray, mm.
+    pub step: f64,
+    /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
+    /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
+    pub apron: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("scene: {field}: {fault}")]
+pub struct SceneError {
+    pub field: &'static str,
+    pub fault: String,
+}
+
+pub(crate) fn refuse<T>(field: &'static str, fault: impl Into<String>) -> Result<T, SceneError> {
+    Err(SceneError { field, fault: fault.into() })
+}
+
+impl Scene {
+    /// Checks the settings against the geometry and resolves them.
+    ///
+    /// # Errors
+    /// Names the first setting that cannot be drawn, and its limits.
+    pub fn new(geometry: Geometry, input: Input, settings: Settings) -> Result<Scene, SceneError> {
+        match &geometry {
+            Geometry::Sweep(probe) => {
+                probe.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
+            }
+            Geometry::Cartesian(grid) => {
+                grid.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
+            }
+        }
+        check(&settings)?;
+        let [low, high] = input.range;
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
+        }
+        let grid = slice_grid(&geometry, settings.slices.pixels);
+        let (low, high) = visible_box(&geometry, &settings)?;
+        let rays = camera::rays(&settings, low, high, depth_offset(&geometry), is_still(&geometry));
+        let step = settings.ray.step.unwrap_or(grid.pitch[0].min(grid.pitch[1]));
+        let longest = (high - low).length();
+        if longest / step > 65536.0 {
+            return refuse(
+                "ray.step",
+                format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
+            );
+        }
+        let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0 };
+        scene.apron = 2.0 + scene.filter_reach();
+        Ok(scene)
+    }
+
+    pub fn probe(&self) -> Option<&Probe> {
+        match &self.geometry {
+            Geometry::Sweep(probe) => Some(probe),
+            Geometry::Cartesian(_) => None,
+        }
+    }
+
+    pub fn slices(&self) -> u32 {
+        self.geometry.slices() as u32
+    }
+
+    /// Width and height of an arriving frame: samples x lines, or columns x rows.
+    pub fn frame_size(&self) -> [u32; 2] {
+        self.geometry.frame_size().map(|n| n as u32)
+    }
+
+    /// Width, height and slices of the volume.
+    pub fn volume_size(&self) -> [u32; 3] {
+        [self.grid.size[0], self.grid.size[1], self.slices()]
+    }
+
+    pub fn picture_size(&self) -> [u32; 2] {
+        self.settings.picture.size
+    }
+
+    pub fn is_surface(&self) -> bool {
+        self.settings.mode == Mode::Surface
+    }
+
+    pub fn window(&self) -> [f64; 2] {
+        match self.settings.mode {
+            Mode::Volume => self.settings.volume.window,
+            Mode::Surface => self.settings.surface.window,
+        }
+    }
+
+    /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices.
+    pub fn smoothing(&self) -> [f64; 3] {
+        let smooth = self.settings.slices.smooth.unwrap_or_default();
+        [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
+    }
+
+    /// How many pixels away a slice's filters look.
+    fn filter_reach(&self) -> f64 {
+        let [lateral, depth, _] = self.smoothing();
+        let median = if self.settings.slices.median { 1.0 } else { 0.0 };
+        let sigma = self.settings.slices.sigma.map_or(0.0, |s| (s.window / 2) as f64);
+        median + sigma + gaussian_radius(lateral).max(gaussian_radius(depth)) as f64
+    }
+}
+
+/// Taps on one side of a Gaussian: three standard deviations hold 99.7 % of it.
+pub fn gaussian_radius(deviation: f64) -> u32 {
+    if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).clamp(1, MAX_WINDOW / 2) } else { 0 }
+}
+
+/// What is added to a depth below the face to get Y.
+fn depth_offset(geometry: &Geometry) -> f64 {
+    match geometry {
+        Geometry::Sweep(probe) => probe.array_radius(),
+        Geometry::Cartesian(_) => 0.0,
+    }
+}
+
+fn is_still(geometry: &Geometry) -> bool {
+    matches!(geometry, Geometry::Sweep(Probe { motion: Motion::Still { .. }, .. }))
+}
+
+/// Corners of the insonified region in space.
+pub fn insonified_box(geometry: &Geometry) -> (DVec3, DVec3) {
+    match geometry {
+        Geometry::Sweep(probe) => probe.bounds(),
+        Geometry::Cartesian(grid) => {
+            // Half a voxel beyond the outer centres, so that a volume of one slice has a thickness.
+            let (origin, spacing) = (DVec3::from(grid.origin), DVec3::from(grid.spacing));
+            let count = DVec3::new(grid.size[0] as f64, grid.size[1] as f64, grid.size[2] as f64);
+            (origin - spacing / 2.0, origin + (count - 0.5) * spacing)
+        }
+    }
+}
+
+fn slice_grid(geometry: &Geometry, pixels: u32) -> SliceGrid {
+    match geometry {
+        Geometry::Cartesian(grid) => SliceGrid {
+            size: [grid.size[0] as u32, grid.size[1] as u32],
+            origin: [grid.origin[0], grid.origin[1]],
+            pitch: [grid.spacing[0], grid.spacing[1]],
+        },
+        Geometry::Sweep(probe) => {
+            let (low, high) = probe.plane_bounds();
+            let extent = [high[0] - low[0], high[1] - low[1]];
+            let pitch = extent[0].max(extent[1]) / f64::from(pixels - 1);
+            let count = |e: f64| ((e / pitch - 1e-9).ceil().max(0.0) as u32 + 1).max(2);
+            SliceGrid { size: [count(extent[0]), count(extent[1])], origin: low, pitch: [pitch, pitch] }
+        }
+    }
+}
+
+fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(DVec3, DVec3), SceneError> {
+    let (mut low, mut high) = insonified_box(geometry);
+    let offset = depth_offset(geometry);
+    let region = &settings.region;
+    let sides =
+        [("region.lateral", region.lateral), ("region.depth", region.depth), ("region.elevation", region.elevation)];
+    for (axis, (field, side)) in sides.into_iter().enumerate() {
+        let Some([from, to]) = side else { continue };
+        if !(from.is_finite() && to.is_finite() && from < to) {
+            return refuse(field, format!("[{from}, {to}] must be finite and rise"));
+        }
+        let offset = if axis == 1 { offset } else { 0.0 };
+        let there = [low[axis] - offset, high[axis] - offset];
+        low[axis] = low[axis].max(from + offset);
+        high[axis] = high[axis].min(to + offset);
+        if low[axis] >= high[axis] {
+            return refuse(
+                field,
+                format!("[{from}, {to}] mm misses the volume, which lies in [{:.2}, {:.2}]", there[0], there[1]),
+            );
+        }
+    }
+    let (field, start) = match settings.mode {
+        Mode::Volume => ("volume.start_depth", settings.volume.start_depth),
+        Mode::Surface => ("surface.start_depth", settings.surface.start_depth),
+    };
+    if let Some(start) = start {
+        if !start.is_finite() || start + offset >= high.y {
+            return refuse(field, format!("{start} mm leaves nothing: the region ends at {:.2} mm", high.y - offset));
+        }
+        low.y = low.y.max(start + offset);
+    }
+    Ok((low, high))
+}
+
+/// Everything that can be told without a geometry.
+fn check(settings: &Settings) -> Result<(), SceneError> {
+    let within = |field, value: f64, low: f64, high: f64| match value >= low && value <= high {
+        true => Ok(()),
+        false => refuse(field, format!("is {value}, must lie in {low}..={high}")),
+    };
+    let [width, height] = settings.picture.size;
+    if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
+        return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
+    }
+    let s = &settings.slices;
+    within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
+    if let Some(smooth) = s.smooth {
+        within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
+        within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
+        within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
+    }
+    check_sigma("slices.sigma", s.sigma)?;
+    check_sigma("distance.sigma", settings.distance.sigma)?;
+    check_sigma("post.sigma", settings.post.sigma)?;
+    if settings.distance.median > 0 {
+        check_window("distance.median", settings.distance.median)?;
+    }
+    if let Some(b) = settings.distance.bilateral {
+        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
+        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
+        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
+    }
+    for (field, [low, high]) in [("volume.window", settings.volume.window), ("surface.window", settings.surface.window)]
+    {
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            return refuse(field, format!("[{low}, {high}] must be finite and rise"));
+        }
+    }
+    let c = &settings.camera;
+    for (field, value) in [("camera.azimuth", c.azimuth), ("camera.elevation", c.elevation), ("camera.roll", c.roll)] {
+        within(field, value, -360.0, 360.0)?;
+    }
+    within("camera.zoom", c.zoom, 1e-3, 1e3)?;
+    within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
+    if c.target.is_some_and(|t| !t.iter().all(|v| v.is_finite())) {
+        return refuse("camera.target", "must be finite");
+    }
+    if let Some(step) = settings.ray.step {
+        within("ray.step", step, 1e-4, 1e3)?;
+    }
+    within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
+    if let Some(fault) = transfer::fault(&settings.volume.transfer) {
+        return refuse("volume.transfer", fault);
+    }
+    let f = &settings.surface;
+    within("surface.threshold", f.threshold, 1e-6, 1.0)?;
+    within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
+    within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
+    let l = &settings.light;
+    if !l.direction.is_finite() || l.direction.length() < 1e-6 {
+        return refuse("light.direction", "must be finite and not zero");
+    }
+    for (field, value, high) in [
+        ("light.ambient", l.ambient, 10.0),
+        ("light.diffuse", l.diffuse, 10.0),
+        ("light.specular", l.specular, 10.0),
+        ("light.shininess", l.shininess, 1e6),
+        ("light.texture", l.texture, 1.0),
+        ("light.cliff", l.cliff, 1e6),
+    ] {
+        within(field, value, 0.0, high)?;
+    }
+    for v in l.colour.iter().chain(&l.surface_colour) {
+        within("light.colour", *v, 0.0, 10.0)?;
+    }
+    within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
+    within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
+    within("post.gamma", settings.post.gamma, 0.1, 10.0)
+}
+
+fn check_window(field: &'static str, window: u32) -> Result<(), SceneError> {
+    match window % 2 == 1 && (3..=MAX_WINDOW).contains(&window) {
+        true => Ok(()),
+        false => refuse(field, format!("window is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
+    }
+}
+
+fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
+    let Some(sigma) = sigma else { return Ok(()) };
+    check_window(field, sigma.window)?;
+    // Infinity is allowed: it is the box mean.
+    match sigma.sigma >= 0.0 {
+        true => Ok(()),
+        false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
+    }
+}

@@ -1,0 +1,139 @@
+//! The transfer function and the colour maps as tables, made in f64.
+
+use super::settings::{ColourMap, Transfer, TransferName, TransferPoint};
+
+/// Entries of the transfer table: between two of them the shader interpolates.
+pub const ENTRIES: usize = 256;
+
+/// Absorption of a fully opaque voxel: -ln(1 - a) is infinite, and e^-1e6 is 0 in any float format.
+pub const OPAQUE: f64 = 1e6;
+
+/// Absorption kappa over one reference length for an opacity a: min(-ln(1 - a), 1e6). `ln_1p` keeps every digit of a small a,
+/// where GLSL's pow(1 - a, x) loses them all.
+pub fn absorption(opacity: f64) -> f64 {
+    (-(-opacity.clamp(0.0, 1.0)).ln_1p()).min(OPAQUE)
+}
+
+/// Opacity of a step of absorption y = kappa ds / ds0: 1 - exp(-y).
+pub fn opacity(y: f64) -> f64 {
+    -(-y).exp_m1()
+}
+
+/// Red, green, blue and absorption at `ENTRIES` even sample values from 0 to 1.
+pub fn table(transfer: &Transfer) -> Vec<[f64; 4]> {
+    let points = match transfer {
+        Transfer::Named(name) => named(*name),
+        Transfer::Points(points) => points.clone(),
+    };
+    (0..ENTRIES)
+        .map(|i| {
+            let [r, g, b, a] = at(&points, i as f64 / (ENTRIES - 1) as f64);
+            [r, g, b, absorption(a)]
+        })
+        .collect()
+}
+
+/// Why these points are no transfer function.
+pub fn fault(transfer: &Transfer) -> Option<String> {
+    let Transfer::Points(points) = transfer else { return None };
+    if points.is_empty() {
+        return Some("needs at least one point".into());
+    }
+    let unit = |v: f64| (0.0..=1.0).contains(&v);
+    for (i, p) in points.iter().enumerate() {
+        if !unit(p.at) || !unit(p.opacity) || !p.colour.iter().all(|c| unit(*c)) {
+            return Some(format!("point {}: at, colour and opacity must lie in 0..1", i + 1));
+        }
+        if i > 0 && points[i - 1].at >= p.at {
+            return Some(format!("point {}: `at` must rise from point to point", i + 1));
+        }
+    }
+    None
+}
+
+fn at(points: &[TransferPoint], value: f64) -> [f64; 4] {
+    let rgba = |p: &TransferPoint| [p.colour[0], p.colour[1], p.colour[2], p.opacity];
+    let after = points.partition_point(|p| p.at <= value);
+    match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
+        (Some(low), Some(high)) => {
+            let share = (value - low.at) / (high.at - low.at);
+            let (low, high) = (rgba(low), rgba(high));
+            std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
+        }
+        (Some(end), None) | (None, Some(end)) => rgba(end),
+        (None, None) => [0.0; 4],
+    }
+}
+
+fn points(table: &[(f64, [f64; 3], f64)]) -> Vec<TransferPoint> {
+    table.iter().map(|&(at, colour, opacity)| TransferPoint { at, colour, opacity }).collect()
+}
+
+fn named(name: TransferName) -> Vec<TransferPoint> {
+    match name {
+        TransferName::Grey => points(&[(0.0, [0.0; 3], 0.0), (0.1, [0.1; 3], 0.0), (1.0, [1.0; 3], 0.2)]),
+        TransferName::Sepia => points(&[
+            (0.0, [0.05, 0.02, 0.0], 0.0),
+            (0.12, [0.25, 0.13, 0.05], 0.0),
+            (0.5, [0.75, 0.5, 0.28], 0.05),
+            (1.0, [1.0, 0.93, 0.78], 0.25),
+        ]),
+        TransferName::Skin => points(&[
+            (0.0, [0.15, 0.03, 0.01], 0.0),
+            (0.2, [0.5, 0.2, 0.12], 0.0),
+            (0.5, [0.85, 0.55, 0.42], 0.06),
+            (1.0, [1.0, 0.9, 0.82], 0.35),
+        ]),
+        TransferName::Bone => points(&[
+            (0.0, [0.0, 0.0, 0.0], 0.0),
+            (0.25, [0.25, 0.12, 0.08], 0.0),
+            (0.5, [0.7, 0.6, 0.45], 0.05),
+            (0.75, [0.95, 0.9, 0.8], 0.3),
+            (1.0, [1.0, 1.0, 0.97], 0.6),
+        ]),
+    }
+}
+
+/// Colour of a brightness in 0..1 as control points at even places: dark, middle, bright. Interpolated linearly.
+pub fn colour_map(map: ColourMap) -> [[f64; 3]; 5] {
+    match map {
+        ColourMap::None | ColourMap::Grey => std::array::from_fn(|i| [i as f64 / 4.0; 3]),
+        ColourMap::Sepia => [[0.0; 3], [0.3, 0.19, 0.1], [0.62, 0.44, 0.27], [0.88, 0.72, 0.5], [1.0, 0.96, 0.86]],
+        ColourMap::Skin => [[0.0; 3], [0.36, 0.15, 0.09], [0.71, 0.4, 0.28], [0.93, 0.68, 0.52], [1.0, 0.94, 0.87]],
+        ColourMap::Ice => [[0.0; 3], [0.06, 0.16, 0.33], [0.2, 0.42, 0.64], [0.56, 0.76, 0.87], [0.95, 1.0, 1.0]],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_opacity_keeps_its_digits_and_full_opacity_stays_finite() {
+        for a in [1e-7, 1e-4, 0.5, 0.999] {
+            assert!((opacity(absorption(a)) / a - 1.0).abs() < 1e-12, "{a}");
+        }
+        assert_eq!(absorption(1.0), OPAQUE);
+        assert_eq!(opacity(absorption(1.0)), 1.0);
+        assert_eq!(opacity(0.0), 0.0);
+    }
+
+    #[test]
+    fn a_table_runs_through_its_points_and_stays_level_beyond_them() {
+        let transfer =
+            Transfer::Points(points(&[(0.2, [0.0, 0.0, 0.0], 0.0), (0.6, [1.0, 0.5, 0.0], 0.5), (0.7, [0.0; 3], 1.0)]));
+        assert_eq!(fault(&transfer), None);
+        let table = table(&transfer);
+        assert_eq!(table[0], [0.0, 0.0, 0.0, 0.0]);
+        assert!((table[102][0] - 0.5).abs() < 1e-9, "{:?}", table[102]);
+        assert_eq!(table[255], [0.0, 0.0, 0.0, OPAQUE]);
+    }
+
+    #[test]
+    fn points_that_fall_or_leave_the_range_are_refused() {
+        let falling = points(&[(0.5, [0.0; 3], 0.0), (0.5, [0.0; 3], 0.1)]);
+        assert!(fault(&Transfer::Points(falling)).is_some());
+        assert!(fault(&Transfer::Points(points(&[(0.5, [0.0; 3], f64::NAN)]))).is_some());
+        assert!(fault(&Transfer::Points(vec![])).is_some());
+    }
+}

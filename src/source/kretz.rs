@@ -1,0 +1,231 @@
+//! GE Kretz volumes (`.vol`): a magic, then items of {u16 group, u16 element, u32 length, bytes}, little-endian, up to
+//! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
+
+use super::contents::{Contents, Lines, Own, extent};
+use super::pixels::Pixels;
+use super::{InputError, SampleType};
+use crate::probe::file::SLAB;
+use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
+use std::collections::{BTreeMap, HashMap};
+use std::f64::consts::FRAC_PI_2;
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
+/// The format does not say; m/s.
+const SOUND_SPEED: f64 = 1540.0;
+/// An angle table of 65536 entries is the longest item that is read whole.
+const LONGEST_TABLE: u64 = 65_536 * 8;
+
+type Tag = (u16, u16);
+const SAMPLES: Tag = (0xc000, 1);
+const LINES: Tag = (0xc000, 2);
+const FRAMES: Tag = (0xc000, 3);
+const RADIAL_STEP: Tag = (0xc100, 1);
+const ARRAY_RADIUS: Tag = (0xc200, 1);
+const MINUS_AXIS_DEPTH: Tag = (0xc200, 2);
+const SWEEP_ANGLES: Tag = (0xc300, 1);
+const LINE_ANGLES: Tag = (0xc300, 2);
+const VOXELS: Tag = (0xd000, 1);
+const END: Tag = (0xffff, 0xffff);
+const READ_WHOLE: [Tag; 8] =
+    [SAMPLES, LINES, FRAMES, RADIAL_STEP, ARRAY_RADIUS, MINUS_AXIS_DEPTH, SWEEP_ANGLES, LINE_ANGLES];
+/// Elements of group 0002 that are there when the voxels are wavelet-compressed.
+const WAVELET: [Tag; 3] = [(2, 0x1000), (2, 0x1100), (2, 0x1200)];
+
+/// The items of a file that matter here. Where an item comes twice the first counts.
+struct Items<'a> {
+    path: &'a Path,
+    small: HashMap<Tag, Vec<u8>>,
+    /// Offset and length.
+    voxels: Option<(u64, u64)>,
+    wavelet: bool,
+    /// There are items of further volumes in time.
+    four_d: bool,
+}
+
+pub(super) fn read(path: &Path) -> Result<Contents, InputError> {
+    let items = Items::walk(path)?;
+    if items.wavelet {
+        return Err(InputError::new(
+            path,
+            "voxels",
+            "are wavelet-compressed, which is not read: export the volume uncompressed",
+        ));
+    }
+    let (samples, lines) = (items.count(SAMPLES, "samples")?, items.count(LINES, "lines")?);
+    let frames = items.count(FRAMES, "frames")?;
+    let Some((offset, length)) = items.voxels else {
+        let fault = if items.four_d { "missing: a 4D file without a still volume is not read" } else { "are missing" };
+        return Err(InputError::new(path, name(VOXELS, "voxels"), fault));
+    };
+    let mut facts = Vec::new();
+    if items.four_d {
+        facts.push(("4D".into(), "holds more volumes, which are not read: only the still one is".into()));
+    }
+    let claimed = samples as u64 * lines as u64 * frames as u64;
+    if length > claimed {
+        facts.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
+    }
+    let own = items.geometry(samples, lines, frames)?;
+    let contents = Contents {
+        format: "Kretz volume",
+        sample: SampleType::U8,
+        big_endian: false,
+        frame_size: [samples, lines],
+        frames,
+        pixels: Pixels { path: path.into(), offset, length, compressed: false },
+        lines: Lines::InOrder,
+        own,
+        times: BTreeMap::new(),
+        facts,
+    };
+    contents.check(path, "C000 (size)")?;
+    Ok(contents)
+}
+
+impl<'a> Items<'a> {
+    fn walk(path: &'a Path) -> Result<Items<'a>, InputError> {
+        let unreadable = |e| InputError::unreadable(path, &e);
+        let file = File::open(path).map_err(unreadable)?;
+        let there = file.metadata().map_err(unreadable)?.len();
+        let mut input = BufReader::new(file);
+        let mut magic = [0; 16];
+        let whole = fill(&mut input, &mut magic).map_err(unreadable)?;
+        if !whole || magic != *MAGIC {
+            return Err(InputError::new(path, "magic", "is not 'KRETZFILE 1.0   ', the only version that is read"));
+        }
+        let mut items = Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false };
+        let mut at = MAGIC.len() as u64;
+        loop {
+            let mut head = [0; 8];
+            if !fill(&mut input, &mut head).map_err(unreadable)? {
+                return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
+            }
+            let [g0, g1, e0, e1, l0, l1, l2, l3] = head;
+            let tag = (u16::from_le_bytes([g0, g1]), u16::from_le_bytes([e0, e1]));
+            let length = u64::from(u32::from_le_bytes([l0, l1, l2, l3]));
+            at += head.len() as u64;
+            if tag == END {
+                return Ok(items);
+            }
+            let left = there.saturating_sub(at);
+            if length > left {
+                let field = if tag == VOXELS { "data".into() } else { name(tag, "item") };
+                let fault = format!("cut short, {left} of {length} bytes are there");
+                return Err(InputError::new(path, field, fault));
+            }
+            items.wavelet |= WAVELET.contains(&tag);
+            items.four_d |= matches!(tag, (0xd600, 1) | (0xd400, 1 | 2 | 5));
+            if tag == VOXELS && items.voxels.is_none() {
+                items.voxels = Some((at, length));
+            }
+            let mut unread = length;
+            if READ_WHOLE.contains(&tag) && !items.small.contains_key(&tag) {
+                if length > LONGEST_TABLE {
+                    return Err(InputError::new(
+                        path,
+                        name(tag, "item"),
+                        format!("has {length} bytes, which is too long"),
+                    ));
+                }
+                let mut bytes = Vec::new();
+                (&mut input).take(length).read_to_end(&mut bytes).map_err(unreadable)?;
+                unread = length - bytes.len() as u64;
+                items.small.insert(tag, bytes);
+            }
+            // Bounded by the length of the file, which fits.
+            input.seek_relative(unread as i64).map_err(unreadable)?;
+            at += length;
+        }
+    }
+
+    fn fault<T>(&self, tag: Tag, title: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+        Err(InputError::new(self.path, name(tag, title), fault))
+    }
+
+    fn count(&self, tag: Tag, title: &str) -> Result<usize, InputError> {
+        match self.small.get(&tag).map(|b| <[u8; 2]>::try_from(b.as_slice())) {
+            None => self.fault(tag, title, "is missing"),
+            Some(Ok(bytes)) => extent(self.path, &name(tag, title), "", u16::from_le_bytes(bytes).into()),
+            Some(Err(_)) => self.fault(tag, title, "must be 2 bytes long"),
+        }
+    }
+
+    /// A list of f64; empty if the item is absent.
+    fn table(&self, tag: Tag, title: &str) -> Result<Vec<f64>, InputError> {
+        let Some(bytes) = self.small.get(&tag) else { return Ok(Vec::new()) };
+        let (values, rest) = bytes.as_chunks::<8>();
+        let values: Vec<f64> = values.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        if !rest.is_empty() {
+            return self.fault(tag, title, format!("has {} bytes, not a multiple of 8", bytes.len()));
+        }
+        if values.iter().any(|v| !v.is_finite()) {
+            return self.fault(tag, title, "holds a number that is not finite");
+        }
+        Ok(values)
+    }
+
+    fn number(&self, tag: Tag, title: &str) -> Result<f64, InputError> {
+        match self.table(tag, title)?[..] {
+            [value] => Ok(value),
+            [] => self.fault(tag, title, "is missing"),
+            _ => self.fault(tag, title, "must be one number"),
+        }
+    }
+
+    /// Angles centred on pi/2, one of `count`.
+    fn angles(&self, tag: Tag, title: &str, count: usize) -> Result<Axis, InputError> {
+        let table = self.table(tag, title)?;
+        if table.len() != count {
+            return self.fault(tag, title, format!("has {} entries, must have {count}", table.len()));
+        }
+        let axis = Axis::from_table(table.iter().map(|a| a - FRAC_PI_2).collect());
+        if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise from each to the next") }
+    }
+
+    fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<Own, InputError> {
+        let step = self.number(RADIAL_STEP, "radial step")? * 1e3;
+        if !(step > 0.0 && step.is_finite()) {
+            return self.fault(RADIAL_STEP, "radial step", format!("is {step} mm, must be above 0"));
+        }
+        let tables = [SWEEP_ANGLES, LINE_ANGLES].map(|tag| self.small.get(&tag).is_some_and(|b| !b.is_empty()));
+        if tables == [false, false] {
+            let grid = Grid { size: [samples, lines, frames], spacing: [step; 3], origin: [0.0; 3] };
+            return Ok(Own::Pictures(grid, 1));
+        }
+        let radius = self.number(ARRAY_RADIUS, "array radius")? * step;
+        let (motion, slices) = if frames == 1 {
+            (Motion::Still { thickness: SLAB }, Axis::centred(1.0, 1))
+        } else {
+            // Stored is -(Ra - Rw), in samples.
+            let axis_depth = -self.number(MINUS_AXIS_DEPTH, "minus array radius less motor radius")? * step;
+            (Motion::Fan { wobble_radius: radius - axis_depth }, self.angles(SWEEP_ANGLES, "sweep angles", frames)?)
+        };
+        Ok(Own::Sweep(Box::new(Probe {
+            array: Array::Curved { radius },
+            lines: self.angles(LINE_ANGLES, "line angles", lines)?,
+            start_depth: 0.0,
+            sample_pitch: step,
+            samples,
+            motion,
+            slices,
+            advance: Advance::None,
+            sound_speed: SOUND_SPEED,
+        })))
+    }
+}
+
+fn name((group, element): Tag, title: &str) -> String {
+    format!("{group:04X},{element:04X} ({title})")
+}
+
+/// Fills the buffer; false at the end of the file.
+fn fill(input: &mut impl Read, buffer: &mut [u8]) -> io::Result<bool> {
+    match input.read_exact(buffer) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(e),
+    }
+}

@@ -1,0 +1,58 @@
+//! Where frames come from. Every reader is total: any bytes give frames or an [`InputError`], never a panic, and no
+//! more memory is taken than the file's own bytes account for.
+
+mod contents;
+pub mod error;
+mod kretz;
+mod metaimage;
+mod pixels;
+pub mod recording;
+pub mod samples;
+mod words;
+
+pub use crate::probe::{Geometry, Grid};
+pub use error::InputError;
+pub use recording::Recording;
+pub use samples::{SampleType, StoredType};
+
+use contents::Contents;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+/// One polar acquisition, or one slice of a Cartesian volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Number of the volume that the frame belongs to, from 0.
+    pub volume: u32,
+    /// Place in its volume in the order of acquisition, from 0.
+    pub number: u32,
+    /// Place in its volume in geometric order: K - 1 - `number` when swept backwards.
+    pub slice: usize,
+    /// The motor was on its way back.
+    pub backward: bool,
+    /// Time stamp, s, on the recorder's clock.
+    pub time: Option<f64>,
+    /// Samples of the stored type, little-endian, line by line (samples fastest).
+    pub bytes: Vec<u8>,
+}
+
+/// Chooses the reader: by content, then by the name's ending.
+fn read_contents(path: &Path) -> Result<Contents, InputError> {
+    let unreadable = |e| InputError::unreadable(path, &e);
+    // A pipe or a folder has no end to measure claims against, and opening a pipe may wait for ever.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(InputError::new(path, "file", "is not a regular file"));
+    }
+    let file = File::open(path).map_err(unreadable)?;
+    let mut start = Vec::new();
+    file.take(64).read_to_end(&mut start).map_err(unreadable)?;
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    if start.starts_with(b"KRETZFILE") {
+        kretz::read(path)
+    } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
+        metaimage::read(path)
+    } else {
+        Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
+    }
+}

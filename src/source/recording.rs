@@ -1,0 +1,311 @@
+//! A recorded file as a stream of frames in bounded memory: one frame at a time.
+
+use super::contents::{Contents, Lines, Own};
+use super::pixels::PixelStream;
+use super::samples::{self, Replaced};
+use super::{Frame, InputError, SampleType, StoredType, words};
+use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A file of recorded frames.
+pub struct Recording {
+    path: PathBuf,
+    contents: Contents,
+    place: Place,
+    volumes: Volumes,
+    probe_file: Option<PathBuf>,
+    range: [f64; 2],
+    measured: bool,
+    replaced: Replaced,
+    /// Frames whose replaced samples are counted already.
+    counted: usize,
+    /// Open at frame `next`; none after a rewind or an error.
+    stream: Option<PixelStream>,
+    next: usize,
+    /// A whole frame has been seen to be there, so that the next may be allocated at once.
+    proven: bool,
+}
+
+/// Where the samples of all volumes lie, without the motion of each.
+enum Place {
+    Sweep(Box<Probe>),
+    Cartesian(Grid),
+}
+
+impl Recording {
+    /// Opens a file and finds out its geometry: from the `probe` file given, else from one that lies beside the recording
+    /// ([`ProbeFile::beside`]), else from the recording itself. Unless the range of values is known, they are all read.
+    pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
+        let mut contents = super::read_contents(path)?;
+        let probe_file = choose_probe_file(path, probe, &mut contents)?;
+        let (place, volumes) = match (&probe_file, &contents.own) {
+            (Some(file), _) => {
+                let (probe, volumes) =
+                    file.geometry(contents.frame_size[0], contents.frame_size[1], contents.frames)?;
+                (Place::Sweep(Box::new(probe)), volumes)
+            }
+            (None, Own::Sweep(probe)) => {
+                probe.check().map_err(|e| InputError::geometry(path, &e))?;
+                (Place::Sweep(probe.clone()), Volumes::forward(contents.frames, 1))
+            }
+            (None, Own::Pictures(grid, count)) => {
+                grid.check().map_err(|e| InputError::geometry(path, &e))?;
+                (Place::Cartesian(*grid), Volumes::forward(grid.size[2], *count))
+            }
+            (None, Own::Missing(error)) => return Err(error.clone()),
+        };
+        let proven = !contents.pixels.compressed;
+        let mut recording = Recording {
+            path: path.into(),
+            contents,
+            place,
+            volumes,
+            probe_file: probe_file.as_ref().map(|f| f.path().into()),
+            range: [0.0, 255.0],
+            measured: false,
+            replaced: Replaced::default(),
+            counted: 0,
+            stream: None,
+            next: 0,
+            proven,
+        };
+        match probe_file.and_then(|f| f.range()) {
+            Some(range) => recording.range = range.map(|v| v + recording.sample_type().shift()),
+            None if recording.stored_type() == StoredType::U8 => {}
+            None => recording.measure()?,
+        }
+        Ok(recording)
+    }
+
+    /// "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep" or "Kretz volume".
+    pub fn format(&self) -> &'static str {
+        self.contents.format
+    }
+
+    pub fn sample_type(&self) -> SampleType {
+        self.contents.sample
+    }
+
+    pub fn stored_type(&self) -> StoredType {
+        self.contents.sample.stored()
+    }
+
+    /// All frames, also those after the last whole volume.
+    pub fn frames_in_file(&self) -> usize {
+        self.contents.frames
+    }
+
+    /// Whole volumes.
+    pub fn volumes(&self) -> usize {
+        self.volumes.count
+    }
+
+    pub fn frames_per_volume(&self) -> usize {
+        self.volumes.frames
+    }
+
+    /// Where the samples of a volume lie, the motor's way during each frame included.
+    pub fn geometry(&self, volume: usize) -> Geometry {
+        match &self.place {
+            Place::Sweep(probe) => {
+                let advance = self.volumes.advance(volume, &probe.slices);
+                Geometry::Sweep(Probe { advance, ..(**probe).clone() })
+            }
+            Place::Cartesian(grid) => Geometry::Cartesian(*grid),
+        }
+    }
+
+    /// The values that are shown as 0 and 1, in units of the stored type: the probe file's, or all of u8, or the smallest
+    /// and largest in the file. The second is always above the first.
+    pub fn range(&self) -> [f64; 2] {
+        self.range
+    }
+
+    /// Samples that were NaN or infinite and read as 0, in the frames read so far; all frames if the range was measured.
+    pub fn replaced(&self) -> u64 {
+        self.replaced.not_finite
+    }
+
+    /// Denormal f32 samples that read as 0, counted like [`Recording::replaced`].
+    pub fn flushed(&self) -> u64 {
+        self.replaced.denormal
+    }
+
+    /// The next frame in the order of acquisition; none after the last whole volume.
+    pub fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        let index = self.next;
+        if index >= self.frames_to_read() {
+            return Ok(None);
+        }
+        let bytes = match self.read_frame() {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                self.stream = None;
+                return Err(error);
+            }
+        };
+        let (volume, number) = (index / self.volumes.frames, index % self.volumes.frames);
+        let backward = self.volumes.backward(volume);
+        Ok(Some(Frame {
+            volume: volume as u32,
+            number: number as u32,
+            slice: if backward { self.volumes.frames - 1 - number } else { number },
+            backward,
+            time: self.contents.times.get(&index).copied(),
+            bytes,
+        }))
+    }
+
+    /// Back to the first frame.
+    pub fn rewind(&mut self) {
+        (self.stream, self.next) = (None, 0);
+    }
+
+    /// On, or back, to the first frame of a volume. In a compressed file all frames before it are inflated again.
+    pub fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        if volume >= self.volumes.count {
+            let there = self.volumes.count;
+            return Err(InputError::new(
+                &self.path,
+                "volume",
+                format!("there is no {volume}, the last is {}", there - 1),
+            ));
+        }
+        let target = volume * self.volumes.frames;
+        if target < self.next {
+            self.stream = None;
+        } else if let Some(mut stream) = self.stream.take() {
+            stream.skip((target - self.next) as u64 * self.contents.frame_bytes()).map_err(|e| self.broken(&e, 0))?;
+            self.stream = Some(stream);
+        }
+        self.next = target;
+        Ok(())
+    }
+
+    /// What the file is, for people to read: title and value. Never a patient's name or number.
+    pub fn facts(&self) -> Vec<(String, String)> {
+        let mut facts: Vec<(String, String)> = Vec::new();
+        let mut say = |title: &str, value: String| facts.push((title.into(), value));
+        say("format", self.format().into());
+        say("compression", if self.contents.pixels.compressed { "zlib" } else { "none" }.into());
+        say("samples", self.sample_type().to_string());
+        let [first, second] = self.contents.frame_size;
+        match self.place {
+            Place::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
+            Place::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
+        }
+        say("frames", self.contents.frames.to_string());
+        say("volumes", words::volumes(&self.volumes));
+        say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| words::path(p)));
+        match &self.place {
+            Place::Sweep(probe) => facts.extend(words::probe(probe)),
+            Place::Cartesian(grid) => facts.extend(words::grid(grid)),
+        }
+        let [low, high] = self.range.map(|v| words::number(v - self.sample_type().shift()));
+        let how = if self.measured { " (measured)" } else { "" };
+        facts.push(("value range".into(), format!("{low} .. {high}{how}")));
+        if self.sample_type() == SampleType::F32 {
+            let Replaced { not_finite, denormal } = self.replaced;
+            facts.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
+        }
+        facts.extend(words::times(&self.contents.times));
+        facts.extend(self.contents.facts.iter().cloned());
+        facts
+    }
+
+    fn frames_to_read(&self) -> usize {
+        self.volumes.count * self.volumes.frames
+    }
+
+    /// Reads everything once for its smallest and largest value.
+    fn measure(&mut self) -> Result<(), InputError> {
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        while let Some(frame) = self.next_frame()? {
+            samples::widen(&mut range, self.stored_type(), &frame.bytes);
+        }
+        self.range = samples::not_empty(range);
+        self.measured = true;
+        self.rewind();
+        Ok(())
+    }
+
+    fn read_frame(&mut self) -> Result<Vec<u8>, InputError> {
+        let (index, size) = (self.next, self.contents.frame_bytes());
+        let mut stream = match self.stream.take() {
+            Some(stream) => stream,
+            None => self.contents.pixels.open(index as u64 * size).map_err(|e| self.broken(&e, 0))?,
+        };
+        let mut bytes = Vec::with_capacity(if self.proven { size as usize } else { 0 });
+        let outcome = stream.fill(size, &mut bytes);
+        let outcome = outcome.and_then(|()| match bytes.len() as u64 == size {
+            true => Ok(()),
+            false => Err(io::ErrorKind::UnexpectedEof.into()),
+        });
+        outcome.map_err(|e| self.broken(&e, bytes.len()))?;
+        self.proven = true;
+        // Only the end of a compressed stream says whether what came before it was whole.
+        if index + 1 == self.contents.frames {
+            let more = stream.finish().map_err(|e| self.broken(&e, bytes.len()))?;
+            if more > 0 {
+                tracing::warn!(file = %words::path(&self.path), bytes = more, "more samples than frames; not read");
+            }
+        }
+        let replaced = samples::store(self.contents.sample, self.contents.big_endian, &mut bytes);
+        self.count(index, replaced);
+        if matches!((&self.contents.lines, &self.place), (Lines::Reversed, Place::Sweep(_))) {
+            let line = self.contents.frame_size[0] * self.stored_type().bytes();
+            bytes = bytes.rchunks_exact(line).flatten().copied().collect();
+        }
+        (self.stream, self.next) = (Some(stream), index + 1);
+        Ok(bytes)
+    }
+
+    fn count(&mut self, index: usize, replaced: Replaced) {
+        if index < self.counted {
+            return;
+        }
+        self.counted = index + 1;
+        if self.replaced == Replaced::default() && replaced != Replaced::default() {
+            tracing::warn!(file = %words::path(&self.path), frame = index, "samples that are not finite or are denormal read as 0");
+        }
+        self.replaced += replaced;
+    }
+
+    /// What became of reading the samples, `got` bytes into the frame at hand.
+    fn broken(&self, error: &io::Error, got: usize) -> InputError {
+        let size = self.contents.frame_bytes();
+        let (got, claimed) = (self.next as u64 * size + got as u64, self.contents.frames as u64 * size);
+        let fault = match error.kind() {
+            io::ErrorKind::UnexpectedEof if got >= claimed => {
+                "cut short, the end of the compressed stream is missing".into()
+            }
+            io::ErrorKind::UnexpectedEof => format!("cut short, {got} of {claimed} bytes are there"),
+            io::ErrorKind::InvalidData => format!("{error} after {got} of {claimed} bytes"),
+            _ => format!("cannot be read: {error}"),
+        };
+        InputError::new(&self.contents.pixels.path, "data", fault)
+    }
+}
+
+/// The probe file to go by, read; `None` if there is none or the one beside is for others.
+fn choose_probe_file(
+    path: &Path,
+    given: Option<&Path>,
+    contents: &mut Contents,
+) -> Result<Option<ProbeFile>, InputError> {
+    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::beside(path));
+    let Some(found) = found else { return Ok(None) };
+    if let Lines::Pictures(word) = &contents.lines {
+        let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
+        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", words::path(&found));
+        if !for_all {
+            return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
+        }
+        contents
+            .facts
+            .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", words::path(&found))));
+        return Ok(None);
+    }
+    ProbeFile::read(&found).map(Some)
+}

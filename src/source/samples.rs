@@ -1,0 +1,177 @@
+//! The number types of samples, and their way from a file's bytes to the ones that are stored and uploaded.
+
+use std::fmt;
+
+/// What a sample is in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    U8,
+    U16,
+    I16,
+    F32,
+}
+
+/// What a sample is in a [`Frame`](super::Frame).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoredType {
+    U8,
+    U16,
+    F32,
+}
+
+/// What is added to an i16 to store it as u16.
+const I16_SHIFT: f64 = 32768.0;
+
+impl SampleType {
+    pub fn bytes(self) -> usize {
+        self.stored().bytes()
+    }
+
+    pub fn stored(self) -> StoredType {
+        match self {
+            SampleType::U8 => StoredType::U8,
+            SampleType::U16 | SampleType::I16 => StoredType::U16,
+            SampleType::F32 => StoredType::F32,
+        }
+    }
+
+    /// Stored value minus the file's value.
+    pub fn shift(self) -> f64 {
+        if self == SampleType::I16 { I16_SHIFT } else { 0.0 }
+    }
+}
+
+impl StoredType {
+    pub fn bytes(self) -> usize {
+        match self {
+            StoredType::U8 => 1,
+            StoredType::U16 => 2,
+            StoredType::F32 => 4,
+        }
+    }
+}
+
+impl fmt::Display for SampleType {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            SampleType::U8 => "u8",
+            SampleType::U16 => "u16",
+            SampleType::I16 => "i16 (stored as u16, 32768 added)",
+            SampleType::F32 => "f32",
+        })
+    }
+}
+
+/// Samples that no pass must ever see.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Replaced {
+    /// NaN or infinite.
+    pub not_finite: u64,
+    /// Not zero, but too small for a normal f32: many GPUs flush them, so all do.
+    pub denormal: u64,
+}
+
+impl std::ops::AddAssign for Replaced {
+    fn add_assign(&mut self, other: Replaced) {
+        self.not_finite += other.not_finite;
+        self.denormal += other.denormal;
+    }
+}
+
+/// Turns the file's bytes into stored ones, in place. Bytes beyond the last whole sample are left alone.
+pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> Replaced {
+    let mut replaced = Replaced::default();
+    match sample {
+        SampleType::U8 => {}
+        SampleType::U16 | SampleType::I16 => {
+            let flip = if sample == SampleType::I16 { 0x8000 } else { 0 };
+            if !big_endian && flip == 0 {
+                return replaced;
+            }
+            for pair in bytes.as_chunks_mut::<2>().0 {
+                let value = if big_endian { u16::from_be_bytes(*pair) } else { u16::from_le_bytes(*pair) };
+                // Adding 32768 to an i16 turns its top bit.
+                *pair = (value ^ flip).to_le_bytes();
+            }
+        }
+        SampleType::F32 => {
+            for word in bytes.as_chunks_mut::<4>().0 {
+                let mut value = if big_endian { f32::from_be_bytes(*word) } else { f32::from_le_bytes(*word) };
+                if !value.is_finite() {
+                    replaced.not_finite += 1;
+                    value = 0.0;
+                } else if value.is_subnormal() {
+                    replaced.denormal += 1;
+                    value = 0.0;
+                }
+                *word = value.to_le_bytes();
+            }
+        }
+    }
+    replaced
+}
+
+/// Smallest and largest stored sample, widening `range`.
+pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
+    fn span<const N: usize, T: PartialOrd + Copy>(
+        bytes: &[u8],
+        zero: T,
+        read: impl Fn([u8; N]) -> T,
+    ) -> Option<(T, T)> {
+        let values = bytes.as_chunks::<N>().0;
+        let first = values.first().map_or(zero, |v| read(*v));
+        let of = |(low, high): (T, T), v: T| (if v < low { v } else { low }, if v > high { v } else { high });
+        (!values.is_empty()).then(|| values.iter().fold((first, first), |span, v| of(span, read(*v))))
+    }
+    let found = match stored {
+        StoredType::U8 => span(bytes, 0, |b: [u8; 1]| b[0]).map(|(l, h)| [f64::from(l), f64::from(h)]),
+        StoredType::U16 => span(bytes, 0, u16::from_le_bytes).map(|(l, h)| [f64::from(l), f64::from(h)]),
+        StoredType::F32 => span(bytes, 0.0, f32::from_le_bytes).map(|(l, h)| [f64::from(l), f64::from(h)]),
+    };
+    if let Some([low, high]) = found {
+        *range = [range[0].min(low), range[1].max(high)];
+    }
+}
+
+/// A range that can be divided by: constant data get the unit above their value, or as much as keeps f32 apart.
+pub(super) fn not_empty([low, high]: [f64; 2]) -> [f64; 2] {
+    match low < high {
+        true => [low, high],
+        false if low.is_finite() => [low, low + low.abs().max(1.0)],
+        false => [0.0, 1.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_signed_samples_survives_storing() {
+        let mut bytes: Vec<u8> = [-32768i16, -1, 0, 1, 32767].iter().flat_map(|v| v.to_be_bytes()).collect();
+        store(SampleType::I16, true, &mut bytes);
+        let stored: Vec<u16> = bytes.chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        assert_eq!(stored, [0, 32767, 32768, 32769, 65535]);
+    }
+
+    #[test]
+    fn no_sample_that_is_not_finite_or_normal_gets_through() {
+        let hostile = [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e-40, -1e-40, -2.5, 0.0, 7.0];
+        let mut bytes: Vec<u8> = hostile.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(store(SampleType::F32, false, &mut bytes), Replaced { not_finite: 3, denormal: 2 });
+        let stored: Vec<f32> = bytes.chunks(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        assert_eq!(stored, [0.0, 0.0, 0.0, 0.0, 0.0, -2.5, 0.0, 7.0]);
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        widen(&mut range, StoredType::F32, &bytes);
+        assert_eq!(range, [-2.5, 7.0]);
+    }
+
+    #[test]
+    fn constant_data_do_not_give_a_zero_range() {
+        for value in [0.0, 5.0, -3.0, 1e30] {
+            let [low, high] = not_empty([value, value]);
+            assert!(high as f32 > low as f32, "{value}");
+        }
+        assert_eq!(not_empty([f64::INFINITY, f64::NEG_INFINITY]), [0.0, 1.0]);
+    }
+}

@@ -1,0 +1,106 @@
+//! Geometry, volumes and times in words: mm, degrees and seconds, for `info` and messages.
+
+use super::error::escaped;
+use crate::probe::{Array, Axis, Grid, Motion, Probe, Volumes};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Longest path, in characters.
+const LONGEST_PATH: usize = 300;
+
+/// At most four decimals, without trailing zeros; large and tiny numbers with an exponent.
+pub(super) fn number(value: f64) -> String {
+    if value != 0.0 && !(1e-3..1e7).contains(&value.abs()) {
+        return format!("{value:.4e}");
+    }
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+pub(super) fn path(path: &Path) -> String {
+    escaped(&path.display().to_string(), LONGEST_PATH)
+}
+
+pub(super) fn volumes(volumes: &Volumes) -> String {
+    let frames = if volumes.frames == 1 { "1 frame".into() } else { format!("{} frames", volumes.frames) };
+    let mut text = format!("{} of {frames}", volumes.count);
+    if volumes.left_over > 0 {
+        text += &format!(", {} frames of a last, incomplete one are left out", volumes.left_over);
+    }
+    match (volumes.both_ways, volumes.first_backward) {
+        (true, false) => text += ", swept forwards and backwards in turn",
+        (true, true) => text += ", swept backwards and forwards in turn",
+        (false, true) => text += ", swept backwards",
+        (false, false) => {}
+    }
+    if volumes.speed_ratio > 0.0 {
+        text += &format!(", motor moving for {} of each frame", number(volumes.speed_ratio));
+    }
+    text
+}
+
+pub(super) fn grid(grid: &Grid) -> Vec<(String, String)> {
+    let [x, y, z] = grid.spacing.map(number);
+    let [u, v, w] = grid.origin.map(number);
+    let [a, b, c] = grid.size;
+    vec![
+        ("geometry".into(), format!("Cartesian, {a} x {b} x {c} voxels of {x} x {y} x {z} mm")),
+        ("origin".into(), format!("{u}, {v}, {w} mm")),
+    ]
+}
+
+pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
+    let mut facts: Vec<(String, String)> = Vec::new();
+    let mut say = |title: &str, value: String| facts.push((title.into(), value));
+    match probe.array {
+        Array::Curved { radius } => {
+            say("array", format!("curved, radius {} mm", number(radius)));
+            say("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
+        }
+        Array::Linear => {
+            say("array", "linear".into());
+            say("scan lines", axis(&probe.lines, "mm", 1.0));
+        }
+    }
+    let last = probe.start_depth + probe.sample_pitch * (probe.samples.max(1) - 1) as f64;
+    let pitch = number(probe.sample_pitch);
+    say("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
+    match probe.motion {
+        Motion::Fan { wobble_radius } => {
+            say("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
+            say("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
+        }
+        Motion::Translated => {
+            say("motion", "translated".into());
+            say("slices", axis(&probe.slices, "mm", 1.0));
+        }
+        Motion::Still { thickness } => say("motion", format!("still, drawn {} mm thick", number(thickness))),
+    }
+    say("speed of sound", format!("{} m/s", number(probe.sound_speed)));
+    facts
+}
+
+fn axis(axis: &Axis, unit: &str, scale: f64) -> String {
+    let [first, last, pitch] = [axis.first(), axis.last(), axis.pitch()].map(|v| number(v * scale));
+    let even = if matches!(axis, Axis::Even { .. }) { "" } else { " on average, uneven" };
+    match axis.len() {
+        1 => format!("1, at {first} {unit}"),
+        n => format!("{n}, {first} .. {last} {unit}, {pitch} {unit} apart{even}"),
+    }
+}
+
+pub(super) fn times(times: &BTreeMap<usize, f64>) -> Option<(String, String)> {
+    let (first, last) = (times.values().next()?, times.values().next_back()?);
+    Some(("time stamps".into(), format!("{} .. {} s, {} of them", number(*first), number(*last), times.len())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_keep_their_size_when_shortened() {
+        let shown = [0.25, 30.0, 0.0, -74.99999, 1e-9, 3.4e38, 100.0].map(number);
+        assert_eq!(shown, ["0.25", "30", "0", "-75", "1.0000e-9", "3.4000e38", "100"]);
+    }
+}
