@@ -1,13 +1,16 @@
 //! The only folder that knows Vulkan, and the only one with unsafe code.
 //!
 //! [`context`] owns instance, device, queue and allocator; [`resources`] images and buffers; [`pipelines`] what a shader
-//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer with its barriers and time stamps;
+//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`timeline`] what is done;
 //! [`renderer`] the four stages; [`single`] one pass alone, for tests.
 
 pub mod context;
 pub mod error;
 pub mod faults;
 pub mod formats;
+#[cfg(feature = "hot-reload")]
+pub mod hot_reload;
+pub mod order;
 pub mod pipelines;
 pub mod recorder;
 pub mod renderer;
@@ -15,6 +18,7 @@ pub mod resources;
 pub mod select;
 pub mod single;
 pub mod slots;
+pub mod timeline;
 pub mod timing;
 
 pub use context::{Context, ContextOptions};

@@ -3,12 +3,13 @@
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
-use super::faults::Seam;
+use super::order::Order;
 use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Buffer, Image, Purpose, WHOLE};
 use super::slots::{Resource, Slots};
+use super::timeline::Timeline;
 use super::timing::{self, Stamps};
-use crate::barriers::{self, Access, Barrier, Tracker, Worker, Workers};
+use crate::barriers::{self, Access, Worker};
 use crate::passes::{Part, Pass, PassTime, Slot, Turn, contract};
 use crate::scene::Scene;
 use crate::spirv::Kind;
@@ -19,19 +20,6 @@ use std::sync::Arc;
 /// Room for the parameters of one command buffer.
 const PARAMS_BYTES: u64 = 64 << 10;
 const STAMPS: u32 = 128;
-/// A software device may need minutes for a picture of 16k pixels.
-const TIME_OUT: u64 = 600;
-
-/// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
-#[derive(Default)]
-pub struct Order {
-    pub tracker: Tracker,
-    pub barriers: u32,
-    /// Names of the passes dispatched, in order, while someone counts them.
-    pub dispatched: Option<Vec<&'static str>>,
-    /// Leaves out the n-th barrier, to show that something notices.
-    pub drop_barrier: Option<u32>,
-}
 
 /// One dispatch: a pass, and what it runs on.
 #[derive(Clone, Copy)]
@@ -51,14 +39,6 @@ pub struct Place {
     pub parts: Range<u32>,
 }
 
-/// Done when the timeline has reached a value.
-pub struct Timeline {
-    context: Arc<Context>,
-    semaphore: vk::Semaphore,
-    pub submitted: u64,
-    doing: String,
-}
-
 pub struct Recorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
@@ -71,44 +51,6 @@ pub struct Recorder {
     /// The submission whose times were added last.
     collected_to: u64,
     label: &'static str,
-}
-
-impl Timeline {
-    pub fn new(context: &Arc<Context>) -> Result<Timeline, GpuError> {
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-        let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        // SAFETY: the chain is complete and outlives the call.
-        let semaphore = unsafe { context.device.create_semaphore(&create, None) }.doing(|| "create timeline".into())?;
-        context.name(semaphore, "timeline");
-        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, doing: String::new() })
-    }
-
-    /// Blocks until a submission is done.
-    pub fn wait(&self, value: u64) -> Result<(), GpuError> {
-        let (semaphores, values) = ([self.semaphore], [value]);
-        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-        // SAFETY: the semaphore is alive; the arrays outlive the call.
-        let result = self
-            .context
-            .faults
-            .pass(Seam::Wait)
-            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIME_OUT * 1_000_000_000) });
-        match result {
-            Err(vk::Result::TIMEOUT) => Err(GpuError::TimedOut { seconds: TIME_OUT, doing: self.doing.clone() }),
-            other => other.doing(|| format!("run {}", self.doing)),
-        }
-    }
-
-    pub fn wait_all(&self) -> Result<(), GpuError> {
-        self.wait(self.submitted)
-    }
-}
-
-impl Drop for Timeline {
-    fn drop(&mut self) {
-        // SAFETY: the owner waited for the device before it drops its timeline.
-        unsafe { self.context.device.destroy_semaphore(self.semaphore, None) };
-    }
 }
 
 impl Recorder {
@@ -194,8 +136,10 @@ impl Recorder {
         let transitions: Vec<_> = images
             .iter()
             .map(|(image, ..)| {
+                // The memory may have been another image's a moment ago.
                 vk::ImageMemoryBarrier2::default()
-                    .src_stage_mask(vk::PipelineStageFlags2::NONE)
+                    .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                    .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
                     .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
                     .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
                     .old_layout(vk::ImageLayout::UNDEFINED)
@@ -372,21 +316,7 @@ impl Recorder {
     }
 
     fn barrier(&self, order: &mut Order, accesses: &[Access]) {
-        let Some(Barrier { from, to }) = order.tracker.before(accesses) else { return };
-        order.barriers += 1;
-        if order.drop_barrier == Some(order.barriers) {
-            return;
-        }
-        let barrier = [vk::MemoryBarrier2::default()
-            .src_stage_mask(stages(from))
-            .src_access_mask(writes(from))
-            .dst_stage_mask(stages(to))
-            .dst_access_mask(reads(to) | writes(to))];
-        // SAFETY: the command buffer is being recorded, outside any render pass.
-        unsafe {
-            let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-            self.context.device.cmd_pipeline_barrier2(self.commands, &dependency);
-        }
+        order.before(&self.context, self.commands, accesses);
     }
 }
 
@@ -404,43 +334,6 @@ fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
         image_extent: vk::Extent3D { depth, ..image.extent },
         ..vk::BufferImageCopy::default()
     }
-}
-
-fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: Workers, of: [(Worker, T); 3]) -> T {
-    of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
-}
-
-fn stages(workers: Workers) -> vk::PipelineStageFlags2 {
-    flags(
-        workers,
-        [
-            (Worker::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
-            (Worker::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
-            (Worker::Host, vk::PipelineStageFlags2::HOST),
-        ],
-    )
-}
-
-fn writes(workers: Workers) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            (Worker::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_WRITE),
-            (Worker::Host, vk::AccessFlags2::NONE),
-        ],
-    )
-}
-
-fn reads(workers: Workers) -> vk::AccessFlags2 {
-    flags(
-        workers,
-        [
-            (Worker::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_READ),
-            (Worker::Host, vk::AccessFlags2::HOST_READ),
-        ],
-    )
 }
 
 impl Drop for Recorder {

@@ -3,10 +3,12 @@
 
 use super::GpuError;
 use super::context::Context;
+use super::order::Order;
 use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
-use super::recorder::{Order, Place, Recorder, Timeline, Work};
+use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
+use super::timeline::Timeline;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Texels, Turn, When};
 use crate::picture::Picture;

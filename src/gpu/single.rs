@@ -2,11 +2,13 @@
 
 use super::GpuError;
 use super::context::Context;
+use super::order::Order;
 use super::pipelines::{Pipelines, embedded};
-use super::recorder::{Order, Place, Recorder, Timeline, Work};
+use super::recorder::{Place, Recorder, Work};
 use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
+use super::timeline::Timeline;
 use crate::passes::slots::{Filled, Shape};
 use crate::passes::{Arrays, Bind, Part, Pass, Texels, Turn};
 use crate::plan::Plan;

@@ -286,7 +286,7 @@ mod tests {
     fn one_frame_of_a_fan_is_a_slab() {
         let (probe, _) = parse(FAN).unwrap().geometry(160, 71, 1).unwrap();
         assert_eq!(probe.motion, Motion::Still { thickness: SLAB });
-        assert!(parse(FAN).unwrap().geometry(160, 1, 1).is_ok(), "a single line is a probe too");
+        assert!(parse(FAN).unwrap().geometry(160, 1, 1).is_err(), "a single line spans no picture");
     }
 
     #[test]

@@ -1,0 +1,57 @@
+//! One timeline semaphore: what was submitted, and whether it is done.
+
+use super::GpuError;
+use super::context::Context;
+use super::error::Doing;
+use super::faults::Seam;
+use ash::vk;
+use std::sync::Arc;
+
+/// A software device may need minutes for a picture of 16k pixels.
+const TIME_OUT: u64 = 600;
+
+/// Done when the timeline has reached a value.
+pub struct Timeline {
+    context: Arc<Context>,
+    pub(super) semaphore: vk::Semaphore,
+    pub submitted: u64,
+    pub(super) doing: String,
+}
+
+impl Timeline {
+    pub fn new(context: &Arc<Context>) -> Result<Timeline, GpuError> {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the chain is complete and outlives the call.
+        let semaphore = unsafe { context.device.create_semaphore(&create, None) }.doing(|| "create timeline".into())?;
+        context.name(semaphore, "timeline");
+        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, doing: String::new() })
+    }
+
+    /// Blocks until a submission is done.
+    pub fn wait(&self, value: u64) -> Result<(), GpuError> {
+        let (semaphores, values) = ([self.semaphore], [value]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore is alive; the arrays outlive the call.
+        let result = self
+            .context
+            .faults
+            .pass(Seam::Wait)
+            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIME_OUT * 1_000_000_000) });
+        match result {
+            Err(vk::Result::TIMEOUT) => Err(GpuError::TimedOut { seconds: TIME_OUT, doing: self.doing.clone() }),
+            other => other.doing(|| format!("run {}", self.doing)),
+        }
+    }
+
+    pub fn wait_all(&self) -> Result<(), GpuError> {
+        self.wait(self.submitted)
+    }
+}
+
+impl Drop for Timeline {
+    fn drop(&mut self) {
+        // SAFETY: the owner waited for the device before it drops its timeline.
+        unsafe { self.context.device.destroy_semaphore(self.semaphore, None) };
+    }
+}

@@ -1,0 +1,59 @@
+//! The four stages in f64 on the CPU: every step of a plan by its reference, slots as plain arrays. What goldens are made of,
+//! and what error is measured against where it is fast enough.
+
+use crate::passes::slots::{Filled, Shape};
+use crate::passes::{Arrays, Bind, Slot, Texels, Turn, When};
+use crate::plan::{Plan, Step};
+use crate::scene::Scene;
+use std::collections::BTreeMap;
+
+/// Renders `frames` (values as the frame's texture yields them, one array a slice, in geometric order). Returns every slot.
+pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
+    let plan = Plan::new(scene);
+    let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
+    for (slice, frame) in frames.iter().enumerate() {
+        slots.insert(Slot::Frames, frame.clone());
+        for (_, step) in plan.steps_of(When::Frame) {
+            run(scene, step, &Turn { slice: slice as u32, ..step.turn() }, &mut slots);
+        }
+    }
+    for (_, step) in plan.steps_of(When::Volume).chain(plan.steps_of(When::Picture)) {
+        run(scene, step, &step.turn(), &mut slots);
+    }
+    slots
+}
+
+/// A slot as the device holds it before any pass: zero, or made from the scene.
+fn empty(slot: Slot, scene: &Scene) -> Texels {
+    let format = slot.format(scene);
+    let size = match slot.shape(scene) {
+        Shape::Two([w, h]) => [w as usize, h as usize, 1],
+        Shape::Layers([w, h, _]) => [w as usize, h as usize, 1],
+        Shape::Three(n) => n.map(|n| n as usize),
+        Shape::Buffer(bytes) => [bytes as usize / 4, 1, 1],
+    };
+    let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
+    if let Filled::ByScene(make) = slot.filled() {
+        texels.values = make(scene).into_iter().map(f64::from).collect();
+    }
+    texels
+}
+
+fn run(scene: &Scene, step: &Step, turn: &Turn, slots: &mut BTreeMap<Slot, Texels>) {
+    let (reads, writes) = ((step.pass.reads)(scene, turn), (step.pass.writes)(scene, turn));
+    let mut take = |binds: &[Bind]| {
+        let mut arrays = Arrays::default();
+        for bind in binds {
+            // A plan lists every slot that its steps name, and no step reads what it writes.
+            arrays.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(|| Texels::untouched([0; 3], 1)));
+        }
+        arrays
+    };
+    let (inputs, mut outputs) = (take(&reads), take(&writes));
+    (step.pass.reference)(scene, turn, &inputs, &mut outputs);
+    for (binds, arrays) in [(reads, inputs), (writes, outputs)] {
+        for bind in binds {
+            slots.insert(bind.slot, arrays.get(bind.name).clone());
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! Scenes whose answer is a formula.
+
+use crate::common::*;
+use echolume::passes::shade::light::normal;
+use echolume::passes::{MISS, Slot, Texels, is_hit};
+use echolume::probe::{Geometry, Grid};
+use echolume::scene::Scene;
+use glam::DVec3;
+
+fn block(spacing: f64, size: [usize; 3]) -> Geometry {
+    Geometry::Cartesian(Grid { size, spacing: [spacing; 3], origin: [0.0; 3] })
+}
+
+/// SPEC's opacity over a path L through a constant medium of voxel opacity a is 1 - (1 - a)^(L / voxel), whatever the step.
+#[test]
+fn light_through_a_constant_medium_follows_beer_and_lambert_at_any_step() {
+    let device = Device::new();
+    let thickness = 10.0;
+    for step in [0.07, 0.33, 0.5, 3.0, 40.0] {
+        for opacity in [1e-4, 0.02, 0.3, 1.0] {
+            let toml = format!(
+                "mode = 'vr'\npicture = {{ size = [8, 8] }}\nray = {{ step = {step}, early_end = 0.0 }}\n\
+                 [volume]\ntransfer = [{{ at = 0.0, colour = [1.0, 0.5, 0.0], opacity = {opacity} }}]"
+            );
+            // Half a voxel beyond the outer centres is part of the volume: 20 voxels of 0.5 mm are 10 mm.
+            let scene = scene(block(0.5, [20, 20, 20]), BYTES, &toml);
+            let frames = frames(&scene, |_| 0.6);
+            let mut renderer = rendered(&device, scene, &frames);
+            renderer.picture().expect("picture");
+            let picture = renderer.read(Slot::Picture).expect("read").expect("there");
+            let expected = 1.0 - (1.0 - opacity as f64).powf(thickness / 0.5);
+            let got = picture.get([4, 4, 0]);
+            // The picture is R16F: 11 bits.
+            assert!((got[3] - expected).abs() <= expected / 1500.0 + 1e-7, "step {step}, opacity {opacity}: {got:?}");
+            assert!((got[1] - expected / 2.0).abs() <= expected / 1500.0 + 1e-7);
+        }
+    }
+}
+
+#[test]
+fn ten_thousand_thin_samples_and_an_opaque_one_keep_their_digits() {
+    let device = Device::new();
+    for (opacity, step, tolerance) in [(1e-4, 0.002, 1e-3), (1e-7, 0.002, 2e-3), (1.0, 1e-3, 0.0), (0.999, 30.0, 1e-3)]
+    {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {step}, early_end = 0.0 }}\n\
+             [volume]\ntransfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = {opacity} }}]"
+        );
+        let scene = scene(block(0.5, [4, 40, 4]), BYTES, &toml);
+        let frames = frames(&scene, |_| 1.0);
+        let mut renderer = rendered(&device, scene, &frames);
+        renderer.picture().expect("picture");
+        let got = renderer.read(Slot::Picture).expect("read").expect("there").get([1, 1, 0])[3];
+        let expected = -(40.0 * (-opacity as f64).ln_1p()).exp_m1();
+        assert!(got.is_finite() && (0.0..=1.0).contains(&got));
+        // 4e-6 is below R16F's normal numbers, which are 6e-8 apart there.
+        assert!((got - expected).abs() <= tolerance * expected + 6e-8, "opacity {opacity}: {got} for {expected}");
+    }
+}
+
+/// A wall seen face on: the surface lies at the wall, however the samples fall.
+#[test]
+fn a_step_wall_is_found_within_a_tenth_of_a_step() {
+    let device = Device::new();
+    let geometry = block(0.25, [16, 120, 16]);
+    for (wall, height) in [(12.0, 1.0), (12.13, 0.5), (17.31, 0.25)] {
+        let toml = "mode = 'sr'\npicture = { size = [9, 7] }\nray = { step = 0.4, sampling = 'exact' }
+                    slices = { format = 'r32f' }\nsurface = { threshold = 0.1 }";
+        let scene = scene(geometry.clone(), FLOATS, toml);
+        // A ramp of two voxels about the wall, so that its place between voxels is in the data.
+        let frames = body_frames(&scene, |p| height * ((p.y - wall) / 0.5 + 0.5).clamp(0.0, 1.0));
+        let mut renderer = rendered(&device, scene.clone(), &frames);
+        renderer.picture().expect("picture");
+        let distances = renderer.read(Slot::Distance).expect("read").expect("there");
+        let mut found = 0;
+        for y in 0..7 {
+            for x in 0..9 {
+                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+                // The picture is wider than the block.
+                if origin.x < scene.low.x
+                    || origin.x > scene.high.x
+                    || origin.z < scene.low.z
+                    || origin.z > scene.high.z
+                {
+                    continue;
+                }
+                found += 1;
+                let place = origin + direction * distances.one(x, y, 0);
+                assert!((place.y - wall).abs() < 0.04, "wall at {wall} found at {}", place.y);
+            }
+        }
+        assert!(found > 40, "{found}");
+    }
+}
+
+/// A sphere through scan conversion, sweep map and detector.
+#[test]
+fn a_sphere_in_a_sweep_is_where_it_is() {
+    let device = Device::new();
+    let mut probe = wobbler();
+    probe.lines = echolume::probe::Axis::centred(1.1 / 127.0, 128);
+    probe.slices = echolume::probe::Axis::centred(0.8 / 60.0, 61);
+    probe.sample_pitch = 0.2;
+    probe.samples = 256;
+    let (centre, radius) = (DVec3::new(1.5, 50.0, -2.0), 9.0);
+    let toml = "mode = 'sr'\npicture = { size = [64, 64] }\nray = { step = 0.2 }\nsurface = { threshold = 0.2 }
+                camera = { zoom = 3.0, target = [1.5, 30.0, -2.0], elevation = 10, field_of_view = 20 }";
+    let scene = scene(Geometry::Sweep(probe), FLOATS, toml);
+    let frames = body_frames(&scene, |p| ((radius - p.distance(centre)) / 0.6 + 0.5).clamp(0.0, 1.0));
+    let mut renderer = rendered(&device, scene.clone(), &frames);
+    renderer.picture().expect("picture");
+    let distances = renderer.read(Slot::Distance).expect("read").expect("there");
+    let (mut hits, mut worst) = (0, 0.0f64);
+    for y in 0..64 {
+        for x in 0..64 {
+            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+            let along = (centre - origin).dot(direction);
+            let offset = (origin + direction * along).distance(centre);
+            // Away from the limb, where a ray crosses the edge at a slant.
+            if offset > 0.8 * radius {
+                continue;
+            }
+            let expected = along - (radius * radius - offset * offset).sqrt();
+            let got = distances.one(x, y, 0);
+            assert!(is_hit(got), "a hole at {x}, {y}");
+            worst = worst.max((got - expected).abs());
+            hits += 1;
+        }
+    }
+    assert!(hits > 400, "the sphere fills the picture: {hits}");
+    // Half a step: the lattice of frames, 0.013 rad at 45 mm, is 0.6 mm wide across a curved edge.
+    assert!(worst < 0.1, "off by {worst} mm");
+}
+
+#[test]
+fn normals_of_a_sphere_point_outwards_within_a_degree_away_from_the_limb() {
+    let toml =
+        "picture = { size = [200, 160] }\ncamera = { field_of_view = 35, azimuth = 15 }\nlight = { cliff = 3.0 }";
+    let scene = scene(block(1.0, [40, 40, 40]), BYTES, toml);
+    let (centre, radius) = (DVec3::splat(20.0), 15.0);
+    let distances = sphere_distances(&scene, centre, radius);
+    let mut checked = 0;
+    for y in 0..160 {
+        for x in 0..200 {
+            let distance = distances.one(x, y, 0);
+            let Some(normal) = normal(&scene, &distances, x as i64, y as i64) else { continue };
+            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+            let outwards = (origin + direction * distance - centre).normalize();
+            if outwards.dot(-direction) > 0.5 {
+                assert!(normal.angle_between(outwards).to_degrees() < 1.0, "at {x}, {y}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 3000, "{checked}");
+}
+
+fn sphere_distances(scene: &Scene, centre: DVec3, radius: f64) -> Texels {
+    let [width, height] = scene.picture_size().map(|n| n as usize);
+    Texels::from_fn([width, height, 1], 1, |[x, y, _], _| {
+        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let along = (centre - origin).dot(direction);
+        let offset = (origin + direction * along).distance(centre);
+        if offset < radius { along - (radius * radius - offset * offset).sqrt() } else { MISS }
+    })
+}
+
+/// Volume images that take turns give the same picture, and one does not show through the other.
+#[test]
+fn volume_images_that_take_turns_do_not_mix() {
+    use echolume::gpu::{Options, Renderer};
+    let device = Device::new();
+    let scene = scene(
+        Geometry::Sweep(wobbler()),
+        BYTES,
+        "mode = 'sr'\npicture = { size = [32, 32] }\nslices = { pixels = 48 }",
+    );
+    let near = body_frames(&scene, |p| if p.y > 40.0 { 0.8 } else { 0.0 });
+    let far = body_frames(&scene, |p| if p.y > 55.0 { 0.8 } else { 0.0 });
+    let alone = |frames: &[Texels]| rendered(&device, scene.clone(), frames).picture().expect("picture");
+    let (near_alone, far_alone) = (alone(&near), alone(&far));
+    let options = Options { volume_images: 2, ..Options::default() };
+    let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
+    send(&mut renderer, &near, 0);
+    // The other image is filled while the first is still to be drawn.
+    send(&mut renderer, &far, 1);
+    renderer.show(0);
+    assert_eq!(renderer.picture().expect("picture"), near_alone);
+    renderer.show(1);
+    assert_eq!(renderer.picture().expect("picture"), far_alone);
+    assert_ne!(near_alone, far_alone);
+}

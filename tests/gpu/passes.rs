@@ -1,0 +1,327 @@
+//! Every pass alone against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
+//! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
+
+use crate::common::*;
+use echolume::gpu::renderer::size_of;
+use echolume::gpu::single::Single;
+use echolume::passes::slots::{Filled, Shape};
+use echolume::passes::{Arrays, Bind, MISS, PASSES, Part, Pass, Slot, Texels, Turn};
+use echolume::probe::{Advance, Geometry, Probe};
+use echolume::scene::{Input, Scene};
+use echolume::source::StoredType;
+
+/// What outputs hold before a pass: no pass computes it by chance, and every format stores it (nearly).
+const POISON: f64 = 0.654_321;
+
+const ALL_FILTERS: &str = "
+    slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
+    distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }
+    post = { sigma = { window = 5, sigma = 0.05 }, brightness = 0.05, contrast = 1.3, gamma = 1.8, colour_map = 'skin' }
+    light = { texture = 0.4, shininess = 40.0 }
+    picture = { size = [37, 29] }
+    camera = { azimuth = 20, elevation = -35, roll = 10, field_of_view = 30 }
+    ray = { step = 0.5, sampling = 'exact' }
+    surface = { threshold = 0.12 }
+";
+
+fn moved(mut probe: Probe, share: f64) -> Probe {
+    probe.advance = Advance::Same(share * probe.slices.pitch());
+    probe
+}
+
+fn scenes() -> Vec<(String, Scene)> {
+    let mut scenes = Vec::new();
+    let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
+        for mode in ["sr", "vr"] {
+            let scene = scene(geometry.clone(), input, &format!("mode = '{mode}'\n{toml}"));
+            scenes.push((format!("{name}, {mode}"), scene));
+        }
+    };
+    let sweep = Geometry::Sweep(wobbler());
+    add("fan with every filter", &sweep, BYTES, ALL_FILTERS);
+    let each = (0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect();
+    let geometries = [
+        ("fan, motor moving", Geometry::Sweep(moved(wobbler(), 0.7))),
+        ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
+        ("fan, uneven and moving", Geometry::Sweep(Probe { advance: Advance::Each(each), ..uneven(wobbler()) })),
+        ("linear array, translated", Geometry::Sweep(linear())),
+        ("linear array, translated and moving backwards", Geometry::Sweep(moved(linear(), -0.9))),
+        ("single frame", Geometry::Sweep(still())),
+        ("Cartesian", cartesian([17, 23, 9])),
+        ("Cartesian, one slice", cartesian([9, 8, 1])),
+    ];
+    for (name, geometry) in &geometries {
+        let toml = "slices = { pixels = 33 }
+            picture = { size = [19, 33] }
+            camera = { azimuth = -30, elevation = 25 }
+            ray = { step = 0.45, sampling = 'exact' }";
+        add(name, geometry, BYTES, toml);
+    }
+    for format in ["r8", "r16", "r16f", "r32f"] {
+        let toml = format!(
+            "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.6 }}"
+        );
+        add(&format!("volume in {format}, the device's filter"), &sweep, BYTES, &toml);
+    }
+    for (name, stored, range) in [("u16", StoredType::U16, [1000.0, 40000.0]), ("f32", StoredType::F32, [-0.25, 1.5])] {
+        let toml = "slices = { pixels = 9 }\npicture = { size = [1, 1] }\nray = { sampling = 'exact' }";
+        add(&format!("frames in {name}, one pixel"), &sweep, Input { stored, range }, toml);
+    }
+    for (name, toml) in [
+        ("sigma 0", "slices = { pixels = 20, sigma = { window = 7, sigma = 0.0 } }"),
+        (
+            "infinite sigma",
+            "slices = { pixels = 20, sigma = { window = 63, sigma = inf } }\npost = { sigma = { window = 9, sigma = inf } }",
+        ),
+        (
+            "first crossing, no rough detector",
+            "surface = { place = 'first-crossing', rough = 1 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "dark cavity, roughest",
+            "surface = { sign = 'dark', rough = 8, rough_threshold = 0.05 }\nslices = { pixels = 30 }",
+        ),
+        ("parallel to a face", "camera = { elevation = 90 }\nslices = { pixels = 30 }"),
+        ("inside the volume", "camera = { field_of_view = 90, zoom = 20 }\nslices = { pixels = 30 }"),
+        ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
+        ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
+    ] {
+        let toml = format!(
+            "{toml}\npicture = {{ size = [23, 17] }}\nray = {{ sampling = 'exact', step = 0.7, early_end = 0.0 }}"
+        );
+        add(name, &sweep, BYTES, &toml);
+    }
+    scenes
+}
+
+/// Inputs by kind: noise, all zero, all one, one hot texel; for distances smooth hits with cliffs and misses, all misses, one
+/// hit; for volumes blurred noise, so that rays see something like tissue.
+const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
+
+fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
+    let format = bind.slot.format(scene);
+    let mut size = size_of(bind.slot.shape(scene));
+    if bind.part == Part::Layer {
+        size[2] = 1;
+    }
+    let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
+    if let Filled::ByScene(make) = bind.slot.filled() {
+        texels.values = make(scene).into_iter().map(f64::from).collect();
+        return texels;
+    }
+    let count = texels.values.len();
+    let is_distance = matches!(bind.slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB);
+    let tilt = noise.range(-0.4, 0.4);
+    for i in 0..count {
+        let (x, y) = ((i / format.channels() % size[0]) as f64, (i / format.channels() / size[0]) as f64);
+        texels.values[i] = match (kind, is_distance) {
+            ("noise", true) => match noise.next() {
+                share if share < 0.1 => MISS,
+                share if share < 0.2 => noise.range(10.0, 90.0),
+                _ => 60.0 + tilt * x - 0.2 * y + if x > 9.0 { 8.0 } else { 0.0 } + noise.range(-0.3, 0.3),
+            },
+            ("zero", true) => MISS,
+            ("one", true) => 42.0,
+            ("hot", true) => {
+                if i == count / 2 {
+                    33.0
+                } else {
+                    MISS
+                }
+            }
+            ("noise", false) => noise.next(),
+            ("one", false) => 1.0,
+            ("hot", false) => {
+                if i == count / 2 {
+                    1.0
+                } else {
+                    0.0
+                }
+            }
+            _ => 0.0,
+        };
+    }
+    if bind.slot == Slot::Picture || bind.slot == Slot::SmoothPicture {
+        // Alpha is 0 or 1, as the passes leave it.
+        texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());
+    }
+    if bind.slot == Slot::Surface {
+        texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
+    }
+    if bind.slot == Slot::Volume && kind == "noise" {
+        texels = blurred(&texels);
+    }
+    // Both sides see what the slot's format can hold.
+    Texels::decode(size, format, &texels.encode(format))
+}
+
+fn blurred(noise: &Texels) -> Texels {
+    Texels::from_fn(noise.size, 1, |[x, y, z], _| {
+        let mut sum = 0.0;
+        for (dx, dy, dz) in (0..125).map(|i| (i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2)) {
+            sum += noise.clamped(x as i64 + dx, y as i64 + dy, z as i64 + dz);
+        }
+        (0.5 + 4.0 * (sum / 125.0 - 0.5)).clamp(0.0, 1.0)
+    })
+}
+
+/// The worst texel beyond tolerance, if there are more such texels than the pass allows.
+fn compare(pass: &Pass, scene: &Scene, expected: &Arrays, got: &Arrays, writes: &[Bind]) -> Result<f64, String> {
+    let mut largest = 0.0f64;
+    for (name, expected) in expected.iter() {
+        let got = got.get(name);
+        let format = writes.iter().find(|b| b.name == name).expect("declared").slot.format(scene);
+        let (mut beyond, mut worst) = (0, None);
+        for (i, (e, g)) in expected.values.iter().zip(&got.values).enumerate() {
+            let untouched = e.is_nan();
+            let e = if untouched { POISON } else { *e };
+            let rounding = 1.01 * Texels::spacing(format, e);
+            let allowed = if untouched {
+                rounding
+            } else {
+                pass.tolerance.absolute.max(pass.tolerance.relative * e.abs()) + rounding
+            };
+            let error = (e - g).abs();
+            if error <= allowed {
+                largest = largest.max(error);
+            } else {
+                beyond += 1;
+                if worst.is_none_or(|(_, _, _, w)| error > w) {
+                    worst = Some((i, e, *g, error));
+                }
+            }
+        }
+        let share = beyond as f64 / expected.values.len() as f64;
+        if share > pass.tolerance.outliers {
+            let (i, e, g, _) = worst.expect("something is beyond");
+            let texel = i / expected.channels;
+            let at = (texel % expected.size[0], texel / expected.size[0] % expected.size[1]);
+            return Err(format!("'{name}' at {at:?}: expected {e}, got {g}; {beyond} texels beyond tolerance"));
+        }
+    }
+    Ok(largest)
+}
+
+fn run_one(
+    single: &mut Single,
+    scene: &Scene,
+    pass: &'static Pass,
+    kind: &str,
+    seed: u64,
+) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
+    let turn = Turn { layer: 2, slice: scene.slices() / 2, iteration: 0, image: 0 };
+    let mut noise = Noise(seed);
+    let mut inputs = Arrays::default();
+    for bind in (pass.reads)(scene, &turn) {
+        inputs.insert(bind.name, input(scene, &bind, kind, &mut noise));
+    }
+    let writes = (pass.writes)(scene, &turn);
+    let mut expected = Arrays::default();
+    for bind in &writes {
+        let channels = bind.slot.format(scene).channels();
+        expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+    }
+    (pass.reference)(scene, &turn, &inputs, &mut expected);
+    let got = single.run(scene, pass, &turn, &inputs, POISON).expect("dispatch");
+    (inputs, expected, got, writes)
+}
+
+#[test]
+fn every_pass_matches_its_reference() {
+    let device = Device::new();
+    println!("device: {}", device.describe());
+    let mut single = Single::new(&device).expect("single");
+    let mut failures = Vec::new();
+    let mut errors: Vec<(&str, f64, u32)> = PASSES.iter().map(|p| (p.name, 0.0, 0)).collect();
+    for (name, scene) in scenes() {
+        for (n, pass) in PASSES.iter().enumerate().filter(|(_, p)| p.is_needed(&scene)) {
+            for (k, kind) in KINDS.iter().enumerate() {
+                let (_, expected, got, writes) = run_one(&mut single, &scene, pass, kind, (n * 8 + k) as u64);
+                match compare(pass, &scene, &expected, &got, &writes) {
+                    Ok(error) => errors[n].1 = error.max(errors[n].1),
+                    Err(fault) => failures.push(format!("{} in '{name}' on {kind}: {fault}", pass.name)),
+                }
+                errors[n].2 += 1;
+            }
+        }
+    }
+    for (name, error, runs) in &errors {
+        println!("{name:20} largest error {error:.2e} over {runs} runs");
+        assert!(*runs > 0, "no scene needs {name}");
+    }
+    assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let base = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\n{ALL_FILTERS}"));
+    let lit = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'sr'\n{ALL_FILTERS}"));
+    // What the reference is told differs from what the device is told, by one small thing.
+    let mut half_pixel = base.clone();
+    half_pixel.rays.origin += half_pixel.rays.right * 0.3;
+    let mut half_slice_pixel = base.clone();
+    half_slice_pixel.grid.origin[0] += 0.5 * half_slice_pixel.grid.pitch[0];
+    let mut swapped = lit.clone();
+    std::mem::swap(&mut swapped.settings.light.ambient, &mut swapped.settings.light.diffuse);
+    let mut mirrored = lit.clone();
+    mirrored.rays.direction_dx = -mirrored.rays.direction_dx;
+    let mut toned = base.clone();
+    toned.settings.post.brightness += 2.5 / 255.0;
+    let mut narrow = base.clone();
+    narrow.settings.slices.sigma.as_mut().expect("sigma").sigma *= 0.8;
+    let cases: [(&str, &str, &Scene, &Scene); 6] = [
+        ("half a pixel", "raycast_volume", &base, &half_pixel),
+        ("half a slice pixel", "scan_convert", &base, &half_slice_pixel),
+        ("ambient and diffuse swapped", "light", &lit, &swapped),
+        ("mirrored", "raycast_surface", &lit, &mirrored),
+        ("two levels brighter", "tone", &base, &toned),
+        ("a narrower sigma", "sigma_slice", &base, &narrow),
+    ];
+    for (fault, name, told, wrong) in cases {
+        let pass = echolume::passes::by_name(name).expect("pass");
+        let (inputs, right, got, writes) = run_one(&mut single, told, pass, "noise", 5);
+        compare(pass, told, &right, &got, &writes).expect("unperturbed");
+        let turn = Turn { layer: 2, slice: told.slices() / 2, iteration: 0, image: 0 };
+        let mut expected = Arrays::default();
+        for bind in &writes {
+            let channels = bind.slot.format(told).channels();
+            expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
+        }
+        (pass.reference)(wrong, &turn, &inputs, &mut expected);
+        assert!(compare(pass, told, &expected, &got, &writes).is_err(), "{fault} went unnoticed in {name}");
+    }
+    // One voxel.
+    let pass = echolume::passes::by_name("median_slice").expect("pass");
+    let (mut inputs, _, got, writes) = run_one(&mut single, &base, pass, "zero", 5);
+    let mut source = inputs.get("source").clone();
+    let middle = source.size[0] * (source.size[1] / 2) + source.size[0] / 2;
+    (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
+    inputs.insert("source", source);
+    let mut expected = Arrays::default();
+    expected.insert("target", Texels::untouched(size_of(writes[0].slot.shape(&base)), 1));
+    (pass.reference)(&base, &Turn::default(), &inputs, &mut expected);
+    assert!(compare(pass, &base, &expected, &got, &writes).is_err(), "changed pixels went unnoticed");
+}
+
+#[test]
+fn what_is_outside_the_sector_is_not_touched() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
+    let pass = echolume::passes::by_name("scan_convert").expect("pass");
+    let (_, expected, got, _) = run_one(&mut single, &scene, pass, "one", 1);
+    let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
+    let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();
+    let poison = Texels::decode(
+        [1; 3],
+        Slot::Volume.format(&scene),
+        &Texels::from_fn([1; 3], 1, |_, _| POISON).encode(Slot::Volume.format(&scene)),
+    );
+    let slice =
+        &got.get("target").values[(scene.slices() / 2 * width * height) as usize..][..(width * height) as usize];
+    let left = slice.iter().filter(|v| **v == poison.values[0]).count();
+    assert!(outside > 500, "a sector leaves corners: {outside}");
+    assert_eq!(left, outside);
+}

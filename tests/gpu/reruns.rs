@@ -1,0 +1,145 @@
+//! What runs again after a change, counted from recorded dispatches; and barriers left out, seen by validation.
+
+use crate::common::*;
+use echolume::gpu::{Choice, Context, ContextOptions, Renderer};
+use echolume::passes::{PASSES, Stage};
+use echolume::plan::{Plan, Rerun};
+use echolume::probe::Geometry;
+use echolume::scene::Scene;
+
+const SETTINGS: &str = "mode = 'sr'
+    picture = { size = [24, 24] }
+    slices = { pixels = 40, median = true, smooth = { lateral = 1.0, depth = 1.0, elevation = 0.7 } }
+    distance = { median = 3, bilateral = { pixels = 1.0, distance = 2.0 } }
+    post = { sigma = { window = 3, sigma = 0.1 } }";
+
+fn with(more: &str) -> Scene {
+    scene(Geometry::Sweep(wobbler()), BYTES, &format!("{SETTINGS}\n{more}"))
+}
+
+fn drawn(device: &Device) -> Renderer {
+    let scene = with("");
+    let frames = body_frames(&scene, |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+    let mut renderer = rendered(device, scene, &frames);
+    renderer.picture().expect("picture");
+    renderer
+}
+
+#[test]
+fn a_change_runs_again_what_it_touches_and_nothing_else() {
+    let device = Device::new();
+    let mut renderer = drawn(&device);
+    let picture = renderer.picture().expect("picture");
+    assert_eq!(renderer.dispatched(|r| r.picture()).unwrap(), [""; 0], "nothing changed, nothing runs");
+
+    let stages = |names: &[&str]| -> Vec<Stage> {
+        let mut stages: Vec<_> = PASSES.iter().filter(|p| names.contains(&p.name)).map(|p| p.stage).collect();
+        stages.dedup();
+        stages
+    };
+    let cases: [(&str, &[Stage]); 5] = [
+        ("camera = { azimuth = 10 }", &[Stage::Raycast, Stage::Shade, Stage::Postprocess]),
+        ("surface = { threshold = 0.2 }", &[Stage::Raycast, Stage::Shade, Stage::Postprocess]),
+        ("light = { direction = [1.0, 0.0, 0.5] }", &[Stage::Shade, Stage::Postprocess]),
+        ("", &[Stage::Shade, Stage::Postprocess]),
+        ("", &[]),
+    ];
+    renderer.change(with("camera = { azimuth = 10 }")).expect("change");
+    renderer.change(with("")).expect("change");
+    renderer.picture().expect("picture");
+    for (i, (change, expected)) in cases.iter().enumerate() {
+        // The light case starts from the plain scene, so that only the light differs.
+        if i == 2 {
+            renderer.change(with("")).expect("change");
+            renderer.picture().expect("picture");
+        }
+        let names = renderer
+            .dispatched(|r| {
+                r.change(with(change))?;
+                r.picture()
+            })
+            .expect("picture");
+        assert_eq!(stages(&names), *expected, "{change}: {names:?}");
+        if *expected == [Stage::Shade, Stage::Postprocess] {
+            assert_eq!(names[0], "light", "filters of the distance map need not run for a light");
+        }
+    }
+    assert_eq!(renderer.picture().expect("picture"), picture, "back where it was");
+
+    let tone = SETTINGS.replace("window = 3, sigma = 0.1 }", "window = 3, sigma = 0.1 }, gamma = 2.0");
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, &tone);
+    let names = renderer.dispatched(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
+    assert_eq!(names, ["tone"]);
+}
+
+#[test]
+fn a_filter_switched_on_keeps_the_volume_and_a_frame_goes_through_stage_one_alone() {
+    let device = Device::new();
+    let mut renderer = drawn(&device);
+    let plain = SETTINGS.replace("median = 3, bilateral = { pixels = 1.0, distance = 2.0 }", "");
+    let unfiltered = scene(Geometry::Sweep(wobbler()), BYTES, &plain);
+    let names = renderer.dispatched(|r| r.change(unfiltered.clone()).and_then(|_| r.picture())).expect("picture");
+    assert_eq!(names, ["light", "sigma_picture", "tone"]);
+    let names = renderer.dispatched(|r| r.change(with("")).and_then(|_| r.picture())).expect("picture");
+    assert_eq!(names, ["median_distance", "bilateral_distance", "light", "sigma_picture", "tone"]);
+
+    let frame = vec![0u8; renderer.frame_bytes()];
+    let names = renderer.dispatched(|r| r.frame(3, &frame, 0)).expect("frame");
+    assert_eq!(names, ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_depth"]);
+
+    let sharper =
+        SETTINGS.replace("median = true, smooth = { lateral = 1.0", "median = true, smooth = { lateral = 1.2");
+    let sharper = scene(Geometry::Sweep(wobbler()), BYTES, &sharper);
+    let plan = Plan::new(&sharper);
+    assert_eq!(plan.rerun(&with(""), &sharper), Rerun::Frames);
+}
+
+#[test]
+fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
+    let names = |toml: &str| {
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml);
+        let plan = Plan::new(&scene);
+        let passes: Vec<_> = plan.steps.iter().map(|s| s.pass.name).collect();
+        let slots: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
+        (passes.join(" "), slots.join(" "))
+    };
+    let (passes, slots) = names("mode = 'vr'");
+    assert_eq!(passes, "scan_convert raycast_volume tone");
+    assert_eq!(slots, "frames scan_lut volume sweep_lut transfer picture screen");
+    let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
+    assert_eq!(
+        passes,
+        "scan_convert raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
+    );
+    assert_eq!(slots, "frames scan_lut volume sweep_lut distance_map distance_a distance_b surface picture screen");
+    let (passes, slots) = names("mode = 'vr'\nslices = { sigma = { window = 5, sigma = 0.0 } }");
+    assert_eq!(passes, "scan_convert raycast_volume tone", "a sigma of 0 changes nothing");
+    assert!(!slots.contains("slice_a"));
+}
+
+/// The layer sees a missing barrier between a writer and a reader (not between two writers: that is the oracle's).
+#[test]
+fn a_dropped_barrier_is_seen_by_synchronization_validation() {
+    let recorded = drawn(&Device::new()).barriers();
+    assert!(recorded > 20, "{recorded}");
+    let mut seen = 0;
+    let tried = recorded.min(60);
+    for n in 1..=tried {
+        let options = ContextOptions { device: Choice::Best, validation: true };
+        let device = Device(Context::new(&options).expect("device"));
+        let scene = with("");
+        let frames = body_frames(&scene, |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+        let mut renderer = Renderer::new(&device, scene, &Default::default()).expect("renderer");
+        renderer.drop_barrier(n);
+        send(&mut renderer, &frames, 0);
+        renderer.picture().expect("picture");
+        drop(renderer);
+        let messages = device.0.messages();
+        assert!(messages.iter().all(|m| m.contains("SYNC-HAZARD")), "{messages:?}");
+        seen += u32::from(!messages.is_empty());
+        // The messages were asked for.
+        std::mem::forget(device);
+    }
+    println!("{seen} of {tried} dropped barriers were seen");
+    assert!(seen * 2 > tried, "only {seen} of {tried} were seen");
+}

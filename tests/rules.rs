@@ -1,0 +1,191 @@
+//! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
+//! Needs no GPU.
+
+use echolume::passes::{PASSES, Pass, contract};
+use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::scene::{Input, Scene};
+use echolume::shader_source;
+use echolume::source::StoredType;
+use echolume::spirv;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+fn top() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every Rust file below a folder, with its path from the top.
+fn sources(folder: &str) -> Vec<(String, String)> {
+    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").path()) {
+            match entry.is_dir() {
+                true => walk(&entry, found),
+                false if entry.extension().is_some_and(|e| e == "rs") => found.push(entry),
+                false => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk(&top().join(folder), &mut found);
+    found.sort();
+    let name = |p: &PathBuf| p.strip_prefix(top()).expect("below the top").to_string_lossy().into_owned();
+    found.iter().map(|p| (name(p), std::fs::read_to_string(p).expect("source"))).collect()
+}
+
+/// Code without comments: a doc comment may name what the code may not use.
+fn code(text: &str) -> String {
+    text.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn layers_hold() {
+    // A folder or file, and what it must not name.
+    let rules: &[(&str, &[&str])] = &[
+        ("src/scene", &["crate::gpu", "crate::passes", "crate::plan", "crate::barriers", "ash::vk"]),
+        ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
+        ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
+        ("src/plan.rs", &["crate::gpu", "ash::vk"]),
+        ("src/barriers.rs", &["crate::gpu", "ash::vk"]),
+        ("src/spirv.rs", &["crate::gpu", "crate::passes", "ash::vk"]),
+        ("src/shader_source.rs", &["crate::", "ash::vk"]),
+        ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::report", "ash::vk"]),
+        ("src/report", &["crate::gpu", "ash::vk"]),
+        ("src/cli", &["ash::vk", "use ash"]),
+    ];
+    let all = sources("src");
+    for (place, forbidden) in rules {
+        let within: Vec<_> = all.iter().filter(|(name, _)| name.starts_with(place)).collect();
+        assert!(!within.is_empty(), "{place} is gone");
+        for (name, text) in within {
+            for word in *forbidden {
+                assert!(!code(text).contains(word), "{name} names {word}, which its layer does not know");
+            }
+        }
+    }
+    for (name, text) in &all {
+        let text = code(text);
+        let in_gpu = name.starts_with("src/gpu/");
+        assert!(in_gpu || !text.contains("use ash"), "{name} imports ash");
+        assert!(in_gpu || !text.contains("unsafe {"), "{name} has unsafe code");
+        assert!(
+            !text.contains(".unwrap()") || name.contains("test") || text.contains("#[cfg(test)]"),
+            "{name} unwraps"
+        );
+    }
+}
+
+#[test]
+fn every_unsafe_block_has_its_reason() {
+    for (name, text) in sources("src/gpu") {
+        let lines: Vec<&str> = text.lines().collect();
+        for (i, line) in lines.iter().enumerate().filter(|(_, l)| l.contains("unsafe {")) {
+            let reasoned = (i.saturating_sub(6)..=i).any(|j| lines[j].contains("// SAFETY:"));
+            assert!(reasoned, "{name}:{}: {}", i + 1, line.trim());
+        }
+    }
+}
+
+#[test]
+fn the_embedded_shaders_are_what_their_sources_say() {
+    let text = std::fs::read_to_string(top().join("spirv/SOURCES")).expect("spirv/SOURCES");
+    let known: BTreeMap<&str, &str> = text.lines().filter_map(|l| l.split_once("  ")).map(|(h, n)| (n, h)).collect();
+    let sources = shader_source::sources(&top().join("glsl")).expect("glsl");
+    for source in &sources {
+        let hash: String = Sha256::digest(source.fingerprint()).iter().map(|b| format!("{b:02x}")).collect();
+        assert_eq!(known.get(source.name.as_str()), Some(&hash.as_str()), "{}: run tools/shaders", source.name);
+        assert!(spirv::embedded(&source.name).is_some(), "{} is not embedded", source.name);
+    }
+    assert_eq!(known.len(), sources.len(), "spirv/ has shaders that glsl/ has not");
+    assert_eq!(spirv::EMBEDDED.len(), sources.len());
+}
+
+fn scenes() -> Vec<Scene> {
+    let fan = Probe {
+        array: Array::Curved { radius: 30.0 },
+        lines: Axis::centred(0.05, 16),
+        start_depth: 0.0,
+        sample_pitch: 0.5,
+        samples: 64,
+        motion: Motion::Fan { wobble_radius: 15.0 },
+        slices: Axis::centred(0.05, 8),
+        advance: Advance::None,
+        sound_speed: 1540.0,
+    };
+    let uneven = Axis::from_table((0..8).map(|k| 0.05 * k as f64 + 0.01 * (k as f64).sin()).collect());
+    let advance = Advance::Same(0.02);
+    let grid = Grid { size: [8, 8, 8], spacing: [1.0; 3], origin: [0.0; 3] };
+    let geometries = [
+        Geometry::Sweep(fan.clone()),
+        Geometry::Sweep(Probe { advance: advance.clone(), ..fan.clone() }),
+        Geometry::Sweep(Probe { slices: uneven.clone(), ..fan.clone() }),
+        Geometry::Sweep(Probe { slices: uneven, advance, ..fan.clone() }),
+        Geometry::Sweep(Probe { motion: Motion::Still { thickness: 1.0 }, slices: Axis::centred(1.0, 1), ..fan }),
+        Geometry::Cartesian(grid),
+    ];
+    let filters = [
+        "",
+        "slices = { median = true, sigma = {}, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\n\
+         distance = { median = 3, sigma = {}, bilateral = { pixels = 2.0, distance = 1.0 } }\npost = { sigma = {} }",
+        "slices = { median = true }",
+        "slices = { sigma = {} }",
+        "slices = { smooth = { lateral = 1.0 } }",
+    ];
+    let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+    let mut scenes = Vec::new();
+    for geometry in &geometries {
+        for filters in filters {
+            for mode in ["vr", "sr"] {
+                let settings = toml::from_str(&format!("mode = '{mode}'\n{filters}")).expect("settings");
+                scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
+            }
+        }
+    }
+    scenes
+}
+
+#[test]
+fn every_pass_agrees_with_every_shader_it_may_use() {
+    let mut used = Vec::new();
+    for scene in scenes() {
+        for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
+            let shader = (pass.shader)(&scene);
+            let bytes = spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
+            let module = spirv::reflect(&spirv::words(bytes)).expect("reflection");
+            contract::check(pass, &scene, &module).unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+            used.push(shader);
+        }
+    }
+    for (name, _) in spirv::EMBEDDED {
+        assert!(used.contains(name), "no scene uses {name}");
+    }
+}
+
+#[test]
+fn a_disagreement_names_both_sides() {
+    let scene = scenes().swap_remove(1);
+    let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone").unwrap())).unwrap();
+    let tone = echolume::passes::by_name("tone").unwrap();
+    let changed = |change: fn(&mut Pass)| {
+        let mut pass = Pass { ..*tone };
+        change(&mut pass);
+        contract::check(&pass, &scene, &module).unwrap_err()
+    };
+    let error = changed(|p| p.reads = |_, _| vec![echolume::passes::whole("pictur", echolume::passes::Slot::Picture)]);
+    assert!(error.contains("pictur") && error.contains("reads"), "{error}");
+    let error = changed(|p| p.params = |_, _| echolume::passes::Params::default().i32("brightness", 1));
+    assert!(error.contains("brightness") && error.contains("float"), "{error}");
+    let error = changed(|p| p.constants = |_| vec![("COLOUR", 1)]);
+    assert!(error.contains("COLOUR"), "{error}");
+    let error = changed(|p| p.writes = |_, _| vec![echolume::passes::whole("screen", echolume::passes::Slot::Volume)]);
+    assert!(error.contains("Three") && error.contains("Two"), "{error}");
+}
+
+#[test]
+fn pass_names_are_unique_and_stages_in_order() {
+    let mut names: Vec<_> = PASSES.iter().map(|p| p.name).collect();
+    assert!(PASSES.windows(2).all(|w| w[0].stage <= w[1].stage), "a pass runs before its stage");
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), PASSES.len());
+}
