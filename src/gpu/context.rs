@@ -130,7 +130,7 @@ impl Context {
         };
         let messages = Box::new(Mutex::new(Vec::new()));
         let messenger = options.validation.then(|| create_messenger(&entry, instance, &messages)).flatten();
-        Ok(Arc::new(Context {
+        let context = Arc::new(Context {
             push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
             // SAFETY: the device was created with one queue of this family.
@@ -146,7 +146,11 @@ impl Context {
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
             faults: Faults::default(),
-        }))
+        });
+        context.name(context.device.handle(), "device");
+        context.name(context.queue, "queue");
+        tracing::info!("device '{}', driver {}", context.candidate.name, context.candidate.driver.trim());
+        Ok(context)
     }
 
     /// What validation has said so far; silence is the pass mark.

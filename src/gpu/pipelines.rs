@@ -129,6 +129,8 @@ impl Pipeline {
         let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: as above.
         pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.doing(doing)?;
+        context.name(set_layout, key.0);
+        context.name(pipeline.layout, key.0);
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
             .doing(doing)?;
@@ -155,6 +157,7 @@ impl Pipeline {
         unsafe { device.destroy_shader_module(shader, None) };
         pipeline.handle = made.map_err(|(_, result)| result).doing(doing)?[0];
         context.name(pipeline.handle, key.0);
+        tracing::debug!("pipeline '{}' {:?}", key.0, key.1);
         Ok(pipeline)
     }
 }

@@ -133,18 +133,25 @@ impl Image {
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
         bound.doing(doing)?;
-        image.view = image.create_view(view_kind, 0, layers)?;
+        image.view = image.create_view(slot.name(), view_kind, 0, layers)?;
         if let Shape::Layers(_) = shape {
             for layer in 0..layers {
-                let view = image.create_view(vk::ImageViewType::TYPE_2D, layer, 1)?;
+                let view = image.create_view(slot.name(), vk::ImageViewType::TYPE_2D, layer, 1)?;
                 image.layers.push(view);
             }
         }
         context.name(handle, slot.name());
+        tracing::debug!("image '{}': {width}x{height}x{} {format:?}, {mebibytes} MiB", slot.name(), depth.max(layers));
         Ok(image)
     }
 
-    fn create_view(&self, kind: vk::ImageViewType, layer: u32, layers: u32) -> Result<vk::ImageView, GpuError> {
+    fn create_view(
+        &self,
+        name: &str,
+        kind: vk::ImageViewType,
+        layer: u32,
+        layers: u32,
+    ) -> Result<vk::ImageView, GpuError> {
         let range = vk::ImageSubresourceRange { base_array_layer: layer, layer_count: layers, ..WHOLE };
         let create = vk::ImageViewCreateInfo::default()
             .image(self.handle)
@@ -152,7 +159,10 @@ impl Image {
             .format(formats::vulkan(self.format))
             .subresource_range(range);
         // SAFETY: the image is bound to memory and alive.
-        unsafe { self.context.device.create_image_view(&create, None) }.doing(|| "create image view".into())
+        let view = unsafe { self.context.device.create_image_view(&create, None) };
+        let view = view.doing(|| format!("create a view of image '{name}'"))?;
+        self.context.name(view, name);
+        Ok(view)
     }
 }
 

@@ -28,7 +28,7 @@ fn light_through_a_constant_medium_follows_beer_and_lambert_at_any_step() {
             let mut renderer = rendered(&device, scene, &frames);
             renderer.picture().expect("picture");
             let picture = renderer.read(Slot::Picture).expect("read").expect("there");
-            let expected = 1.0 - (1.0 - opacity as f64).powf(thickness / 0.5);
+            let expected = 1.0 - (1.0f64 - opacity).powf(thickness / 0.5);
             let got = picture.get([4, 4, 0]);
             // The picture is R16F: 11 bits.
             assert!((got[3] - expected).abs() <= expected / 1500.0 + 1e-7, "step {step}, opacity {opacity}: {got:?}");
@@ -40,7 +40,8 @@ fn light_through_a_constant_medium_follows_beer_and_lambert_at_any_step() {
 #[test]
 fn ten_thousand_thin_samples_and_an_opaque_one_keep_their_digits() {
     let device = Device::new();
-    for (opacity, step, tolerance) in [(1e-4, 0.002, 1e-3), (1e-7, 0.002, 2e-3), (1.0, 1e-3, 0.0), (0.999, 30.0, 1e-3)]
+    for (opacity, step, tolerance) in
+        [(1e-4f64, 0.002, 1e-3), (1e-7, 0.002, 2e-3), (1.0, 1e-3, 0.0), (0.999, 30.0, 1e-3)]
     {
         let toml = format!(
             "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {step}, early_end = 0.0 }}\n\
@@ -51,7 +52,7 @@ fn ten_thousand_thin_samples_and_an_opaque_one_keep_their_digits() {
         let mut renderer = rendered(&device, scene, &frames);
         renderer.picture().expect("picture");
         let got = renderer.read(Slot::Picture).expect("read").expect("there").get([1, 1, 0])[3];
-        let expected = -(40.0 * (-opacity as f64).ln_1p()).exp_m1();
+        let expected = -(40.0 * (-opacity).ln_1p()).exp_m1();
         assert!(got.is_finite() && (0.0..=1.0).contains(&got));
         // 4e-6 is below R16F's normal numbers, which are 6e-8 apart there.
         assert!((got - expected).abs() <= tolerance * expected + 6e-8, "opacity {opacity}: {got} for {expected}");

@@ -122,22 +122,11 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
             },
             ("zero", true) => MISS,
             ("one", true) => 42.0,
-            ("hot", true) => {
-                if i == count / 2 {
-                    33.0
-                } else {
-                    MISS
-                }
-            }
+            ("hot", true) if i == count / 2 => 33.0,
+            ("hot", true) => MISS,
             ("noise", false) => noise.next(),
             ("one", false) => 1.0,
-            ("hot", false) => {
-                if i == count / 2 {
-                    1.0
-                } else {
-                    0.0
-                }
-            }
+            ("hot", false) if i == count / 2 => 1.0,
             _ => 0.0,
         };
     }
