@@ -99,6 +99,8 @@ pub fn accesses(scene: &Scene, pass: &Pass, turn: &Turn) -> Vec<Access> {
 #[derive(Clone, Debug, Default)]
 pub struct Tracker {
     pending: Vec<(Access, Workers)>,
+    /// Something that was recorded may never have run.
+    unsure: bool,
 }
 
 impl Tracker {
@@ -107,16 +109,23 @@ impl Tracker {
         let hazard = accesses.iter().any(|later| {
             self.pending.iter().any(|(earlier, covered)| !covered.has(later.by) && earlier.conflicts(later))
         });
-        let barrier = hazard.then(|| self.barrier(accesses));
+        let barrier = (hazard || self.unsure).then(|| self.barrier(accesses));
         for access in accesses {
             self.record(access);
         }
         barrier
     }
 
+    /// What was recorded last was not submitted, so its barriers do not count: the next operation waits for everything.
+    pub fn doubt(&mut self) {
+        self.unsure = true;
+    }
+
     fn barrier(&mut self, accesses: &[Access]) -> Barrier {
         let to = accesses.iter().fold(Workers::DEVICE, |to, a| to.with(a.by.into()));
-        let from = self.pending.iter().fold(Workers::default(), |from, (a, _)| from.with(a.by.into()));
+        let before = if self.unsure { Workers::DEVICE } else { Workers::default() };
+        let from = self.pending.iter().fold(before, |from, (a, _)| from.with(a.by.into()));
+        self.unsure = false;
         for (_, covered) in &mut self.pending {
             *covered = covered.with(to);
         }
@@ -223,6 +232,16 @@ mod tests {
         assert!(tracker.before(&[touch(Slot::Volume, 1..2, true)]).is_none());
         assert!(tracker.before(&[touch(Slot::Volume, 1..2, true)]).is_some(), "write after write, which layers miss");
         assert!(tracker.before(&[touch(Slot::Volume, 3..4, false)]).is_some());
+    }
+
+    #[test]
+    fn after_a_failed_submission_the_next_operation_waits_for_everything() {
+        let mut tracker = Tracker::default();
+        assert!(tracker.before(&[touch(Slot::Picture, 0..1, true)]).is_none());
+        tracker.doubt();
+        let barrier = tracker.before(&[touch(Slot::Distance, 0..1, false)]).expect("a barrier");
+        assert_eq!((barrier.from, barrier.to), (Workers::DEVICE, Workers::DEVICE));
+        assert!(tracker.before(&[touch(Slot::Distance, 0..1, false)]).is_none());
     }
 
     #[test]

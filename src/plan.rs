@@ -3,6 +3,7 @@
 use crate::passes::slots::Filled;
 use crate::passes::{PASSES, Pass, Slot, Turn, When};
 use crate::scene::Scene;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// One dispatch of a plan; a pass that repeats has several.
@@ -130,7 +131,44 @@ impl Plan {
     }
 }
 
+/// Which step (pass and iteration) wrote a slot last.
+pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
+
+impl Plan {
+    /// Adds to `stale` (one entry a step) the steps whose results a stale step reads but that are no longer in their slot,
+    /// because a later filter of the same chain has used the slot since. `contents` is what the slots hold now.
+    pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
+        'again: loop {
+            let mut now = contents.clone();
+            for (i, step) in self.steps.iter().enumerate().filter(|(_, s)| s.pass.when != When::Frame) {
+                if !stale[i] {
+                    continue;
+                }
+                for bind in (step.pass.reads)(scene, &step.turn()) {
+                    let writer = self.steps[..i].iter().rposition(|s| s.writes(scene).contains(&bind.slot));
+                    let Some(j) = writer.filter(|j| self.steps[*j].pass.when != When::Frame) else { continue };
+                    if now.get(&bind.slot) != Some(&self.steps[j].id()) {
+                        stale[j] = true;
+                        continue 'again;
+                    }
+                }
+                now.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
+            }
+            return;
+        }
+    }
+}
+
 impl Step {
+    pub fn id(&self) -> (&'static str, u32) {
+        (self.pass.name, self.iteration)
+    }
+
+    /// Slots that it writes.
+    pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
+        (self.pass.writes)(scene, &self.turn()).iter().map(|b| b.slot).collect()
+    }
+
     pub fn turn(&self) -> Turn {
         Turn { iteration: self.iteration, ..Turn::default() }
     }
@@ -142,7 +180,7 @@ impl Step {
     }
 
     fn is(&self, other: &Step) -> bool {
-        self.pass.name == other.pass.name && self.iteration == other.iteration
+        self.id() == other.id()
     }
 
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {

@@ -273,7 +273,12 @@ impl Tables {
             let Some(&offset) = self.offsets.get(&key) else {
                 return error(format!("parameter '{name}' has no offset"));
             };
-            module.params_size = module.params_size.max(offset + 4 * components);
+            // The least that every device allows for a uniform block.
+            let Some(end) = components.checked_mul(4).and_then(|size| size.checked_add(offset)).filter(|e| *e <= 16384)
+            else {
+                return error(format!("parameter '{name}' lies beyond 16384 bytes"));
+            };
+            module.params_size = module.params_size.max(end);
             module.params.push(Member { name, offset, components, is_float, is_signed });
         }
         Ok(())

@@ -36,7 +36,8 @@ void main() {
     int rank = (valid - 1) / 2;
     float found = low;
     while (low < high) {
-        float guess = 0.5 * low + 0.5 * high;
+        // Clamped: halves of the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
+        float guess = clamp(0.5 * low + 0.5 * high, low, high);
         int below = 0, equal = 0;
         float under = low, over = high;
         for (int y = -RADIUS; y <= RADIUS; ++y) {

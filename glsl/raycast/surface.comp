@@ -24,22 +24,27 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
     int count = ray.leave > ray.enter ? int((ray.leave - ray.enter) / step_length) : 0;
+    // The region bounds where surfaces lie, not what the detector may look at: its ring is filled before the region begins,
+    // and an edge that rises inside may peak behind it. Nothing lies behind the camera.
+    int first = max(-RING / 2 * ROUGH, int(ceil(-ray.enter / step_length - 0.5)));
+    int end = count > 0 ? count + RING / 2 * ROUGH + RING : first;
 
     const int start = ROUGH > 1 ? SEARCH_ROUGH : SEARCH_FINE;
     int state = start;
     int stride = ROUGH;
-    int limit = 0x7fffffff;  // the fine search gives up here
-    int segment = 0;         // first sample since the ray entered the insonified region
+    int limit = 0x7fffffff; // the fine search gives up here
+    int segment = first;    // first sample since the ray entered the insonified region
     int filled = 0;
     int fired = 0;
     bool found = false;
     vec4 older = vec4(0.0), newer = vec4(0.0);
     float previous = 0.0;
-    // The largest difference since the crossing, its neighbours, its sample and the echo behind it.
+    // The largest difference since the crossing, its neighbours, its sample and the echo behind it. Until the sample after it
+    // is known it may not be the largest, and there is no surface.
     float best = 0.0, before = 0.0, after = 0.0, echo = 0.0;
     int best_at = 0;
 
-    for (int i = 0; i < count;) {
+    for (int i = first; i < end;) {
         vec3 p = ray.origin + ray.direction * (ray.enter + (float(i) + 0.5) * step_length);
         vec3 texel;
         if (!locate(p, texel)) {
@@ -68,15 +73,15 @@ void main() {
                 continue;
             }
         } else if (state == SEARCH_FINE) {
-            if (ready && difference > threshold) {
+            // A crossing: an edge that was there before the region began is not one.
+            if (ready && i >= RING / 2 && difference > threshold && (filled == RING || previous <= threshold)) {
                 state = FOLLOW;
                 fired = i;
                 best = difference;
                 best_at = i;
                 before = filled > RING ? previous : difference;
-                after = difference;
                 echo = dot(newer, vec4(0.25));
-                found = true;
+                found = PEAK == 0;
                 if (PEAK == 0) break;
             } else if (ROUGH > 1 && i >= limit) {
                 // A false alarm: the rough ring is refilled so that its next word is about what the fine one has not seen.
@@ -88,13 +93,16 @@ void main() {
                 continue;
             }
         } else {
-            if (i == best_at + 1) after = difference;
+            if (i == best_at + 1) {
+                after = difference;
+                found = true;
+            }
             if (i >= fired + RING) break;
             if (difference > best) {
                 best = difference;
                 best_at = i;
                 before = previous;
-                after = difference;
+                found = false;
                 echo = dot(newer, vec4(0.25));
             }
         }
@@ -110,8 +118,10 @@ void main() {
             float shift = bend < 0.0 && before < best && after < best ? 0.5 * (before - after) / bend : 0.0;
             place += shift - 0.5 * float(RING - 1);
         }
-        distance = ray.enter + (place + 0.5) * step_length;
+        float at = (place + 0.5) * step_length;
+        found = at >= 0.0 && at <= ray.leave - ray.enter;
+        if (found) distance = ray.enter + at;
     }
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
-    imageStore(surface, pixel, vec4(echo, found ? 1.0 : 0.0, 0.0, 0.0));
+    imageStore(surface, pixel, vec4(found ? echo : 0.0, found ? 1.0 : 0.0, 0.0, 0.0));
 }

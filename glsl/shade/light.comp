@@ -2,7 +2,6 @@
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {
-    vec3 origin;
     vec3 origin_dx;
     vec3 origin_dy;
     vec3 direction;
@@ -24,11 +23,6 @@ uniform writeonly image2D picture;
 
 vec3 ray_direction(vec2 at) { return normalize(direction + direction_dx * at.x + direction_dy * at.y); }
 
-vec3 place(ivec2 pixel, float distance) {
-    vec2 at = vec2(pixel) + 0.5;
-    return origin + origin_dx * at.x + origin_dy * at.y + ray_direction(at) * distance;
-}
-
 float distance_at(ivec2 pixel) {
     ivec2 size = textureSize(distance_map, 0);
     if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, size))) return MISS;
@@ -41,9 +35,12 @@ vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 facing) {
     float back = distance_at(pixel - along), on = distance_at(pixel + along);
     bool use_back = abs(back - here) <= cliff, use_on = abs(on - here) <= cliff;
     if (!use_back && !use_on) return facing;
-    vec3 from = use_back ? place(pixel - along, back) : place(pixel, here);
-    vec3 to = use_on ? place(pixel + along, on) : place(pixel, here);
-    return to - from;
+    ivec2 first = use_back ? pixel - along : pixel, second = use_on ? pixel + along : pixel;
+    float near = use_back ? back : here, far = use_on ? on : here;
+    vec3 first_ray = ray_direction(vec2(first) + 0.5), second_ray = ray_direction(vec2(second) + 0.5);
+    vec2 steps = vec2(second - first);
+    // The difference of two places, term by term: subtracting the places would cancel all but a few of f32's digits.
+    return origin_dx * steps.x + origin_dy * steps.y + second_ray * (far - near) + (second_ray - first_ray) * near;
 }
 
 void main() {
@@ -67,9 +64,9 @@ void main() {
     float facing = max(dot(normal, to_light), 0.0);
     vec3 halfway = to_light - along_ray;
     float half_length = length(halfway);
-    float gloss = half_length > 1e-6 ? max(dot(normal, halfway) / half_length, 0.0) : 0.0;
+    float gloss = half_length > 1e-6 ? clamp(dot(normal, halfway) / half_length, 0.0, 1.0) : 0.0;
     // pow(0, 0) is undefined: a gloss of 0 shines nowhere unless the exponent is 0, when it shines evenly.
-    float shine = shininess == 0.0 ? 1.0 : (gloss > 0.0 ? pow(gloss, shininess) : 0.0);
+    float shine = shininess == 0.0 ? 1.0 : (gloss > 0.0 ? min(pow(gloss, shininess), 1.0) : 0.0);
     vec2 echo = texelFetch(surface, pixel, 0).xy;
     vec3 colour = surface_colour * mix(1.0, echo.x, texture_share * echo.y);
     vec3 lit = light_colour * (colour * (ambient + diffuse * facing) + vec3(specular * shine * (facing > 0.0 ? 1.0 : 0.0)));

@@ -173,8 +173,7 @@ impl Render {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        renderer.show(0);
-        Ok(())
+        renderer.show(0).map_err(failed)
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {

@@ -31,7 +31,7 @@ pub struct Context {
     pub device: ash::Device,
     pub push_descriptor: ash::khr::push_descriptor::Device,
     names: Option<ash::ext::debug_utils::Device>,
-    pub queue: vk::Queue,
+    queue: Mutex<vk::Queue>,
     /// Families that slots which cross queues are shared between; one here until a device offers more.
     pub queue_families: Vec<u32>,
     /// Taken in `drop`, before the device goes.
@@ -61,7 +61,9 @@ fn create_instance(entry: &ash::Entry, validation: bool, debug_utils: bool) -> R
         .engine_name(c"echolume")
         .api_version(vk::API_VERSION_1_3);
     let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
-    let extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+    let mut extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+    // The layer itself brings this one.
+    extensions.extend(validation.then_some(ash::ext::validation_features::NAME.as_ptr()));
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
     let mut create = vk::InstanceCreateInfo::default()
@@ -129,12 +131,23 @@ impl Context {
             }
         };
         let messages = Box::new(Mutex::new(Vec::new()));
-        let messenger = options.validation.then(|| create_messenger(&entry, instance, &messages)).flatten();
+        let messenger = match options.validation {
+            false => None,
+            true => match create_messenger(&entry, instance, &messages) {
+                Ok(messenger) => Some(messenger),
+                Err(error) => {
+                    drop(allocator);
+                    // SAFETY: nothing made from the device is left.
+                    unsafe { device.destroy_device(None) };
+                    return Err(error);
+                }
+            },
+        };
         let context = Arc::new(Context {
             push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
             // SAFETY: the device was created with one queue of this family.
-            queue: unsafe { device.get_device_queue(candidate.queue_family, 0) },
+            queue: Mutex::new(unsafe { device.get_device_queue(candidate.queue_family, 0) }),
             queue_families: vec![candidate.queue_family],
             limits: candidate.limits,
             instance: instance.clone(),
@@ -148,7 +161,8 @@ impl Context {
             faults: Faults::default(),
         });
         context.name(context.device.handle(), "device");
-        context.name(context.queue, "queue");
+        let queue = *context.queue.lock().unwrap_or_else(|e| e.into_inner());
+        context.name(queue, "queue");
         tracing::info!("device '{}', driver {}", context.candidate.name, context.candidate.driver.trim());
         Ok(context)
     }
@@ -192,10 +206,33 @@ impl Context {
     pub(super) fn submit(&self, submit: &vk::SubmitInfo2, doing: impl FnOnce() -> String) -> Result<(), GpuError> {
         self.faults
             .pass(Seam::Submit)
-            // SAFETY: the queue is used by one thread (a renderer is not shared); the command buffer in `submit` is recorded
-            // and what it names is alive until the timeline says it is done.
-            .and_then(|()| unsafe { self.device.queue_submit2(self.queue, &[*submit], vk::Fence::null()) })
+            .and_then(|()| {
+                let queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
+                // SAFETY: the lock keeps the queue to one thread; the command buffer in `submit` is recorded and what it names is
+                // alive until the timeline says it is done.
+                unsafe { self.device.queue_submit2(*queue, &[*submit], vk::Fence::null()) }
+            })
             .doing(doing)
+    }
+
+    pub(super) fn wait_idle(&self) {
+        let _queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
+        // SAFETY: the lock keeps every queue of the device to this thread.
+        let _ = unsafe { self.device.device_wait_idle() };
+    }
+
+    /// The largest image of this kind, and its bytes.
+    pub fn image_limits(
+        &self,
+        format: vk::Format,
+        kind: vk::ImageType,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<vk::ImageFormatProperties, GpuError> {
+        let (device, tiling) = (self.candidate.handle, vk::ImageTiling::OPTIMAL);
+        let none = vk::ImageCreateFlags::empty();
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        unsafe { self.instance.get_physical_device_image_format_properties(device, format, kind, tiling, usage, none) }
+            .doing(|| format!("use {format:?} as {usage:?}"))
     }
 }
 
@@ -227,7 +264,7 @@ fn create_messenger(
     entry: &ash::Entry,
     instance: &ash::Instance,
     messages: &Mutex<Vec<String>>,
-) -> Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)> {
+) -> Result<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT), GpuError> {
     let debug = ash::ext::debug_utils::Instance::new(entry, instance);
     let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
@@ -236,8 +273,8 @@ fn create_messenger(
         .pfn_user_callback(Some(on_message))
         .user_data(std::ptr::from_ref(messages).cast_mut().cast());
     // SAFETY: `messages` is boxed in the context and dropped after the messenger.
-    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) }.ok()?;
-    Some((debug, messenger))
+    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) };
+    messenger.map(|m| (debug, m)).doing(|| "create messenger".into())
 }
 
 unsafe extern "system" fn on_message(

@@ -30,6 +30,10 @@ pub enum GpuError {
     FrameSize { got: usize, expected: usize },
     #[error("frame for slice {slice}, the volume has {slices}")]
     FrameSlice { slice: u32, slices: u32 },
+    #[error("volume image {image}: there are {images}")]
+    VolumeImage { image: u32, images: u32 },
+    #[error("the last change of scene failed ({0}); the next one builds everything anew")]
+    Broken(String),
     #[error("the device did not finish within {seconds} s; last submitted: {doing}")]
     TimedOut { seconds: u64, doing: String },
 }

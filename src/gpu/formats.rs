@@ -30,7 +30,9 @@ pub fn usage(slot: Slot) -> vk::ImageUsageFlags {
 }
 
 fn features(slot: Slot, scene: &Scene) -> vk::FormatFeatureFlags {
-    let mut features = vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::TRANSFER_DST;
+    let mut features = vk::FormatFeatureFlags::SAMPLED_IMAGE
+        | vk::FormatFeatureFlags::TRANSFER_DST
+        | vk::FormatFeatureFlags::TRANSFER_SRC;
     if usage(slot).contains(vk::ImageUsageFlags::STORAGE) {
         features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
     }
@@ -49,6 +51,10 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
             true => Ok(()),
             false => Err(GpuError::Limit { what: what(), needed: needed.into(), allowed: allowed.into() }),
         };
+        let bytes = slot.bytes(scene);
+        if bytes > context.candidate.max_bytes {
+            return Err(GpuError::Limit { what: what(), needed: bytes, allowed: context.candidate.max_bytes });
+        }
         match slot.shape(scene) {
             Shape::Buffer(bytes) => {
                 within(bytes, limits.max_storage_buffer_range)?;
@@ -69,6 +75,14 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
                 format: format!("{format:?}"),
                 usage: format!("{:?}", needed & !context.format_features(format)),
             });
+        }
+        let kind = match slot.shape(scene) {
+            Shape::Three(_) => vk::ImageType::TYPE_3D,
+            _ => vk::ImageType::TYPE_2D,
+        };
+        let allowed = context.image_limits(format, kind, usage(slot))?.max_resource_size;
+        if bytes > allowed {
+            return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
         }
     }
     Ok(())

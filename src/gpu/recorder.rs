@@ -51,6 +51,8 @@ pub struct Recorder {
     /// The submission whose times were added last.
     collected_to: u64,
     label: &'static str,
+    /// Begun and not submitted.
+    recording: bool,
 }
 
 impl Recorder {
@@ -74,6 +76,7 @@ impl Recorder {
             done_at: 0,
             collected_to: 0,
             label,
+            recording: false,
         };
         recorder.commands = commands.doing(|| "create commands".into())?[0];
         context.name(recorder.commands, label);
@@ -81,7 +84,10 @@ impl Recorder {
     }
 
     /// Waits until the last submission is done, then starts anew.
-    pub fn begin(&mut self, timeline: &Timeline) -> Result<(), GpuError> {
+    pub fn begin(&mut self, order: &mut Order, timeline: &Timeline) -> Result<(), GpuError> {
+        if std::mem::replace(&mut self.recording, true) {
+            order.tracker.doubt();
+        }
         timeline.wait(self.done_at)?;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the device is done with this pool's only command buffer.
@@ -126,6 +132,7 @@ impl Recorder {
         timeline.submitted += 1;
         timeline.doing = self.label.to_string();
         self.done_at = timeline.submitted;
+        self.recording = false;
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use super::timeline::Timeline;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Texels, Turn, When};
 use crate::picture::Picture;
-use crate::plan::{Plan, Rerun};
+use crate::plan::{Contents, Plan, Rerun};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -49,6 +49,13 @@ pub struct Renderer {
     scene: Scene,
     /// Steps of the volume and the picture that have to run before the next picture.
     stale: Vec<bool>,
+    /// Which step wrote each slot last.
+    contents: Contents,
+    /// Why the last change of scene was left half done.
+    broken: Option<String>,
+    /// One-shot staging buffers, kept until the device is done with them.
+    uploads: Vec<Buffer>,
+    volume_images: u32,
     next_lane: usize,
     /// The volume image that is shown.
     shown: u32,
@@ -69,20 +76,24 @@ impl Renderer {
             lanes: Vec::new(),
             picture: Recorder::new(context, "picture")?,
             readback: readback(context, &scene)?,
-            slots: Slots::new(context, options.volume_images),
+            slots: Slots::new(context, options.volume_images.max(1)),
             steps,
             pipelines,
             timeline: Timeline::new(context)?,
             order: Order::default(),
             context: context.clone(),
             stale: vec![true; plan.steps.len()],
+            contents: Contents::new(),
+            broken: None,
+            uploads: Vec::new(),
+            volume_images: options.volume_images.max(1),
             plan,
             scene,
             next_lane: 0,
             shown: 0,
             times: Vec::new(),
         };
-        renderer.make_lanes()?;
+        renderer.lanes = lanes(context, &renderer.scene)?;
         renderer.fit()?;
         Ok(renderer)
     }
@@ -97,20 +108,7 @@ impl Renderer {
 
     /// Bytes of a frame as this scene expects it.
     pub fn frame_bytes(&self) -> usize {
-        let layers = u64::from(FRAMES_IN_FLIGHT);
-        (Slot::Frames.bytes(&self.scene) / layers) as usize
-    }
-
-    fn make_lanes(&mut self) -> Result<(), GpuError> {
-        self.lanes.clear();
-        let bytes = self.frame_bytes() as u64;
-        for _ in 0..FRAMES_IN_FLIGHT {
-            self.lanes.push(Lane {
-                recorder: Recorder::new(&self.context, "frame")?,
-                staging: Buffer::new(&self.context, "staging", bytes, Purpose::Staging)?,
-            });
-        }
-        Ok(())
+        frame_bytes(&self.scene) as usize
     }
 
     /// Makes and fills the slots that are not there yet.
@@ -119,7 +117,7 @@ impl Renderer {
         if new.is_empty() {
             return Ok(());
         }
-        self.picture.begin(&self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timeline)?;
         self.picture.clear_new(&mut self.order, &self.slots, &new);
         self.picture.submit(&mut self.timeline)?;
         for (slot, _) in new {
@@ -144,10 +142,24 @@ impl Renderer {
         let mut staging = Buffer::new(&self.context, "upload", slot.bytes(&self.scene), Purpose::Staging)?;
         let length = bytes.len().min(staging.bytes().len());
         staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-        self.picture.begin(&self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timeline)?;
         self.picture.copy_in(&mut self.order, &staging, image, Place { slot, copy, parts: 0..image.shape.parts() });
+        self.uploads.push(staging);
         self.picture.submit(&mut self.timeline)?;
-        self.timeline.wait_all()
+        self.timeline.wait_all()?;
+        self.uploads.clear();
+        Ok(())
+    }
+
+    /// Refuses to go on with a scene that was left half changed, or an image that is not there.
+    fn check(&self, image: u32) -> Result<(), GpuError> {
+        if let Some(fault) = &self.broken {
+            return Err(GpuError::Broken(fault.clone()));
+        }
+        match image < self.volume_images {
+            true => Ok(()),
+            false => Err(GpuError::VolumeImage { image, images: self.volume_images }),
+        }
     }
 
     /// Sends one frame through stage 1 into its slice of volume image `image`. Returns once the frame's bytes are copied; the
@@ -156,6 +168,7 @@ impl Renderer {
     /// # Errors
     /// A frame of the wrong size, a slice that is not there, a device that fails.
     pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
+        self.check(image)?;
         if bytes.len() != self.frame_bytes() {
             return Err(GpuError::FrameSize { got: bytes.len(), expected: self.frame_bytes() });
         }
@@ -166,7 +179,7 @@ impl Renderer {
         self.next_lane = (layer + 1) % self.lanes.len();
         let Lane { recorder, staging } = &mut self.lanes[layer];
         recorder.collect(&self.timeline, &mut self.times)?;
-        recorder.begin(&self.timeline)?;
+        recorder.begin(&mut self.order, &self.timeline)?;
         staging.bytes_mut().copy_from_slice(bytes);
         if let Some(frames) = self.slots.image(Slot::Frames, 0) {
             let place = Place { slot: Slot::Frames, copy: 0, parts: layer as u32..layer as u32 + 1 };
@@ -182,20 +195,34 @@ impl Renderer {
     }
 
     /// All frames of volume image `image` have been sent: the next picture shows it.
-    pub fn show(&mut self, image: u32) {
+    pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
+        self.check(image)?;
         self.shown = image;
         self.stale.iter_mut().for_each(|stale| *stale = true);
+        Ok(())
     }
 
-    /// Runs what changed since the last picture and brings the result back.
+    /// Runs what changed since the last picture and brings the result back; where nothing changed, nothing runs.
     pub fn picture(&mut self) -> Result<Picture, GpuError> {
+        self.check(self.shown)?;
+        let [width, height] = self.scene.picture_size();
+        if self.stale.iter().any(|stale| *stale) {
+            self.draw()?;
+        }
+        Ok(Picture { width, height, rgba: self.readback.bytes().to_vec() })
+    }
+
+    fn draw(&mut self) -> Result<(), GpuError> {
+        self.plan.complete(&self.scene, &mut self.stale, &self.contents);
         self.picture.collect(&self.timeline, &mut self.times)?;
-        self.picture.begin(&self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timeline)?;
         let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
         for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
             let turn = Turn { image: self.shown, ..step.turn() };
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             self.picture.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
+            // Taken as written from here on: if the submission fails, all of it is stale still.
+            self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
         }
         if let Some(screen) = self.slots.image(Slot::Screen, 0) {
             self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, &self.readback);
@@ -204,76 +231,88 @@ impl Renderer {
         self.picture.submit(&mut self.timeline)?;
         self.timeline.wait_all()?;
         self.stale.iter_mut().for_each(|stale| *stale = false);
-        let [width, height] = self.scene.picture_size();
-        Ok(Picture { width, height, rgba: self.readback.bytes().to_vec() })
+        Ok(())
     }
 
     /// Takes a new scene. What it changes is run with the next picture; when it says `Everything` or `Frames`, frames have to
     /// be sent again first.
+    ///
+    /// # Errors
+    /// A shader that does not compile or a slot that the device cannot hold at all leaves the old scene as it was. When memory
+    /// runs out half-way nothing can be drawn until another change succeeds; that one builds everything anew.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
         let plan = Plan::new(&scene);
-        let rerun = plan.rerun(&self.scene, &scene);
-        // Compiled before anything is given up, so that a failure leaves the old scene working.
+        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&self.scene, &scene) };
+        super::formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
-        self.timeline.wait_all()?;
-        let resized = scene.picture_size() != self.scene.picture_size();
-        let kept: Vec<&str> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.pass.name).collect();
-        self.stale = plan.steps.iter().map(|s| kept.contains(&s.pass.name)).collect();
-        self.plan = plan;
-        self.steps = steps;
-        self.scene = scene;
-        match &rerun {
-            Rerun::Everything => {
-                self.stale.iter_mut().for_each(|stale| *stale = true);
-                self.make_lanes()?;
-                self.fit()?;
-                for (slot, _) in self.slots.iter().collect::<Vec<_>>() {
-                    self.fill(slot)?;
-                }
-            }
-            Rerun::Frames => {
-                self.stale.iter_mut().for_each(|stale| *stale = true);
-                self.fit()?;
-                for (slot, _) in self.slots.iter().collect::<Vec<_>>() {
-                    self.fill(slot)?;
-                }
-            }
+        self.collect()?;
+        let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
+        self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
+        (self.plan, self.steps, self.scene) = (plan, steps, scene);
+        self.broken = None;
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
+    fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
+        let refilled = match rerun {
             Rerun::Steps { steps, slots } => {
-                self.fit()?;
                 steps.iter().for_each(|i| self.stale[*i] = true);
-                for slot in slots.clone() {
-                    self.fill(slot)?;
-                }
+                slots.clone()
             }
+            Rerun::Frames | Rerun::Everything => {
+                self.stale.iter_mut().for_each(|stale| *stale = true);
+                if *rerun == Rerun::Everything {
+                    self.slots.clear();
+                    self.lanes = lanes(&self.context, &self.scene)?;
+                    self.next_lane = 0;
+                }
+                self.plan.slots.clone()
+            }
+        };
+        self.fit()?;
+        for slot in refilled {
+            self.fill(slot)?;
         }
-        if resized {
+        if self.readback.size != Slot::Screen.bytes(&self.scene) {
             self.readback = readback(&self.context, &self.scene)?;
         }
-        Ok(rerun)
+        Ok(())
     }
 
     /// A slot's content now; none for a slot that the plan does not have, or one made by the CPU as a table.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
+        self.check(self.shown)?;
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
         let (format, size) = (image.format, size_of(image.shape));
         let copy = if slot.takes_turns() { self.shown } else { 0 };
         self.picture.collect(&self.timeline, &mut self.times)?;
-        self.picture.begin(&self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timeline)?;
         self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);
         self.picture.submit(&mut self.timeline)?;
-        self.timeline.wait_all()?;
+        let done = self.timeline.wait_all();
+        if done.is_err() {
+            // The copy may still be running.
+            self.uploads.push(buffer);
+            return done.map(|()| None);
+        }
         Ok(Some(Texels::decode(size, format, buffer.bytes())))
     }
 
     /// Times of every pass since the last call, and of what was copied. Empty where the device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
+        self.collect()?;
+        Ok(std::mem::take(&mut self.times))
+    }
+
+    /// Waits until the device has done everything, and adds up what was measured.
+    fn collect(&mut self) -> Result<(), GpuError> {
         self.timeline.wait_all()?;
         for lane in &mut self.lanes {
             lane.recorder.collect(&self.timeline, &mut self.times)?;
         }
-        self.picture.collect(&self.timeline, &mut self.times)?;
-        Ok(std::mem::take(&mut self.times))
+        self.picture.collect(&self.timeline, &mut self.times)
     }
 
     /// Names of the passes that `work` dispatched, in order.
@@ -302,6 +341,20 @@ fn pipelines_of(pipelines: &mut Pipelines, plan: &Plan, scene: &Scene) -> Result
     plan.steps.iter().map(|step| pipelines.get(step.pass, scene)).collect()
 }
 
+fn frame_bytes(scene: &Scene) -> u64 {
+    Slot::Frames.bytes(scene) / u64::from(FRAMES_IN_FLIGHT)
+}
+
+fn lanes(context: &Arc<Context>, scene: &Scene) -> Result<Vec<Lane>, GpuError> {
+    let lane = |_| {
+        Ok(Lane {
+            recorder: Recorder::new(context, "frame")?,
+            staging: Buffer::new(context, "staging", frame_bytes(scene), Purpose::Staging)?,
+        })
+    };
+    (0..FRAMES_IN_FLIGHT).map(lane).collect()
+}
+
 fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Buffer, GpuError> {
     Buffer::new(context, "readback", Slot::Screen.bytes(scene), Purpose::Readback)
 }
@@ -317,7 +370,6 @@ pub fn size_of(shape: Shape) -> [usize; 3] {
 
 impl Drop for Renderer {
     fn drop(&mut self) {
-        // A device that is lost has nothing in flight any more.
-        let _ = self.timeline.wait_all();
+        self.timeline.drain();
     }
 }

@@ -197,6 +197,9 @@ impl Buffer {
             Purpose::Staging => (vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
             Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
         };
+        if size > context.candidate.max_bytes {
+            return Err(GpuError::Limit { what: doing(), needed: size, allowed: context.candidate.max_bytes });
+        }
         let create = vk::BufferCreateInfo::default().size(size.max(4)).usage(usage);
         let device = &context.device;
         // SAFETY: the create structure is complete.

@@ -38,6 +38,8 @@ pub struct Candidate {
     pub queue_family: u32,
     pub valid_bits: u32,
     pub limits: vk::PhysicalDeviceLimits,
+    /// Largest allocation and largest buffer, whichever is less.
+    pub max_bytes: u64,
 }
 
 impl Candidate {
@@ -81,7 +83,10 @@ pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> 
 
 fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut properties =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut v11).push_next(&mut v13);
     // SAFETY: `handle` comes from this instance; the chain is on the stack and outlives the call.
     unsafe { instance.get_physical_device_properties2(handle, &mut properties) };
     let properties = properties.properties;
@@ -133,6 +138,8 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         queue_family: family.unwrap_or(0) as u32,
         valid_bits,
         limits: properties.limits,
+        // A driver older than 1.3 leaves this 0; it is refused anyway.
+        max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
 }
 
@@ -182,6 +189,7 @@ mod tests {
             queue_family: 0,
             valid_bits: 64,
             limits: vk::PhysicalDeviceLimits::default(),
+            max_bytes: u64::MAX,
         }
     }
 

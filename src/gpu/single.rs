@@ -62,7 +62,7 @@ impl Single {
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
-        recorder.begin(&timeline)?;
+        recorder.begin(&mut order, &timeline)?;
         recorder.clear_new(&mut order, &slots, &new);
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
@@ -87,7 +87,10 @@ impl Single {
             results.push((bind.name, size_of(image.shape), image.format, buffer));
         }
         recorder.submit(&mut timeline)?;
-        timeline.wait_all()?;
+        let done = timeline.wait_all();
+        // Everything above is freed at the end, also when waiting failed.
+        timeline.drain();
+        done?;
         let mut outputs = Arrays::default();
         for (name, size, format, buffer) in results {
             outputs.insert(name, Texels::decode(size, format, buffer.bytes()));

@@ -32,26 +32,23 @@ impl Slots {
     /// UNDEFINED: they are returned, to be cleared into GENERAL before their first use.
     ///
     /// # Errors
-    /// What the device cannot hold; then slots that were there stay, unless they were to be replaced.
+    /// What the device cannot hold; then nothing new is there.
     pub fn fit(&mut self, plan: &Plan, scene: &Scene) -> Result<Vec<(Slot, u32)>, GpuError> {
         formats::check(&self.context, plan, scene)?;
         self.there.retain(|(slot, _), resource| plan.slots.contains(slot) && resource.is(*slot, scene));
-        let mut made = Vec::new();
+        let mut made = BTreeMap::new();
         for &slot in &plan.slots {
             let copies = if slot.takes_turns() { self.images } else { 1 };
-            for copy in 0..copies {
-                if self.there.contains_key(&(slot, copy)) {
-                    continue;
-                }
-                let resource = Resource::new(&self.context, slot, scene)?;
-                if let Resource::Image(_) = resource {
-                    made.push((slot, copy));
-                }
-                self.there.insert((slot, copy), resource);
-                self.fill(slot, scene);
+            for key in (0..copies).map(|copy| (slot, copy)).filter(|key| !self.there.contains_key(key)) {
+                made.insert(key, Resource::new(&self.context, slot, scene)?);
             }
         }
-        Ok(made)
+        let is_image = |resource: &Resource| matches!(resource, Resource::Image(_));
+        let new = made.iter().filter(|(_, resource)| is_image(resource)).map(|(key, _)| *key).collect();
+        let tables: Vec<Slot> = made.iter().filter(|(_, resource)| !is_image(resource)).map(|(key, _)| key.0).collect();
+        self.there.extend(made);
+        tables.into_iter().for_each(|slot| self.fill(slot, scene));
+        Ok(new)
     }
 
     /// Writes a slot made from the scene, if it is a table; images of that kind go through staging.
@@ -88,6 +85,11 @@ impl Slots {
             Some(Resource::Buffer(buffer)) => Some(buffer),
             _ => None,
         }
+    }
+
+    /// Frees everything.
+    pub fn clear(&mut self) {
+        self.there.clear();
     }
 
     pub fn iter(&self) -> impl Iterator<Item = (Slot, u32)> {

@@ -47,6 +47,16 @@ impl Timeline {
     pub fn wait_all(&self) -> Result<(), GpuError> {
         self.wait(self.submitted)
     }
+
+    /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. A lost
+    /// device has nothing in flight any more.
+    pub fn drain(&self) {
+        match self.wait_all() {
+            Ok(()) => {}
+            Err(error) if error.is_device_lost() => {}
+            Err(_) => self.context.wait_idle(),
+        }
+    }
 }
 
 impl Drop for Timeline {

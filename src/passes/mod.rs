@@ -162,11 +162,14 @@ pub enum Value {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Params(pub Vec<(&'static str, Value)>);
 
+fn finite(value: f64) -> f32 {
+    value.clamp(-f64::from(f32::MAX), f64::from(f32::MAX)) as f32
+}
+
 impl Params {
     /// Clamped to what is finite: shaders need not keep infinities.
     pub fn f32(mut self, name: &'static str, value: f64) -> Params {
-        let finite = value.clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
-        self.0.push((name, Value::F32(finite as f32)));
+        self.0.push((name, Value::F32(finite(value))));
         self
     }
 
@@ -176,12 +179,12 @@ impl Params {
     }
 
     pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
-        self.0.push((name, Value::Vec2(value.map(|v| v as f32))));
+        self.0.push((name, Value::Vec2(value.map(finite))));
         self
     }
 
     pub fn vec3(mut self, name: &'static str, value: impl Into<DVec3>) -> Params {
-        self.0.push((name, Value::Vec3(value.into().as_vec3().to_array())));
+        self.0.push((name, Value::Vec3(value.into().to_array().map(finite))));
         self
     }
 }

@@ -275,6 +275,9 @@ impl Probe {
         if !self.slices.is_valid() || outermost > 1e6 {
             return fault("frames", "positions must be finite and rise from slice to slice");
         }
+        if self.slices.len() < 2 && !matches!(self.motion, Motion::Still { .. }) {
+            return fault("frames", "a sweep has at least 2 frames a volume; a single one is a still probe's");
+        }
         if let Array::Curved { .. } = self.array {
             let widest = self.lines.first().abs().max(self.lines.last().abs());
             if widest >= PI / 2.0 {

@@ -17,6 +17,8 @@ use glam::DVec3;
 pub const MAX_PICTURE: u32 = 16384;
 /// Ring of the surface detector, samples (n of thesis 4-3).
 pub const RING: u32 = 8;
+/// Largest standard deviation of a Gaussian, pixels: 193 taps.
+pub const MAX_DEVIATION: f64 = 32.0;
 /// Widest window of a filter, pixels.
 pub const MAX_WINDOW: u32 = 63;
 
@@ -101,6 +103,15 @@ impl Scene {
             );
         }
         let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0 };
+        for (axis, field) in
+            ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
+        {
+            let deviation = scene.smoothing()[axis];
+            if deviation > MAX_DEVIATION {
+                let unit = if axis < 2 { "slice pixels" } else { "slices" };
+                return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
+            }
+        }
         scene.apron = 2.0 + scene.filter_reach();
         Ok(scene)
     }
@@ -152,13 +163,15 @@ impl Scene {
         let [lateral, depth, _] = self.smoothing();
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
         let sigma = self.settings.slices.sigma.map_or(0.0, |s| (s.window / 2) as f64);
-        median + sigma + gaussian_radius(lateral).max(gaussian_radius(depth)) as f64
+        // To the corners of square windows, one filter after another.
+        let gaussian = f64::from(gaussian_radius(lateral)).hypot(f64::from(gaussian_radius(depth)));
+        std::f64::consts::SQRT_2 * (median + sigma) + gaussian
     }
 }
 
 /// Taps on one side of a Gaussian: three standard deviations hold 99.7 % of it.
 pub fn gaussian_radius(deviation: f64) -> u32 {
-    if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).clamp(1, MAX_WINDOW / 2) } else { 0 }
+    if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
 }
 
 /// What is added to a depth below the face to get Y.
@@ -278,8 +291,15 @@ fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     within("camera.zoom", c.zoom, 1e-3, 1e3)?;
     within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
-    if c.target.is_some_and(|t| !t.iter().all(|v| v.is_finite())) {
-        return refuse("camera.target", "must be finite");
+    if c.field_of_view > 0.0 && c.field_of_view < 1.0 {
+        // The camera would stand so far away that f32 has no digits left for the body.
+        return refuse(
+            "camera.field_of_view",
+            format!("is {}, must be 0 (parallel) or at least 1 deg", c.field_of_view),
+        );
+    }
+    for value in c.target.iter().flatten() {
+        within("camera.target", *value, -1e6, 1e6)?;
     }
     if let Some(step) = settings.ray.step {
         within("ray.step", step, 1e-4, 1e3)?;

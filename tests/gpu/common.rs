@@ -154,7 +154,7 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) {
     for (k, frame) in frames.iter().enumerate() {
         renderer.frame(k as u32, &frame.encode(format), image).expect("frame");
     }
-    renderer.show(image);
+    renderer.show(image).expect("show");
 }
 
 /// Mean and largest difference of two pictures, levels of 255.

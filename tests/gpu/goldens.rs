@@ -21,13 +21,27 @@ fn goldens() -> Vec<(&'static str, Scene, Vec<Texels>)> {
         picture = { size = [96, 80] }
         ray = { step = 0.5, sampling = 'exact' }
         distance = { median = 3, bilateral = { pixels = 1.5, distance = 2.0 } }
-        camera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 1.6 }
         post = { sigma = { window = 3, sigma = 0.05 }, gamma = 1.3 }";
     let mut goldens = Vec::new();
     for (name, geometry, mode, more) in [
-        ("fan-surface", Geometry::Sweep(probe.clone()), "sr", "surface = { threshold = 0.15 }"),
-        ("fan-volume", Geometry::Sweep(probe), "vr", "volume = { transfer = 'skin' }"),
-        ("cartesian-surface", cartesian([32, 40, 16]), "sr", "surface = { threshold = 0.15 }"),
+        (
+            "fan-surface",
+            Geometry::Sweep(probe.clone()),
+            "sr",
+            "surface = { threshold = 0.15 }\ncamera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 3.2, target = [1.0, 32.0, 0.0] }",
+        ),
+        (
+            "fan-volume",
+            Geometry::Sweep(probe),
+            "vr",
+            "volume = { transfer = 'skin' }\ncamera = { azimuth = -30, zoom = 2.5, target = [1.0, 32.0, 0.0] }",
+        ),
+        (
+            "cartesian-surface",
+            cartesian([32, 40, 16]),
+            "sr",
+            "surface = { threshold = 0.15 }\ncamera = { azimuth = 15, elevation = 10 }",
+        ),
     ] {
         let scene = scene(geometry, FLOATS, &format!("mode = '{mode}'\n{all}\n{more}"));
         let frames = match &scene.geometry {

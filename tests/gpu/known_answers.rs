@@ -185,9 +185,9 @@ fn volume_images_that_take_turns_do_not_mix() {
     send(&mut renderer, &near, 0);
     // The other image is filled while the first is still to be drawn.
     send(&mut renderer, &far, 1);
-    renderer.show(0);
+    renderer.show(0).expect("show");
     assert_eq!(renderer.picture().expect("picture"), near_alone);
-    renderer.show(1);
+    renderer.show(1).expect("show");
     assert_eq!(renderer.picture().expect("picture"), far_alone);
     assert_ne!(near_alone, far_alone);
 }

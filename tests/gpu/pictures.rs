@@ -21,7 +21,7 @@ fn preset(device: &Device, file: &str, preset: &str, mode: &str) -> (Scene, Rend
     while let Some(frame) = recording.next_frame().expect("frame") {
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
     }
-    renderer.show(0);
+    renderer.show(0).expect("show");
     (scene, renderer)
 }
 

@@ -59,7 +59,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
             assert_eq!((expected + 0.5).floor() as u8, stored, "the f64 reference equals the stored conversion");
         }
         renderer.frame(0, frame, 0).expect("frame");
-        renderer.show(0);
+        renderer.show(0).expect("show");
         let slice = renderer.read(Slot::Volume).expect("read").expect("there");
         for (got, &stored) in slice.values.iter().zip(stored) {
             let off = ((got * 255.0 + 0.5).floor() as i32 - i32::from(stored)).abs();
@@ -92,7 +92,7 @@ fn wobbler_volume(device: &Device, file: &str) -> (Probe, Scene, Texels) {
     while let Some(frame) = recording.next_frame().expect("frame") {
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
     }
-    renderer.show(0);
+    renderer.show(0).expect("show");
     let volume = renderer.read(Slot::Volume).expect("read").expect("there");
     let Geometry::Sweep(probe) = recording.geometry(0) else { panic!("a sweep") };
     (probe, scene, volume)

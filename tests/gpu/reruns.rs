@@ -117,6 +117,53 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     assert!(!slots.contains("slice_a"));
 }
 
+/// Filters of a chain take turns with two slots, so a filter that runs again may find its input overwritten by a later one.
+/// Whatever the change, the picture is that of a renderer made for the new scene.
+#[test]
+fn any_change_gives_the_picture_of_a_fresh_renderer() {
+    let device = Device::new();
+    let medians = ["median = 3, ", "median = 5, ", ""];
+    let bilaterals = [
+        "",
+        "bilateral = { pixels = 1.0, distance = 2.0, repeat = 2 }, ",
+        "bilateral = { pixels = 1.0, distance = 0.5, repeat = 3 }, ",
+    ];
+    let sigmas = ["", "sigma = { window = 3, sigma = 0.5 }", "sigma = { window = 5, sigma = 0.2 }"];
+    let lights = ["", "light = { direction = [1.0, 0.0, 0.4] }"];
+    let posts = ["", "post = { sigma = { window = 3, sigma = 0.2 } }", "post = { gamma = 2.0 }"];
+    let modes = ["sr", "sr", "sr", "vr"];
+    let mut noise = Noise(3);
+    let mut pick = |n: usize| (noise.next() * n as f64) as usize;
+    let mut next = || {
+        let toml = format!(
+            "mode = '{}'\npicture = {{ size = [24, 20] }}\nslices = {{ pixels = 32 }}\ndistance = {{ {}{}{} }}\n{}\n{}",
+            modes[pick(4)],
+            medians[pick(3)],
+            bilaterals[pick(3)],
+            sigmas[pick(3)],
+            lights[pick(2)],
+            posts[pick(3)]
+        );
+        scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(", }", " }"))
+    };
+    let first = next();
+    let frames =
+        body_frames(&first, |p| (0.5 + 0.4 * (p.y - 45.0 + 3.0 * (p.x * 0.7).sin()).clamp(-1.0, 1.0)).clamp(0.0, 1.0));
+    let mut renderer = rendered(&device, first, &frames);
+    for round in 0..60 {
+        let scene = next();
+        // Sometimes two changes before a picture.
+        if round % 3 == 0 {
+            renderer.change(next()).expect("change");
+        }
+        let rerun = renderer.change(scene.clone()).expect("change");
+        assert!(matches!(rerun, Rerun::Steps { .. }), "the volume stays: {rerun:?}");
+        let picture = renderer.picture().expect("picture");
+        let fresh = rendered(&device, scene.clone(), &frames).picture().expect("picture");
+        assert!(picture == fresh, "round {round}: {:?}", scene.settings);
+    }
+}
+
 /// The layer sees a missing barrier between a writer and a reader (not between two writers: that is the oracle's).
 #[test]
 fn a_dropped_barrier_is_seen_by_synchronization_validation() {

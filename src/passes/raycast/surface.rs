@@ -42,11 +42,17 @@ pub const PASS: Pass = Pass {
             for x in 0..size[0] {
                 let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
                 let (enter, leave) = ray::span(scene, origin, direction);
-                let count = ((leave - enter) / scene.step).max(0.0).floor() as usize;
-                let at = |i: usize| enter + (i as f64 + 0.5) * scene.step;
+                let count = ((leave - enter) / scene.step).max(0.0).floor() as i64;
+                // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
+                let half = i64::from(RING / 2 * scene.settings.surface.rough);
+                let first = (-half).max((-enter / scene.step - 0.5).ceil() as i64);
+                let end = if count > 0 { count + half + i64::from(RING) } else { first };
+                let at = |i: i64| enter + (i as f64 + 0.5) * scene.step;
                 let samples: Vec<Option<f64>> =
-                    (0..count).map(|i| ray::sample(scene, volume, origin + direction * at(i))).collect();
-                let (distance, surface) = match detect(scene, &samples) {
+                    (first..end).map(|i| ray::sample(scene, volume, origin + direction * at(i))).collect();
+                let within = |place: f64| (0.0..=leave - enter).contains(&((place + 0.5) * scene.step));
+                let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
+                let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
                     Some((place, echo)) => (enter + (place + 0.5) * scene.step, [echo, 1.0]),
                     None => (MISS, [0.0, 0.0]),
                 };
@@ -64,8 +70,9 @@ fn polarity(scene: &Scene) -> f64 {
     }
 }
 
-/// Place of the surface in samples, and the echo behind it.
-fn detect(scene: &Scene, samples: &[Option<f64>]) -> Option<(f64, f64)> {
+/// Place of the surface in samples, and the echo behind it. Sample n is the ray's sample `first + n`; the region begins at its
+/// sample 0, and half a ring later an edge in its middle may be a surface.
+fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f64)> {
     let surface = &scene.settings.surface;
     let ring = RING as usize;
     let rough = surface.rough as usize;
@@ -78,6 +85,13 @@ fn detect(scene: &Scene, samples: &[Option<f64>]) -> Option<(f64, f64)> {
         (i < samples.len() && i >= since + (ring - 1) * stride)
             .then(|| Some(polarity(scene) * (mean(i, stride, 0)? - mean(i, stride, ring / 2)?)))
             .flatten()
+    };
+    // Above the threshold here and not just before: an edge that was there before the region began is none of its surfaces.
+    let crossing = |i: usize, since: usize| -> Option<f64> {
+        let inside = i as i64 + first >= i64::from(RING / 2);
+        let rises =
+            i == since + ring - 1 || difference(i.wrapping_sub(1), 1, since).is_none_or(|d| d <= surface.threshold);
+        difference(i, 1, since).filter(|d| inside && rises && *d > surface.threshold)
     };
     let mut since = 0;
     let mut i = 0;
@@ -112,8 +126,8 @@ fn detect(scene: &Scene, samples: &[Option<f64>]) -> Option<(f64, f64)> {
                     continue 'rough;
                 }
                 from = at + 1;
-            } else if let Some(d) = difference(at, 1, from).filter(|d| *d > surface.threshold) {
-                return Some(place(scene, &difference, &|i| mean(i, 1, 0), at, d, from));
+            } else if let Some(d) = crossing(at, from) {
+                return place(scene, &difference, &|i| mean(i, 1, 0), at, d, from);
             } else if at >= limit {
                 i = limit - (ring - 2) * rough;
                 since = i;
@@ -134,9 +148,9 @@ fn place(
     crossing: usize,
     crossing_difference: f64,
     since: usize,
-) -> (f64, f64) {
+) -> Option<(f64, f64)> {
     if scene.settings.surface.place == Place::FirstCrossing {
-        return (crossing as f64, echo(crossing).unwrap_or(0.0));
+        return Some((crossing as f64, echo(crossing)?));
     }
     let (mut best, mut best_at) = (crossing_difference, crossing);
     for i in crossing + 1..crossing + RING as usize {
@@ -147,9 +161,10 @@ fn place(
         }
     }
     let before = difference(best_at - 1, 1, since).unwrap_or(best);
-    let after = difference(best_at + 1, 1, since).unwrap_or(best);
+    // Without the sample after it, it may not be the peak: the ray left the insonified region on a rising edge.
+    let after = difference(best_at + 1, 1, since)?;
     let bend = before - 2.0 * best + after;
     let peaked = bend < 0.0 && before < best && after < best;
     let shift = if peaked { 0.5 * (before - after) / bend } else { 0.0 };
-    (best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at).unwrap_or(0.0))
+    Some((best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at)?))
 }

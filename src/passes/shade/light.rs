@@ -17,7 +17,6 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let (rays, light) = (&s.rays, &s.settings.light);
         Params::default()
-            .vec3("origin", rays.origin)
             .vec3("origin_dx", rays.origin_dx)
             .vec3("origin_dy", rays.origin_dy)
             .vec3("direction", rays.direction)
