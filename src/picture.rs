@@ -1,5 +1,8 @@
 //! A rendered 2D result, and its way to and from a file.
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use std::io::Write;
 use std::path::Path;
 
 /// 8-bit red, green, blue, alpha; rows from the top.
@@ -18,13 +21,24 @@ impl Picture {
     pub fn save(&self, file: &Path) -> Result<(), String> {
         let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
         let mut bytes = Vec::new();
-        let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-        let rgb: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        image::ImageEncoder::write_image(encoder, &rgb, self.width, self.height, image::ExtendedColorType::Rgb8)
-            .map_err(|e| cannot(&e))?;
-        let mut part = file.as_os_str().to_owned();
-        part.push(".part");
-        let written = std::fs::write(&part, &bytes).and_then(|()| std::fs::rename(&part, file));
+        let (compression, filter) = (CompressionType::Default, FilterType::Adaptive);
+        let encoder = PngEncoder::new_with_quality(&mut bytes, compression, filter);
+        let is_grey = self.rgba.chunks_exact(4).all(|p| p[0] == p[1] && p[1] == p[2]);
+        let (channels, colour) = if is_grey { (1, ExtendedColorType::L8) } else { (3, ExtendedColorType::Rgb8) };
+        let texels: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| &p[..channels]).copied().collect();
+        encoder.write_image(&texels, self.width, self.height, colour).map_err(|e| cannot(&e))?;
+        if std::fs::metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+            // A device or a pipe is written to; renaming would replace it.
+            let opened = std::fs::OpenOptions::new().write(true).open(file);
+            return opened.and_then(|mut f| f.write_all(&bytes)).map_err(|e| cannot(&e));
+        }
+        check_target(file)?;
+        // Through a link to the file itself, and beside it, so that renaming stays within one file system.
+        let target = file.canonicalize().unwrap_or_else(|_| file.to_path_buf());
+        let part = target.with_file_name(format!(".echolume-{}.part", std::process::id()));
+        let opened = std::fs::OpenOptions::new().write(true).create_new(true).open(&part);
+        let mut opened = opened.map_err(|e| cannot(&e))?;
+        let written = opened.write_all(&bytes).and_then(|()| std::fs::rename(&part, &target));
         written.map_err(|e| {
             let _ = std::fs::remove_file(&part);
             cannot(&e)
@@ -38,5 +52,22 @@ impl Picture {
         let image = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png).map_err(|e| cannot(&e))?;
         let rgba = image.to_rgba8();
         Ok(Picture { width: rgba.width(), height: rgba.height(), rgba: rgba.into_raw() })
+    }
+}
+
+/// Whether a picture could be written there, before the work is done.
+///
+/// # Errors
+/// One line: the folder does not exist, or the name is a folder's.
+pub fn check_target(file: &Path) -> Result<(), String> {
+    let cannot = |fault: &str| Err(format!("{}: cannot be written: {fault}", file.display()));
+    if file.is_dir() || file.file_name().is_none() {
+        return cannot("it is a folder");
+    }
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            cannot(&format!("there is no folder {}; make it first", folder.display()))
+        }
+        _ => Ok(()),
     }
 }

@@ -5,17 +5,27 @@ mod info;
 mod render;
 
 use clap::{Parser, Subcommand};
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Mutex;
 
-/// Prints a line; a closed pipe is not an error worth a panic.
+/// Prints a line on standard output.
 macro_rules! say {
-    ($($word:tt)*) => {{
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stdout(), $($word)*);
-    }};
+    ($($word:tt)*) => { crate::cli::print(format_args!($($word)*)) };
 }
 pub(crate) use say;
+
+/// What standard output said when it could not be written.
+static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Remembers a failure for the end: whoever reads may go away at any time, but a full disk is no success.
+fn print(line: std::fmt::Arguments) {
+    let written = writeln!(std::io::stdout(), "{line}").and_then(|()| std::io::stdout().flush());
+    if let Err(error) = written.or_else(|e| if e.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(e) }) {
+        UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error);
+    }
+}
 
 #[derive(Parser)]
 #[command(
@@ -79,14 +89,39 @@ pub fn run() -> ExitCode {
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),
     });
+    let done = done.and_then(|()| match UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).take() {
+        Some(error) => Err(Failure::Failed(format!("standard output: cannot be written: {error}"))),
+        None => Ok(()),
+    });
     let (code, message) = match done {
         Ok(()) => return ExitCode::SUCCESS,
         Err(Failure::Failed(message)) => (1, message),
         Err(Failure::Input(message)) => (2, message),
     };
-    use std::io::Write as _;
-    let _ = writeln!(std::io::stderr(), "echolume: {message}");
+    let _ = writeln!(std::io::stderr(), "echolume: {}", plain(&message));
     ExitCode::from(code)
+}
+
+/// An empty file, or one whose first line begins with a time as ours do: a recording is never appended to.
+fn holds_a_log(path: &std::path::Path) -> bool {
+    let mut start = Vec::new();
+    let read =
+        std::fs::File::open(path).and_then(|f| std::io::Read::read_to_end(&mut std::io::Read::take(f, 11), &mut start));
+    read.is_ok() && (start.is_empty() || (start.get(4) == Some(&b'-') && start.get(10) == Some(&b'T')))
+}
+
+/// One line of bounded length: what was typed or read may hold anything, and must not write to the terminal.
+fn plain(message: &str) -> String {
+    const LONGEST: usize = 600;
+    let mut line = String::new();
+    for (i, c) in message.chars().enumerate() {
+        if i == LONGEST {
+            line.push_str(" ...");
+            break;
+        }
+        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
 }
 
 fn start_log(verbose: u8, file: Option<&std::path::Path>) -> Result<(), Failure> {
@@ -99,6 +134,12 @@ fn start_log(verbose: u8, file: Option<&std::path::Path>) -> Result<(), Failure>
     match file {
         None => log.without_time().with_writer(std::io::stderr).init(),
         Some(path) => {
+            if path.metadata().is_ok_and(|there| there.is_file()) && !holds_a_log(path) {
+                return Err(input(format!(
+                    "{}: holds something else than a log; give another --log-file",
+                    path.display()
+                )));
+            }
             let opened = std::fs::OpenOptions::new().create(true).append(true).open(path);
             let file = opened.map_err(|e| input(format!("{}: cannot be written: {e}", path.display())))?;
             log.with_ansi(false).with_writer(std::sync::Mutex::new(file)).init();

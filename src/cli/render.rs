@@ -1,7 +1,8 @@
 //! `echolume render`.
 
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::picture;
 use echolume::plan::Plan;
 use echolume::report::{dump, times};
 use echolume::scene::load::Layers;
@@ -29,7 +30,7 @@ pub struct Render {
     /// Settings in TOML
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Settings that suit a kind of picture: bone, fetal
+    /// Settings that suit a kind of picture: bmode, bone, fetal
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Width and height of the picture, pixels
@@ -75,13 +76,10 @@ impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let mut recording = Recording::open(&self.input, self.probe.as_deref()).map_err(input)?;
         if self.volume >= recording.volumes() {
-            let there = recording.volumes();
-            return Err(input(format!(
-                "{}: --volume {}: the recording has {there}",
-                self.input.display(),
-                self.volume
-            )));
+            let (file, asked, there) = (self.input.display(), self.volume, recording.volumes());
+            return Err(input(format!("{file}: --volume {asked}: the recording has {there}, numbered from 0")));
         }
+        self.keep_inputs()?;
         let geometry = recording.geometry(self.volume);
         let samples = Input { stored: recording.stored_type(), range: recording.range() };
         let scene = Scene::new(geometry, samples, self.settings()?).map_err(input)?;
@@ -91,8 +89,16 @@ impl Render {
             return Ok(());
         }
 
+        picture::check_target(&self.output).map_err(failed)?;
+        if let Some(folder) = &self.dump {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+        }
         let device = self.device.clone().unwrap_or(Choice::Best);
-        let context = Context::new(&ContextOptions { device, validation: self.validate }).map_err(failed)?;
+        let context = Context::new(&ContextOptions { device, validation: self.validate }).map_err(|e| match e {
+            GpuError::NoSuchDevice { .. } => input(e),
+            e => failed(e),
+        })?;
         let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
         say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
         let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(failed)?;
@@ -114,6 +120,16 @@ impl Render {
         }
     }
 
+    /// Refuses to write over what is read.
+    fn keep_inputs(&self) -> Result<(), Failure> {
+        let Ok(output) = self.output.canonicalize() else { return Ok(()) };
+        let inputs = [Some(&self.input), self.probe.as_ref(), self.scene.as_ref()];
+        match inputs.into_iter().flatten().find(|i| i.canonicalize().is_ok_and(|i| i == output)) {
+            Some(read) => Err(input(format!("-o {}: would replace an input", read.display()))),
+            None => Ok(()),
+        }
+    }
+
     fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
         let mut layers = Layers::default();
         if let Some(preset) = &self.preset {
@@ -122,27 +138,33 @@ impl Render {
         if let Some(file) = &self.scene {
             layers.file(file).map_err(input)?;
         }
-        for assignment in self.flags()?.iter().chain(&self.set) {
+        for (flag, assignment) in self.flags()? {
+            layers.set_by(&flag, &assignment).map_err(input)?;
+        }
+        for assignment in &self.set {
             layers.set(assignment).map_err(input)?;
         }
         layers.finish().map_err(input)
     }
 
-    /// The flags as assignments.
-    fn flags(&self) -> Result<Vec<String>, Failure> {
+    /// The flags as typed, and the assignments that they stand for.
+    fn flags(&self) -> Result<Vec<(String, String)>, Failure> {
         let mut set = Vec::new();
-        set.extend(self.mode.as_ref().map(|mode| format!("mode={mode}")));
+        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), format!("mode={mode}"))));
         if let Some(size) = &self.size {
-            let edges = size.split_once('x').ok_or_else(|| input(format!("--size {size}: must read WIDTHxHEIGHT")))?;
-            set.push(format!("picture.size=[{},{}]", edges.0, edges.1));
+            let flag = format!("--size {size}");
+            let edges = size.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+            let (w, h) = edges.ok_or_else(|| input(format!("{flag}: must read WIDTHxHEIGHT in pixels, as 512x512")))?;
+            set.push((flag, format!("picture.size=[{w},{h}]")));
         }
-        for (flag, table, text) in [("--camera", "camera", &self.camera), ("--roi", "region", &self.roi)] {
+        for (name, table, text) in [("--camera", "camera", &self.camera), ("--roi", "region", &self.roi)] {
             for part in text.iter().flat_map(|t| t.split(',')) {
+                let flag = format!("{name} {part}");
                 let pair = part.split_once('=');
-                let (key, value) = pair.ok_or_else(|| input(format!("{flag} {part}: must read key=value")))?;
+                let (key, value) = pair.ok_or_else(|| input(format!("{flag}: must read key=value,key=value")))?;
                 let key = if key == "fov" { "field_of_view" } else { key };
                 let value = if value.contains(':') { format!("[{}]", value.replace(':', ",")) } else { value.into() };
-                set.push(format!("{table}.{key}={value}"));
+                set.push((flag, format!("{table}.{key}={value}")));
             }
         }
         Ok(set)
@@ -177,8 +199,6 @@ impl Render {
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {
-        let cannot = |e: std::io::Error| failed(format!("{}: cannot be written: {e}", folder.display()));
-        std::fs::create_dir_all(folder).map_err(cannot)?;
         for slot in renderer.plan().slots.clone() {
             let texels = renderer.read(slot).map_err(failed)?;
             let drawn = dump::draw(slot, texels.as_ref(), renderer.scene());

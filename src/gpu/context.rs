@@ -97,7 +97,8 @@ impl Context {
         let debug_utils = options.validation
             || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
         let instance = create_instance(&entry, options.validation, debug_utils)?;
-        let made = Context::on_instance(entry, &instance, options, debug_utils);
+        // The loader stays loaded until the instance is gone, also when nothing comes of it.
+        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
             unsafe { instance.destroy_instance(None) };

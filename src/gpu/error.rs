@@ -6,7 +6,10 @@ use ash::vk;
 pub enum GpuError {
     #[error("no Vulkan loader: {0}; install one (Debian: apt-get install libvulkan1 mesa-vulkan-drivers)")]
     NoLoader(String),
-    #[error("no Vulkan device; install a driver (Debian, software: apt-get install mesa-vulkan-drivers)")]
+    #[error(
+        "no Vulkan device; install a driver (Debian, software: apt-get install mesa-vulkan-drivers), \
+         and look whether VK_DRIVER_FILES or VK_ICD_FILENAMES name one that is there"
+    )]
     NoDevice,
     #[error("no device fits: {0}")]
     NoneFits(String),

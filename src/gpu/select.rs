@@ -154,7 +154,7 @@ pub fn choose(candidates: &[Candidate], choice: &Choice) -> Result<usize, GpuErr
         Choice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
         Choice::Name(name) => {
             let part = name.to_lowercase();
-            let found = candidates.iter().position(|c| c.name.to_lowercase().contains(&part));
+            let found = candidates.iter().position(|c| !part.is_empty() && c.name.to_lowercase().contains(&part));
             found.ok_or_else(|| missing(name.clone()))?
         }
         Choice::Best => {

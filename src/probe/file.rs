@@ -27,6 +27,10 @@ impl ProbeFile {
     /// Reads and checks all that can be checked without the recording.
     pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
         let unreadable = |e| InputError::unreadable(path, &e);
+        // A pipe would be waited for.
+        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(InputError::new(path, "file", "is not a regular file"));
+        }
         let file = File::open(path).map_err(unreadable)?;
         let mut text = String::new();
         file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;

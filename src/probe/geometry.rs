@@ -75,6 +75,11 @@ fn fault<T>(field: &'static str, fault: impl Into<String>) -> Result<T, Geometry
     Err(GeometryError { field, fault: fault.into() })
 }
 
+/// A number without its three hundred digits.
+fn short(value: f64) -> String {
+    if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
+}
+
 impl Probe {
     /// Range of the first sample: from the apex of a curved array, from the face of a linear one. mm.
     pub fn first_range(&self) -> f64 {
@@ -251,11 +256,11 @@ impl Probe {
         // What lies beyond is no probe, and would be infinite in f32.
         let positive = |field, value: f64| match (1e-6..=1e6).contains(&value) {
             true => Ok(()),
-            false => fault(field, format!("is {value}, must lie in 1e-6..=1e6")),
+            false => fault(field, format!("is {}, must lie in 1e-6..=1e6", short(value))),
         };
         let not_negative = |field, value: f64| match (0.0..=1e6).contains(&value) {
             true => Ok(()),
-            false => fault(field, format!("is {value}, must lie in 0..=1e6")),
+            false => fault(field, format!("is {}, must lie in 0..=1e6", short(value))),
         };
         positive("sample pitch", self.sample_pitch)?;
         positive("sound speed", self.sound_speed)?;

@@ -2,12 +2,19 @@
 
 use super::Settings;
 use serde::Deserialize;
+use std::io::Read;
 use std::path::Path;
 use toml::{Table, Value};
 
+/// Longest scene file, bytes.
+const LONGEST: u64 = 1 << 20;
+
 /// Settings that suit a kind of picture, as TOML.
-pub const PRESETS: &[(&str, &str)] =
-    &[("bone", include_str!("presets/bone.toml")), ("fetal", include_str!("presets/fetal.toml"))];
+pub const PRESETS: &[(&str, &str)] = &[
+    ("bmode", include_str!("presets/bmode.toml")),
+    ("bone", include_str!("presets/bone.toml")),
+    ("fetal", include_str!("presets/fetal.toml")),
+];
 
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
@@ -32,19 +39,37 @@ impl Layers {
 
     pub fn file(&mut self, path: &Path) -> Result<(), LoadError> {
         let shown = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| LoadError::File { path: shown.clone(), fault: format!("cannot be read: {e}") })?;
+        let fault = |fault: String| LoadError::File { path: shown.clone(), fault };
+        let unreadable = |e: std::io::Error| fault(format!("cannot be read: {e}"));
+        // A pipe would be waited for.
+        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(fault("is not a regular file".into()));
+        }
+        let mut text = String::new();
+        let file = std::fs::File::open(path).map_err(unreadable)?;
+        file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
+        if text.len() as u64 > LONGEST {
+            return Err(fault("is longer than 1 MiB, which no scene is".into()));
+        }
         self.add(&shown, &text)
     }
 
-    /// One `key.path=value` of the command line; the value is TOML, or a plain word.
+    /// One `key.path=value` of `--set`; the value is TOML, or a plain word.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
-        let fault = |fault: &str| LoadError::Layer { layer: format!("--set {assignment}"), fault: fault.into() };
-        let (path, value) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;
-        let value: Value = toml::from_str::<Table>(&format!("v = {value}"))
+        self.set_by(&format!("--set {assignment}"), assignment)
+    }
+
+    /// The same for a flag that stands for a setting: messages name the flag as it was typed.
+    pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
+        let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
+        let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;
+        if text.contains('\n') {
+            return Err(fault("unknown field after a line break"));
+        }
+        let value: Value = toml::from_str::<Table>(&format!("v = {text}"))
             .ok()
             .and_then(|mut t| t.remove("v"))
-            .unwrap_or_else(|| Value::String(value.trim().to_string()));
+            .unwrap_or_else(|| Value::String(text.trim().to_string()));
         let mut layer = Table::new();
         let mut at = &mut layer;
         let mut keys = path.trim().split('.').peekable();
@@ -56,19 +81,21 @@ impl Layers {
             let inner = at.entry(key).or_insert_with(|| Value::Table(Table::new()));
             at = inner.as_table_mut().ok_or_else(|| fault("names a key twice"))?;
         }
-        self.merge_checked(&format!("--set {assignment}"), layer)
+        self.merge_checked(flag, layer)
     }
 
     fn add(&mut self, layer: &str, text: &str) -> Result<(), LoadError> {
-        let table =
-            toml::from_str::<Table>(text).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e) })?;
+        let fault = |e: &toml::de::Error| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
+        // Read by itself first: only then does a message know its line.
+        toml::from_str::<Settings>(text).map_err(|e| fault(&e))?;
+        let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
         self.merge_checked(layer, table)
     }
 
     /// Checks after every layer, so that the message names the layer at fault.
     fn merge_checked(&mut self, layer: &str, table: Table) -> Result<(), LoadError> {
         merge(&mut self.0, table);
-        self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e) })
+        self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
     }
 
     fn settings(&self) -> Result<Settings, toml::de::Error> {
@@ -76,7 +103,7 @@ impl Layers {
     }
 
     pub fn finish(self) -> Result<Settings, LoadError> {
-        self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e) })
+        self.settings().map_err(|e| LoadError::Layer { layer: "scene".into(), fault: one_line(&e, "") })
     }
 }
 
@@ -89,9 +116,10 @@ fn merge(under: &mut Table, over: Table) {
     }
 }
 
-fn one_line(error: &toml::de::Error) -> String {
-    let place = error.span().map_or(String::new(), |s| format!(" (at byte {})", s.start));
-    format!("{}{place}", error.message().lines().next().unwrap_or("not valid TOML"))
+fn one_line(error: &toml::de::Error, text: &str) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start));
+    let place = before.map_or(String::new(), |b| format!("line {}: ", b.matches('\n').count() + 1));
+    format!("{place}{}", error.message().lines().collect::<Vec<_>>().join(" "))
 }
 
 #[cfg(test)]

@@ -326,8 +326,8 @@ fn check(settings: &Settings) -> Result<(), SceneError> {
     ] {
         within(field, value, 0.0, high)?;
     }
-    for v in l.colour.iter().chain(&l.surface_colour) {
-        within("light.colour", *v, 0.0, 10.0)?;
+    for (field, colour) in [("light.colour", l.colour), ("light.surface_colour", l.surface_colour)] {
+        colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0))?;
     }
     within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
     within("post.contrast", settings.post.contrast, 0.0, 10.0)?;

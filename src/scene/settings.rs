@@ -182,7 +182,7 @@ impl Default for Volume {
 
 /// A named transfer function, or its points.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be grey, sepia, skin, bone, or a list of points { at, colour, opacity }")]
 pub enum Transfer {
     Named(TransferName),
     Points(Vec<TransferPoint>),

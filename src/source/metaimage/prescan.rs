@@ -27,6 +27,10 @@ pub(super) fn probe(header: &Header, [samples, lines]: [usize; 2], frames: usize
     if kind.starts_with("POSTSCAN") || (!kind.starts_with("PRESCAN") && header.first_of(&KEYS).is_none()) {
         return Ok(None);
     }
+    if !matches!(kind, "" | "BRIGHTNESS") && !kind.starts_with("PRESCAN") {
+        let fault = format!("{} is not read: only detected and compressed frames are", quoted(kind));
+        return header.fault("UltrasoundImageType", fault);
+    }
     let line_pitch = header.size("ScanLinePitch", false)?;
     let (array, lines) = match header.flag("IsTransducerConvex")? {
         Some(true) => {
