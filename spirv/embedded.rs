@@ -1,6 +1,7 @@
 // Written by tools/shaders.
 &[
     ("filter/bilateral.distance", include_bytes!("filter/bilateral.distance.spv")),
+    ("filter/enhanced_sigma.picture", include_bytes!("filter/enhanced_sigma.picture.spv")),
     ("filter/gaussian.plane", include_bytes!("filter/gaussian.plane.spv")),
     ("filter/gaussian.slice", include_bytes!("filter/gaussian.slice.spv")),
     ("filter/gaussian.volume", include_bytes!("filter/gaussian.volume.spv")),
@@ -26,5 +27,10 @@
     ("raycast/volume.moved", include_bytes!("raycast/volume.moved.spv")),
     ("raycast/volume.uneven", include_bytes!("raycast/volume.uneven.spv")),
     ("raycast/volume.uneven_moved", include_bytes!("raycast/volume.uneven_moved.spv")),
-    ("shade/light", include_bytes!("shade/light.spv")),
+    ("shade/light.plain", include_bytes!("shade/light.plain.spv")),
+    ("shade/light.shadowed", include_bytes!("shade/light.shadowed.spv")),
+    ("shade/light.occluded", include_bytes!("shade/light.occluded.spv")),
+    ("shade/light.shadowed_occluded", include_bytes!("shade/light.shadowed_occluded.spv")),
+    ("shade/occlusion", include_bytes!("shade/occlusion.spv")),
+    ("shade/shadow", include_bytes!("shade/shadow.spv")),
 ]

@@ -126,7 +126,10 @@ fn scenes() -> Vec<Scene> {
     let filters = [
         "",
         "slices = { median = true, sigma = {}, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\n\
-         distance = { median = 3, sigma = {}, bilateral = { pixels = 2.0, distance = 1.0 } }\npost = { sigma = {} }",
+         distance = { median = 3, sigma = {}, bilateral = { pixels = 2.0, distance = 1.0 } }\npost = { sigma = {}, enhanced_sigma = {} }\n\
+         light = { shadow = {}, occlusion = {}, skin = {} }",
+        "light = { shadow = {} }",
+        "light = { occlusion = {} }",
         "slices = { median = true }",
         "slices = { sigma = {} }",
         "slices = { smooth = { lateral = 1.0 } }",

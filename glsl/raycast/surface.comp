@@ -5,7 +5,9 @@
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int ROUGH = 2; // fine steps in a rough one; 1: no rough detector
-layout(constant_id = 4) const int PEAK = 1;  // 0: the first crossing is the place
+layout(constant_id = 4) const int PEAK = 1;   // 0: the first crossing is the place
+layout(constant_id = 5) const int NUMBER = 1; // which surface of the ray
+layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
     float threshold;
@@ -14,7 +16,7 @@ layout(scalar) uniform Params {
 };
 #include "ray.glsl"
 uniform writeonly image2D distance_map;
-uniform writeonly image2D surface; // echo at the surface, 1 where one was found
+uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
 const int RING = 8;
 const int SEARCH_ROUGH = 0, SEARCH_FINE = 1, FOLLOW = 2;
@@ -36,6 +38,7 @@ void main() {
     int segment = first;    // first sample since the ray entered the insonified region
     int filled = 0;
     int fired = 0;
+    int seen = 0; // surfaces left behind
     bool found = false;
     vec4 older = vec4(0.0), newer = vec4(0.0);
     float previous = 0.0;
@@ -82,7 +85,7 @@ void main() {
                 before = filled > RING ? previous : difference;
                 echo = dot(newer, vec4(0.25));
                 found = PEAK == 0;
-                if (PEAK == 0) break;
+                if (PEAK == 0 && seen + 1 == NUMBER) break;
             } else if (ROUGH > 1 && i >= limit) {
                 // A false alarm: the rough ring is refilled so that its next word is about what the fine one has not seen.
                 state = SEARCH_ROUGH;
@@ -97,8 +100,18 @@ void main() {
                 after = difference;
                 found = true;
             }
-            if (i >= fired + RING) break;
-            if (difference > best) {
+            if (i >= fired + RING) {
+                if (++seen == NUMBER) break;
+                // The next surface is looked for from here.
+                state = start;
+                stride = ROUGH;
+                filled = 0;
+                segment = i;
+                limit = 0x7fffffff;
+                found = false;
+                continue;
+            }
+            if (PEAK == 1 && difference > best) {
                 best = difference;
                 best_at = i;
                 before = previous;
@@ -110,7 +123,8 @@ void main() {
         i += stride;
     }
     float distance = MISS;
-    if (found) {
+    float behind = 0.0;
+    if (found && seen + 1 >= NUMBER) {
         float place = float(best_at);
         if (PEAK == 1) {
             // The edge lies in the middle of the ring where the difference peaks; a parabola through the neighbours refines.
@@ -120,8 +134,17 @@ void main() {
         }
         float at = (place + 0.5) * step_length;
         found = at >= 0.0 && at <= ray.leave - ray.enter;
-        if (found) distance = ray.enter + at;
+        if (found) {
+            distance = ray.enter + at;
+            for (int i = 1; i <= BEHIND; ++i) {
+                vec3 texel;
+                if (locate(ray.origin + ray.direction * (distance + float(i) * step_length), texel)) behind += sample_volume(texel);
+            }
+            behind /= float(max(BEHIND, 1));
+        }
+    } else {
+        found = false;
     }
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
-    imageStore(surface, pixel, vec4(found ? echo : 0.0, found ? 1.0 : 0.0, 0.0, 0.0));
+    imageStore(surface, pixel, vec4(found ? echo : 0.0, found ? 1.0 : 0.0, behind, 0.0));
 }

@@ -29,8 +29,12 @@ const DISTANCES: Chain = Chain {
     last: None,
 };
 
-const PICTURES: Chain =
-    Chain { passes: &["sigma_picture"], first: |_| Slot::Picture, spare: [Slot::SmoothPicture; 2], last: None };
+const PICTURES: Chain = Chain {
+    passes: &["sigma_picture", "enhanced_sigma_picture"],
+    first: |_| Slot::Picture,
+    spare: [Slot::SmoothPicture, Slot::SmoothPictureB],
+    last: None,
+};
 
 impl Chain {
     fn needed(&self) -> impl Iterator<Item = &'static Pass> {

@@ -12,6 +12,7 @@ pub mod preprocess {
 }
 pub mod filter {
     pub mod bilateral;
+    pub mod enhanced_sigma;
     pub mod gaussian;
     pub mod median;
     pub mod sigma;
@@ -21,9 +22,7 @@ pub mod raycast {
     pub mod surface;
     pub mod volume;
 }
-pub mod shade {
-    pub mod light;
-}
+pub mod shade;
 pub mod postprocess {
     pub mod tone;
 }
@@ -55,8 +54,11 @@ pub const PASSES: &[Pass] = &[
     filter::median::DISTANCE,
     filter::bilateral::DISTANCE,
     filter::sigma::DISTANCE,
+    shade::shadow::PASS,
+    shade::occlusion::PASS,
     shade::light::PASS,
     filter::sigma::PICTURE,
+    filter::enhanced_sigma::PICTURE,
     postprocess::tone::PASS,
 ];
 

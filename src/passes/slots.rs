@@ -32,11 +32,16 @@ pub enum Slot {
     Distance,
     DistanceA,
     DistanceB,
-    /// Echo at the surface, and 1 where a surface was found.
+    /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look wants it.
     Surface,
+    /// Light that arrives at each pixel's surface, 0..1.
+    Shadow,
+    /// Ambient light that arrives, 0..1.
+    Occlusion,
     /// The lit or composited picture.
     Picture,
     SmoothPicture,
+    SmoothPictureB,
     /// 8-bit result.
     Screen,
 }
@@ -114,7 +119,7 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 17] = [
+    pub const ALL: [Slot; 20] = [
         Slot::Frames,
         Slot::ScanLut,
         Slot::SliceA,
@@ -129,8 +134,11 @@ impl Slot {
         Slot::DistanceA,
         Slot::DistanceB,
         Slot::Surface,
+        Slot::Shadow,
+        Slot::Occlusion,
         Slot::Picture,
         Slot::SmoothPicture,
+        Slot::SmoothPictureB,
         Slot::Screen,
     ];
 
@@ -151,8 +159,11 @@ impl Slot {
             Slot::DistanceA => "distance_a",
             Slot::DistanceB => "distance_b",
             Slot::Surface => "surface",
+            Slot::Shadow => "shadow",
+            Slot::Occlusion => "occlusion",
             Slot::Picture => "picture",
             Slot::SmoothPicture => "smooth_picture",
+            Slot::SmoothPictureB => "smooth_picture_b",
             Slot::Screen => "screen",
         }
     }
@@ -167,7 +178,12 @@ impl Slot {
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
             Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.picture_size()),
-            Slot::Picture | Slot::SmoothPicture | Slot::Screen => Shape::Two(scene.picture_size()),
+            Slot::Shadow
+            | Slot::Occlusion
+            | Slot::Picture
+            | Slot::SmoothPicture
+            | Slot::SmoothPictureB
+            | Slot::Screen => Shape::Two(scene.picture_size()),
         }
     }
 
@@ -188,8 +204,10 @@ impl Slot {
             },
             Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer => Format::Floats,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
+            Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
-            Slot::Picture | Slot::SmoothPicture => Format::Rgba16f,
+            Slot::Shadow | Slot::Occlusion => Format::R16f,
+            Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB => Format::Rgba16f,
             Slot::Screen => Format::Rgba8,
         }
     }

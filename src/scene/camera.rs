@@ -17,6 +17,9 @@ pub struct Rays {
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
+    /// What the camera looks at, mm.
+    pub target: DVec3,
+    pub is_perspective: bool,
 }
 
 impl Rays {
@@ -73,6 +76,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
             right,
             up,
             forward,
+            target,
+            is_perspective: true,
         }
     } else {
         Rays {
@@ -85,6 +90,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
             right,
             up,
             forward,
+            target,
+            is_perspective: false,
         }
     }
 }

@@ -2,8 +2,10 @@
 //! and resolved into what the passes ask for. Pure data, no Vulkan.
 
 pub mod camera;
+mod check;
 pub mod load;
 pub mod settings;
+mod settings_shade;
 pub mod transfer;
 
 pub use camera::Rays;
@@ -86,7 +88,7 @@ impl Scene {
                 grid.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
             }
         }
-        check(&settings)?;
+        check::check(&settings)?;
         let [low, high] = input.range;
         if !(low.is_finite() && high.is_finite() && low < high) {
             return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
@@ -156,6 +158,19 @@ impl Scene {
     pub fn smoothing(&self) -> [f64; 3] {
         let smooth = self.settings.slices.smooth.unwrap_or_default();
         [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
+    }
+
+    /// Samples behind the surface whose mean echo the skin look wants; 0 for none.
+    pub fn samples_behind(&self) -> u32 {
+        match self.settings.light.skin {
+            Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.step).ceil() as u32).min(256),
+            _ => 0,
+        }
+    }
+
+    /// Where a near light is, in space.
+    pub fn light_place(&self) -> Option<DVec3> {
+        self.settings.light.position.map(|p| self.rays.target + self.rays.from_camera(p))
     }
 
     /// How many pixels away a slice's filters look.
@@ -249,104 +264,4 @@ fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(DVec3, DVec3
         low.y = low.y.max(start + offset);
     }
     Ok((low, high))
-}
-
-/// Everything that can be told without a geometry.
-fn check(settings: &Settings) -> Result<(), SceneError> {
-    let within = |field, value: f64, low: f64, high: f64| match value >= low && value <= high {
-        true => Ok(()),
-        false => refuse(field, format!("is {value}, must lie in {low}..={high}")),
-    };
-    let [width, height] = settings.picture.size;
-    if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
-        return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
-    }
-    let s = &settings.slices;
-    within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
-    if let Some(smooth) = s.smooth {
-        within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
-        within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
-        within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
-    }
-    check_sigma("slices.sigma", s.sigma)?;
-    check_sigma("distance.sigma", settings.distance.sigma)?;
-    check_sigma("post.sigma", settings.post.sigma)?;
-    if settings.distance.median > 0 {
-        check_window("distance.median", settings.distance.median)?;
-    }
-    if let Some(b) = settings.distance.bilateral {
-        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
-        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
-        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
-    }
-    for (field, [low, high]) in [("volume.window", settings.volume.window), ("surface.window", settings.surface.window)]
-    {
-        if !(low.is_finite() && high.is_finite() && low < high) {
-            return refuse(field, format!("[{low}, {high}] must be finite and rise"));
-        }
-    }
-    let c = &settings.camera;
-    for (field, value) in [("camera.azimuth", c.azimuth), ("camera.elevation", c.elevation), ("camera.roll", c.roll)] {
-        within(field, value, -360.0, 360.0)?;
-    }
-    within("camera.zoom", c.zoom, 1e-3, 1e3)?;
-    within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
-    if c.field_of_view > 0.0 && c.field_of_view < 1.0 {
-        // The camera would stand so far away that f32 has no digits left for the body.
-        return refuse(
-            "camera.field_of_view",
-            format!("is {}, must be 0 (parallel) or at least 1 deg", c.field_of_view),
-        );
-    }
-    for value in c.target.iter().flatten() {
-        within("camera.target", *value, -1e6, 1e6)?;
-    }
-    if let Some(step) = settings.ray.step {
-        within("ray.step", step, 1e-4, 1e3)?;
-    }
-    within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
-    if let Some(fault) = transfer::fault(&settings.volume.transfer) {
-        return refuse("volume.transfer", fault);
-    }
-    let f = &settings.surface;
-    within("surface.threshold", f.threshold, 1e-6, 1.0)?;
-    within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
-    within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
-    let l = &settings.light;
-    if !l.direction.is_finite() || l.direction.length() < 1e-6 {
-        return refuse("light.direction", "must be finite and not zero");
-    }
-    for (field, value, high) in [
-        ("light.ambient", l.ambient, 10.0),
-        ("light.diffuse", l.diffuse, 10.0),
-        ("light.specular", l.specular, 10.0),
-        ("light.shininess", l.shininess, 1e6),
-        ("light.texture", l.texture, 1.0),
-        ("light.cliff", l.cliff, 1e6),
-    ] {
-        within(field, value, 0.0, high)?;
-    }
-    for (field, colour) in [("light.colour", l.colour), ("light.surface_colour", l.surface_colour)] {
-        colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0))?;
-    }
-    within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
-    within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
-    within("post.gamma", settings.post.gamma, 0.1, 10.0)
-}
-
-fn check_window(field: &'static str, window: u32) -> Result<(), SceneError> {
-    match window % 2 == 1 && (3..=MAX_WINDOW).contains(&window) {
-        true => Ok(()),
-        false => refuse(field, format!("window is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
-    }
-}
-
-fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
-    let Some(sigma) = sigma else { return Ok(()) };
-    check_window(field, sigma.window)?;
-    // Infinity is allowed: it is the box mean.
-    match sigma.sigma >= 0.0 {
-        true => Ok(()),
-        false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
-    }
 }

@@ -1,7 +1,7 @@
 //! What a user may ask of a picture: the TOML scene file, its presets and defaults. Lengths in mm, angles in degrees,
 //! samples and opacities in 0..1. Every struct refuses unknown keys, so that a typing error is not silently a default.
 
-use glam::DVec3;
+pub use super::settings_shade::*;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -88,6 +88,25 @@ pub struct Sigma {
 impl Default for Sigma {
     fn default() -> Self {
         Sigma { window: 7, sigma: 0.1 }
+    }
+}
+
+/// The sigma filter with a window that grows where too few neighbours are like the centre (thesis 5.4), about a centre
+/// estimated by a median of 3x3.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EnhancedSigma {
+    /// Odd edge of the window to start with, pixels.
+    pub window: u32,
+    /// Odd edge of the largest window, pixels.
+    pub largest: u32,
+    /// Standard deviation of the noise, 0..1: a neighbour counts within 2 sigma of brightness.
+    pub sigma: f64,
+}
+
+impl Default for EnhancedSigma {
+    fn default() -> Self {
+        EnhancedSigma { window: 5, largest: 19, sigma: 0.1 }
     }
 }
 
@@ -220,6 +239,8 @@ pub struct Surface {
     pub rough: u32,
     pub sign: Sign,
     pub place: Place,
+    /// Which surface of the ray, 1..=8: 1 is the outermost, 2 the next behind it.
+    pub number: u32,
 }
 
 impl Default for Surface {
@@ -232,6 +253,7 @@ impl Default for Surface {
             rough: 2,
             sign: Sign::Bright,
             place: Place::Peak,
+            number: 1,
         }
     }
 }
@@ -257,73 +279,12 @@ pub enum Place {
     FirstCrossing,
 }
 
-/// Stage 3: edge-preserving filters of the distance map, in this order.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Distance {
-    /// Odd edge of a median's window, pixels; 0 for none.
-    pub median: u32,
-    pub bilateral: Option<Bilateral>,
-    /// A sigma filter whose sigma is in mm.
-    pub sigma: Option<Sigma>,
-}
-
-/// Gaussian in place and in distance.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bilateral {
-    /// Standard deviation in the picture, pixels.
-    pub pixels: f64,
-    /// Standard deviation of the distance, mm.
-    pub distance: f64,
-    /// Times in a row, 1..=16.
-    #[serde(default = "once")]
-    pub repeat: u32,
-}
-
-fn once() -> u32 {
-    1
-}
-
-/// Stage 3: the light. Directions are the camera's: right, up, towards the viewer.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Light {
-    /// From the surface to the light.
-    pub direction: DVec3,
-    pub ambient: f64,
-    pub diffuse: f64,
-    pub specular: f64,
-    pub shininess: f64,
-    pub colour: [f64; 3],
-    pub surface_colour: [f64; 3],
-    /// How much the echo at the surface darkens its colour, 0..1.
-    pub texture: f64,
-    /// Neighbours further apart than this are two surfaces: no normal is taken across, mm.
-    pub cliff: f64,
-}
-
-impl Default for Light {
-    fn default() -> Self {
-        Light {
-            direction: DVec3::new(-0.5, 0.6, 0.6),
-            ambient: 0.18,
-            diffuse: 0.75,
-            specular: 0.18,
-            shininess: 24.0,
-            colour: [1.0, 1.0, 1.0],
-            surface_colour: [0.93, 0.72, 0.56],
-            texture: 0.0,
-            cliff: 2.0,
-        }
-    }
-}
-
 /// Stage 4.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Post {
     pub sigma: Option<Sigma>,
+    pub enhanced_sigma: Option<EnhancedSigma>,
     /// Added, -1..1.
     pub brightness: f64,
     /// Multiplied about the middle grey, 0..10.
@@ -335,7 +296,14 @@ pub struct Post {
 
 impl Default for Post {
     fn default() -> Self {
-        Post { sigma: None, brightness: 0.0, contrast: 1.0, gamma: 1.0, colour_map: ColourMap::None }
+        Post {
+            sigma: None,
+            enhanced_sigma: None,
+            brightness: 0.0,
+            contrast: 1.0,
+            gamma: 1.0,
+            colour_map: ColourMap::None,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Scenes whose answer is a formula.
 
 use crate::common::*;
-use echolume::passes::shade::light::normal;
+use echolume::passes::shade::normal;
 use echolume::passes::{MISS, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;

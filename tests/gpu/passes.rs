@@ -17,7 +17,7 @@ const ALL_FILTERS: &str = "
     slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
     distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }
     post = { sigma = { window = 5, sigma = 0.05 }, brightness = 0.05, contrast = 1.3, gamma = 1.8, colour_map = 'skin' }
-    light = { texture = 0.4, shininess = 40.0 }
+    light = { texture = 0.4, shininess = 40.0, shadow = { softness = 0.3 }, occlusion = {}, position = [5.0, 10.0, 30.0] }
     picture = { size = [37, 29] }
     camera = { azimuth = 20, elevation = -35, roll = 10, field_of_view = 30 }
     ray = { step = 0.5, sampling = 'exact' }
@@ -83,6 +83,31 @@ fn scenes() -> Vec<(String, Scene)> {
         ),
         ("parallel to a face", "camera = { elevation = 90 }\nslices = { pixels = 30 }"),
         ("inside the volume", "camera = { field_of_view = 90, zoom = 20 }\nslices = { pixels = 30 }"),
+        ("shadow, hard", "light = { shadow = { softness = 0.0, bias = 0.4 } }\nslices = { pixels = 12 }"),
+        (
+            "shadow, soft, near light",
+            "light = { position = [10.0, 15.0, 25.0], shadow = {} }\nslices = { pixels = 12 }",
+        ),
+        ("occlusion", "light = { occlusion = { radius = 8.0, strength = 1.5 } }\nslices = { pixels = 12 }"),
+        ("skin", "light = { skin = {}, shadow = {}, occlusion = {} }\nslices = { pixels = 30 }"),
+        ("light on the surface", "light = { position = [0.0, 0.0, 0.0], shadow = {} }\nslices = { pixels = 12 }"),
+        (
+            "light behind",
+            "light = { direction = [0.0, 0.0, -1.0], shadow = {}, skin = { translucency = 1.0 } }\nslices = { pixels = 12 }",
+        ),
+        ("second surface", "surface = { number = 2, threshold = 0.05 }\nslices = { pixels = 30 }"),
+        (
+            "third surface, no rough detector",
+            "surface = { number = 3, threshold = 0.05, rough = 1, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        (
+            "enhanced sigma",
+            "post = { enhanced_sigma = { window = 3, largest = 11, sigma = 0.08 } }\nslices = { pixels = 12 }",
+        ),
+        (
+            "both sigmas",
+            "post = { sigma = { window = 3, sigma = 0.1 }, enhanced_sigma = { window = 5, largest = 5, sigma = inf } }\nslices = { pixels = 12 }",
+        ),
         ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
         ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
     ] {

@@ -129,8 +129,12 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
         "bilateral = { pixels = 1.0, distance = 0.5, repeat = 3 }, ",
     ];
     let sigmas = ["", "sigma = { window = 3, sigma = 0.5 }", "sigma = { window = 5, sigma = 0.2 }"];
-    let lights = ["", "light = { direction = [1.0, 0.0, 0.4] }"];
-    let posts = ["", "post = { sigma = { window = 3, sigma = 0.2 } }", "post = { gamma = 2.0 }"];
+    let lights = ["", "light = { direction = [1.0, 0.0, 0.4], shadow = {} }", "light = { occlusion = {}, skin = {} }"];
+    let posts = [
+        "",
+        "post = { sigma = { window = 3, sigma = 0.2 } }",
+        "post = { gamma = 2.0, sigma = { window = 3, sigma = 0.2 }, enhanced_sigma = { window = 3, largest = 7, sigma = 0.1 } }",
+    ];
     let modes = ["sr", "sr", "sr", "vr"];
     let mut noise = Noise(3);
     let mut pick = |n: usize| (noise.next() * n as f64) as usize;
@@ -141,7 +145,7 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
             medians[pick(3)],
             bilaterals[pick(3)],
             sigmas[pick(3)],
-            lights[pick(2)],
+            lights[pick(3)],
             posts[pick(3)]
         );
         scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(", }", " }"))

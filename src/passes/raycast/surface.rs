@@ -3,7 +3,7 @@
 
 use super::ray;
 use crate::passes::*;
-use crate::scene::{Place, RING, Sign};
+use crate::scene::{Place, RING, Scene, Sign};
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface",
@@ -26,6 +26,8 @@ pub const PASS: Pass = Pass {
         let mut constants = ray::constants(s);
         constants.push(("ROUGH", s.settings.surface.rough as i32));
         constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));
+        constants.push(("NUMBER", s.settings.surface.number as i32));
+        constants.push(("BEHIND", s.samples_behind() as i32));
         constants
     },
     tolerance: Tolerance {
@@ -53,15 +55,27 @@ pub const PASS: Pass = Pass {
                 let within = |place: f64| (0.0..=leave - enter).contains(&((place + 0.5) * scene.step));
                 let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
                 let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
-                    Some((place, echo)) => (enter + (place + 0.5) * scene.step, [echo, 1.0]),
-                    None => (MISS, [0.0, 0.0]),
+                    Some((place, echo)) => {
+                        let distance = enter + (place + 0.5) * scene.step;
+                        (distance, [echo, 1.0, behind(scene, volume, origin, direction, distance), 0.0])
+                    }
+                    None => (MISS, [0.0; 4]),
                 };
                 writes.get_mut("distance_map").set([x, y, 0], &[distance]);
-                writes.get_mut("surface").set([x, y, 0], &surface);
+                let map = writes.get_mut("surface");
+                map.set([x, y, 0], &surface[..map.channels]);
             }
         }
     },
 };
+
+/// Mean echo over the samples that the skin look wants, one step after the other behind the surface.
+fn behind(scene: &Scene, volume: &Texels, origin: DVec3, direction: DVec3, distance: f64) -> f64 {
+    let count = scene.samples_behind();
+    let at = |i: u32| origin + direction * (distance + f64::from(i) * scene.step);
+    let sum: f64 = (1..=count).filter_map(|i| ray::sample(scene, volume, at(i))).sum();
+    sum / f64::from(count.max(1))
+}
 
 fn polarity(scene: &Scene) -> f64 {
     match scene.settings.surface.sign {
@@ -95,6 +109,7 @@ fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f6
     };
     let mut since = 0;
     let mut i = 0;
+    let mut seen = 0;
     'rough: while i < samples.len() {
         if samples[i].is_none() {
             i += rough;
@@ -127,7 +142,17 @@ fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f6
                 }
                 from = at + 1;
             } else if let Some(d) = crossing(at, from) {
-                return place(scene, &difference, &|i| mean(i, 1, 0), at, d, from);
+                seen += 1;
+                if seen == surface.number {
+                    return place(scene, &difference, &|i| mean(i, 1, 0), at, d, from);
+                }
+                // The next surface is looked for behind this one, if the ray stays inside until then.
+                let beyond = at + ring;
+                if !(at..=beyond).all(|n| samples.get(n).is_some_and(|s| s.is_some())) {
+                    return None;
+                }
+                (i, since) = (beyond, beyond);
+                continue 'rough;
             } else if at >= limit {
                 i = limit - (ring - 2) * rough;
                 since = i;

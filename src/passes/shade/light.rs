@@ -1,28 +1,34 @@
-//! Normals from the distance map, and Blinn-Phong (thesis 4-4..4-7) under a directional light.
+//! Blinn-Phong (thesis 4-4..4-7) under a far or near light, with shadow, occlusion and the look of skin where asked for.
 
+use super::{camera_params, light_at, normal, to_light};
 use crate::passes::chain::distance_end;
 use crate::passes::*;
-use crate::scene::Scene;
+use crate::scene::{Scene, Skin};
 
 pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |_| "shade/light",
+    shader: |s| match (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s)) {
+        (false, false) => "shade/light.plain",
+        (true, false) => "shade/light.shadowed",
+        (false, true) => "shade/light.occluded",
+        (true, true) => "shade/light.shadowed_occluded",
+    },
     needed: |s| if s.is_surface() { Ok("a surface is lit") } else { Err("no surface in this mode") },
-    reads: |s, _| vec![whole("distance_map", distance_end(s)), whole("surface", Slot::Surface)],
+    reads: |s, _| {
+        let mut reads = vec![whole("distance_map", distance_end(s)), whole("surface", Slot::Surface)];
+        reads.extend(super::shadow::PASS.is_needed(s).then_some(whole("shadow", Slot::Shadow)));
+        reads.extend(super::occlusion::PASS.is_needed(s).then_some(whole("occlusion", Slot::Occlusion)));
+        reads
+    },
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
-        let (rays, light) = (&s.rays, &s.settings.light);
-        Params::default()
-            .vec3("origin_dx", rays.origin_dx)
-            .vec3("origin_dy", rays.origin_dy)
-            .vec3("direction", rays.direction)
-            .vec3("direction_dx", rays.direction_dx)
-            .vec3("direction_dy", rays.direction_dy)
-            .vec3("to_light", to_light(s))
+        let light = &s.settings.light;
+        camera_params(s)
+            .vec3("light_at", light_at(s))
             .f32("ambient", light.ambient)
             .f32("diffuse", light.diffuse)
             .f32("specular", light.specular)
@@ -30,73 +36,73 @@ pub const PASS: Pass = Pass {
             .vec3("light_colour", light.colour)
             .vec3("surface_colour", light.surface_colour)
             .f32("texture_share", light.texture)
-            .f32("cliff", light.cliff)
+            .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
+            .vec3("wrap", wrap(light.skin))
+            .vec3("through", through(light.skin))
     },
-    constants: no_constants,
+    constants: |s| {
+        let light = &s.settings.light;
+        vec![("POINT", light.position.is_some() as i32), ("SKIN", light.skin.is_some() as i32)]
+    },
     tolerance: Tolerance {
         absolute: 6e-3,
         relative: 6e-3,
         outliers: 5e-3,
-        why: "a place of 100 mm has 8e-6 mm of rounding in f32, a slope over two pixels of 0.2 mm is off by 4e-5, and a \
-              shininess of 100 multiplies that; a neighbour at exactly the cliff's height may count or not",
+        why: "a slope is off by 1e-6 in f32, and a shininess of 1e6 multiplies what that does to a cosine; a neighbour at \
+              exactly the cliff's height may count or not",
     },
     reference: |scene, _, reads, writes| {
-        let distances = reads.get("distance_map");
-        let surface = reads.get("surface");
         let picture = writes.get_mut("picture");
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                let colour = lit(scene, distances, surface.get([x, y, 0]), x as i64, y as i64);
+                let colour = lit(scene, reads, x, y);
                 picture.set([x, y, 0], &colour.map_or([0.0; 4], |c| [c.x, c.y, c.z, 1.0]));
             }
         }
     },
 };
 
-/// Unit vector towards the light, in space.
-fn to_light(scene: &Scene) -> DVec3 {
-    scene.rays.from_camera(scene.settings.light.direction.normalize())
+/// Red wraps furthest: light travels furthest through skin at long wavelengths.
+fn wrap(skin: Option<Skin>) -> DVec3 {
+    DVec3::new(1.0, 0.55, 0.35) * skin.map_or(0.0, |s| s.wrap)
 }
 
-fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f64)> {
-    let [width, height, _] = distances.size;
-    if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 {
-        return None;
-    }
-    let distance = distances.one(x as usize, y as usize, 0);
-    let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-    is_hit(distance).then(|| (origin + direction * distance, distance))
+fn through(skin: Option<Skin>) -> DVec3 {
+    skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
 }
 
-/// Unit normal at a pixel, towards the viewer.
-pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
-    let (here, distance) = place(scene, distances, x, y)?;
-    let slope = |dx: i64, dy: i64, facing: DVec3| {
-        let same = |p: &(DVec3, f64)| (p.1 - distance).abs() <= scene.settings.light.cliff;
-        let back = place(scene, distances, x - dx, y - dy).filter(same);
-        let on = place(scene, distances, x + dx, y + dy).filter(same);
-        match (back, on) {
-            (None, None) => facing,
-            (back, on) => on.map_or(here, |p| p.0) - back.map_or(here, |p| p.0),
-        }
-    };
-    let rays = &scene.rays;
-    let sx = slope(1, 0, rays.origin_dx + rays.direction_dx);
-    let sy = slope(0, 1, rays.origin_dy + rays.direction_dy);
-    let (_, along) = rays.at(x as f64 + 0.5, y as f64 + 0.5);
-    let normal = sy.cross(sx).try_normalize().unwrap_or(-along);
-    Some(if normal.dot(along) > 0.0 { -normal } else { normal })
-}
-
-fn lit(scene: &Scene, distances: &Texels, surface: &[f64], x: i64, y: i64) -> Option<DVec3> {
-    let normal = normal(scene, distances, x, y)?;
+fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<DVec3> {
+    let distances = reads.get("distance_map");
+    let (place, _) = super::place(scene, distances, x as i64, y as i64)?;
+    let normal = normal(scene, distances, x as i64, y as i64)?;
     let light = &scene.settings.light;
     let (_, along) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-    let facing = normal.dot(to_light(scene)).max(0.0);
-    let halfway = (to_light(scene) - along).try_normalize().unwrap_or(DVec3::ZERO);
+    let (to_light, _) = to_light(scene, place, normal);
+    let cosine = normal.dot(to_light);
+    let facing = cosine.max(0.0);
+    let halfway = (to_light - along).try_normalize().unwrap_or(DVec3::ZERO);
     let gloss = normal.dot(halfway).max(0.0).powf(light.shininess);
-    let shine = if facing > 0.0 { light.specular * gloss } else { 0.0 };
-    let texture = 1.0 + (surface[0] - 1.0) * light.texture * surface[1];
-    let colour = DVec3::from(light.surface_colour) * texture;
-    Some(DVec3::from(light.colour) * (colour * (light.ambient + light.diffuse * facing) + shine))
+    let surface = reads.get("surface").get([x, y, 0]);
+    let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
+    let colour = DVec3::from(light.surface_colour) * (1.0 + (echo - 1.0) * light.texture * found);
+
+    let arrives = light.shadow.map_or(1.0, |s| match super::shadow::PASS.is_needed(scene) {
+        true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
+        false => 1.0,
+    });
+    let open = if super::occlusion::PASS.is_needed(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
+    let (diffused, glow) = match light.skin {
+        None => (DVec3::splat(facing * arrives), DVec3::ZERO),
+        Some(_) => {
+            let wrap = wrap(light.skin);
+            let wrapped = ((DVec3::splat(cosine) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
+            // What a shadow leaves is red first.
+            let softened = DVec3::splat(arrives) + (1.0 - arrives) * 0.5 * wrap;
+            let thin = found * (1.0 - behind.clamp(0.0, 1.0));
+            (wrapped * softened, through(light.skin) * thin * (0.35 + 0.65 * (-cosine).max(0.0)))
+        }
+    };
+    let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
+    let body = colour * (light.ambient * open + light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0)));
+    Some(DVec3::from(light.colour) * (body + glow * open + shine))
 }

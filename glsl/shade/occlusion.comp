@@ -1,0 +1,45 @@
+// Ambient light that corners keep out, in image space: places of the distance map around a pixel, on a spiral, that stand out
+// of its tangent plane take away sky. (After Mittring 2007 and Bavoil and Sainz 2008: horizon by samples, falling off to the radius.)
+#version 460
+#include "common.glsl"
+layout(constant_id = 0) const int SAMPLES = 32;
+layout(scalar) uniform Params {
+#include "camera_params.glsl"
+    float radius;   // mm
+    float strength;
+};
+#include "distance_map.glsl"
+uniform writeonly image2D occlusion;
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(occlusion)))) return;
+    float distance = distance_at(pixel);
+    float open = 1.0;
+    if (is_hit(distance)) {
+        vec2 at = vec2(pixel) + 0.5;
+        vec3 along_ray = ray_direction(at);
+        vec3 here = ray_origin(at) + along_ray * distance;
+        vec3 normal = normal_at(pixel, distance, along_ray);
+        // Pixels that the radius spans where the surface is.
+        float pixels = radius / max(length(origin_dx + direction_dx * distance), 1e-9);
+        float taken = 0.0;
+        for (int i = 0; i < SAMPLES; ++i) {
+            // Even over the disc's area; the golden angle keeps directions apart.
+            float share = sqrt((float(i) + 0.5) / float(SAMPLES));
+            float turn = 2.39996323 * float(i);
+            ivec2 tap = ivec2(floor(at + pixels * share * vec2(cos(turn), sin(turn))));
+            float other = distance_at(tap);
+            if (!is_hit(other)) continue;
+            vec2 there = vec2(tap) + 0.5;
+            vec3 way = ray_origin(there) + ray_direction(there) * other - here;
+            float far = length(way);
+            if (far < 1e-6) continue;
+            float falls = max(1.0 - far * far / (radius * radius), 0.0);
+            // A tenth: what the map's own roughness raises is no corner.
+            taken += max(dot(normal, way) / far - 0.1, 0.0) * falls;
+        }
+        open = clamp(1.0 - strength * 2.0 * taken / float(SAMPLES), 0.0, 1.0);
+    }
+    imageStore(occlusion, pixel, vec4(open, 0.0, 0.0, 0.0));
+}

@@ -1,0 +1,133 @@
+//! What no scene may ask for, told by name and limit.
+
+use super::{Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+
+/// Everything that can be told without a geometry.
+pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
+    let [width, height] = settings.picture.size;
+    if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
+        return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
+    }
+    let s = &settings.slices;
+    within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
+    if let Some(smooth) = s.smooth {
+        within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
+        within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
+        within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
+    }
+    check_sigma("slices.sigma", s.sigma)?;
+    check_sigma("distance.sigma", settings.distance.sigma)?;
+    check_sigma("post.sigma", settings.post.sigma)?;
+    if settings.distance.median > 0 {
+        check_window("distance.median", settings.distance.median)?;
+    }
+    if let Some(b) = settings.distance.bilateral {
+        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
+        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
+        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
+    }
+    for (field, [low, high]) in [("volume.window", settings.volume.window), ("surface.window", settings.surface.window)]
+    {
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            return refuse(field, format!("[{low}, {high}] must be finite and rise"));
+        }
+    }
+    let c = &settings.camera;
+    for (field, value) in [("camera.azimuth", c.azimuth), ("camera.elevation", c.elevation), ("camera.roll", c.roll)] {
+        within(field, value, -360.0, 360.0)?;
+    }
+    within("camera.zoom", c.zoom, 1e-3, 1e3)?;
+    within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
+    if c.field_of_view > 0.0 && c.field_of_view < 1.0 {
+        // The camera would stand so far away that f32 has no digits left for the body.
+        return refuse(
+            "camera.field_of_view",
+            format!("is {}, must be 0 (parallel) or at least 1 deg", c.field_of_view),
+        );
+    }
+    for value in c.target.iter().flatten() {
+        within("camera.target", *value, -1e6, 1e6)?;
+    }
+    if let Some(step) = settings.ray.step {
+        within("ray.step", step, 1e-4, 1e3)?;
+    }
+    within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
+    if let Some(fault) = transfer::fault(&settings.volume.transfer) {
+        return refuse("volume.transfer", fault);
+    }
+    let f = &settings.surface;
+    within("surface.threshold", f.threshold, 1e-6, 1.0)?;
+    within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
+    within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
+    within("surface.number", f64::from(f.number), 1.0, 8.0)?;
+    check_light(&settings.light)?;
+    if let Some(e) = settings.post.enhanced_sigma {
+        check_sigma("post.enhanced_sigma", Some(Sigma { window: e.window, sigma: e.sigma }))?;
+        check_window("post.enhanced_sigma", e.largest)?;
+        if e.largest < e.window {
+            return refuse("post.enhanced_sigma", format!("largest is {}, less than window {}", e.largest, e.window));
+        }
+    }
+    within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
+    within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
+    within("post.gamma", settings.post.gamma, 0.1, 10.0)
+}
+
+fn check_light(l: &Light) -> Result<(), SceneError> {
+    if !l.direction.is_finite() || l.direction.length() < 1e-6 {
+        return refuse("light.direction", "must be finite and not zero");
+    }
+    for value in l.position.iter().flat_map(|p| p.to_array()) {
+        within("light.position", value, -1e6, 1e6)?;
+    }
+    let shadow = l.shadow.unwrap_or_default();
+    let occlusion = l.occlusion.unwrap_or_default();
+    let skin = l.skin.unwrap_or_default();
+    for (field, value, low, high) in [
+        ("light.ambient", l.ambient, 0.0, 10.0),
+        ("light.diffuse", l.diffuse, 0.0, 10.0),
+        ("light.specular", l.specular, 0.0, 10.0),
+        ("light.shininess", l.shininess, 0.0, 1e6),
+        ("light.texture", l.texture, 0.0, 1.0),
+        ("light.cliff", l.cliff, 0.0, 1e6),
+        ("light.shadow.strength", shadow.strength, 0.0, 1.0),
+        ("light.shadow.softness", shadow.softness, 0.0, 10.0),
+        ("light.shadow.reach", shadow.reach, 1e-3, 1e4),
+        ("light.shadow.thickness", shadow.thickness, 0.0, 1e6),
+        ("light.shadow.bias", shadow.bias, 0.0, 1e3),
+        ("light.occlusion.radius", occlusion.radius, 1e-3, 1e3),
+        ("light.occlusion.strength", occlusion.strength, 0.0, 4.0),
+        ("light.skin.wrap", skin.wrap, 0.0, 1.0),
+        ("light.skin.translucency", skin.translucency, 0.0, 1.0),
+        ("light.skin.depth", skin.depth, 0.0, 100.0),
+    ] {
+        within(field, value, low, high)?;
+    }
+    let colours =
+        [("light.colour", l.colour), ("light.surface_colour", l.surface_colour), ("light.skin.colour", skin.colour)];
+    colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
+}
+
+fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
+    match value >= low && value <= high {
+        true => Ok(()),
+        false => refuse(field, format!("is {value}, must lie in {low}..={high}")),
+    }
+}
+
+fn check_window(field: &'static str, window: u32) -> Result<(), SceneError> {
+    match window % 2 == 1 && (3..=MAX_WINDOW).contains(&window) {
+        true => Ok(()),
+        false => refuse(field, format!("window is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
+    }
+}
+
+fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
+    let Some(sigma) = sigma else { return Ok(()) };
+    check_window(field, sigma.window)?;
+    // Infinity is allowed: it is the box mean.
+    match sigma.sigma >= 0.0 {
+        true => Ok(()),
+        false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
+    }
+}

@@ -1,0 +1,260 @@
+//! The bodies: which there are, what they send back, and the exact answers of those that have any.
+
+use super::DYNAMIC_RANGE;
+use super::beam::Beam;
+use super::head::Head;
+use super::refusal;
+use crate::probe::Probe;
+use crate::source::InputError;
+use glam::DVec3;
+use std::fmt;
+use std::str::FromStr;
+
+/// What the probe looks at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Body {
+    /// A fetal head, a hand and cord in fluid behind the uterine wall; it moves.
+    #[default]
+    Head,
+    /// A bright ball in dark fluid.
+    Sphere,
+    /// Dark above a plane across the beam, bright below.
+    Step,
+    /// Thin bright wires in dark fluid.
+    Wires,
+    /// The same everywhere.
+    Constant,
+    /// Grey that rises linearly with range, line angle and motor angle.
+    Ramp,
+}
+
+impl Body {
+    pub const ALL: [Body; 6] = [Body::Head, Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Body::Head => "head",
+            Body::Sphere => "sphere",
+            Body::Step => "step",
+            Body::Wires => "wires",
+            Body::Constant => "constant",
+            Body::Ramp => "ramp",
+        }
+    }
+}
+
+impl fmt::Display for Body {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Body {
+    type Err = InputError;
+
+    fn from_str(name: &str) -> Result<Body, InputError> {
+        let known = || Body::ALL.map(Body::name).join(", ");
+        let found = Body::ALL.into_iter().find(|body| body.name() == name);
+        found.ok_or_else(|| refusal("body", format!("'{name}' is not known, must be one of {}", known())))
+    }
+}
+
+/// A straight wire between two places, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wire {
+    pub from: DVec3,
+    pub to: DVec3,
+}
+
+impl Wire {
+    /// From the nearest point of the wire, mm.
+    pub fn distance(&self, place: DVec3) -> f64 {
+        let along = self.to - self.from;
+        let share = ((place - self.from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+        (place - self.from - along * share).length()
+    }
+}
+
+/// Grey = `middle` + `per_mm` (range - `range`) + `per_line_rad` line angle + `per_motor_rad` motor angle. Range is from the
+/// in-plane apex. Trilinear interpolation between samples reproduces it, whichever way the motor went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RampTruth {
+    pub middle: f64,
+    pub range: f64,
+    pub per_mm: f64,
+    pub per_line_rad: f64,
+    pub per_motor_rad: f64,
+}
+
+impl RampTruth {
+    pub fn grey(&self, range: f64, line_angle: f64, motor_angle: f64) -> f64 {
+        self.middle
+            + self.per_mm * (range - self.range)
+            + self.per_line_rad * line_angle
+            + self.per_motor_rad * motor_angle
+    }
+}
+
+/// What the answer must be: places in mm in the space of [`Probe`], greys 0..255 as they are without speckle.
+///
+/// Edges are linear in grey over one sample along the beam, with the middle grey on the edge itself.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Truth {
+    /// No formula.
+    Head,
+    Sphere {
+        centre: DVec3,
+        radius: f64,
+        inside: f64,
+        outside: f64,
+    },
+    /// The plane Y = `y`.
+    Step {
+        y: f64,
+        above: f64,
+        below: f64,
+    },
+    /// `peak` is the grey on a wire; it falls as a parabola, `per_mm2` times the square of the distance, down to `outside`.
+    Wires {
+        wires: Vec<Wire>,
+        peak: f64,
+        per_mm2: f64,
+        outside: f64,
+    },
+    Constant {
+        grey: f64,
+    },
+    Ramp(RampTruth),
+}
+
+/// What a place sends back, dB re full scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Echo {
+    /// From scatterers too many to tell apart: they give speckle.
+    pub diffuse: f32,
+    /// From a surface or wire as a whole: it gives none.
+    pub mirror: f32,
+}
+
+impl Echo {
+    /// Far below anything shown.
+    pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
+
+    /// Without speckle: the sum of both powers, dB.
+    pub fn bare(self) -> f32 {
+        if self.mirror <= Echo::SILENT.mirror {
+            return self.diffuse;
+        }
+        10.0 * (10f32.powf(self.diffuse / 10.0) + 10f32.powf(self.mirror / 10.0)).log10()
+    }
+}
+
+/// Greys of the bodies with exact answers. The constant one is 15 dB below full scale, where neither end of the scale clips.
+const BRIGHT: f64 = 204.0;
+const DARK: f64 = 25.5;
+const CONSTANT: f64 = 255.0 * (1.0 - 15.0 / DYNAMIC_RANGE);
+const WIRE_PEAK: f64 = 250.0;
+/// Grey falls by this times the square of the distance: a wire is 2.9 mm wide in all, so that no frame pitch skips it.
+const WIRE_FALL: f64 = 107.0;
+
+/// A body, placed before a probe.
+pub(super) enum Scatterers {
+    Head(Box<Head>),
+    Exact { truth: Truth, pitch: f64 },
+}
+
+impl Scatterers {
+    pub fn new(body: Body, probe: &Probe) -> Scatterers {
+        let face = probe.array_radius();
+        let depth = |depth: f64| face + depth;
+        let truth = match body {
+            Body::Head => return Scatterers::Head(Box::new(Head::new(face))),
+            Body::Sphere => Truth::Sphere {
+                centre: DVec3::new(4.0, depth(62.0), -3.0),
+                radius: 20.0,
+                inside: BRIGHT,
+                outside: DARK,
+            },
+            Body::Step => Truth::Step { y: depth(60.0), above: DARK, below: BRIGHT },
+            Body::Wires => {
+                let wire = |from: [f64; 3], to: [f64; 3]| {
+                    let place = |[x, y, z]: [f64; 3]| DVec3::new(x, depth(y), z);
+                    Wire { from: place(from), to: place(to) }
+                };
+                // Along the elevation, and aslant: a wire along the lateral axis may lie between two frames.
+                let wires = vec![
+                    wire([0.0, 30.0, -60.0], [0.0, 30.0, 60.0]),
+                    wire([-22.0, 45.0, -60.0], [-22.0, 45.0, 60.0]),
+                    wire([20.0, 60.0, -60.0], [20.0, 60.0, 60.0]),
+                    wire([-10.0, 70.0, -50.0], [10.0, 86.0, 50.0]),
+                    wire([30.0, 100.0, -70.0], [-30.0, 100.0, 70.0]),
+                ];
+                Truth::Wires { wires, peak: WIRE_PEAK, per_mm2: WIRE_FALL, outside: DARK }
+            }
+            Body::Constant => Truth::Constant { grey: CONSTANT },
+            Body::Ramp => {
+                // A third of the scale for each of the three, so that the corners stay within it.
+                let share = 80.0;
+                let over = |span: f64| share / span;
+                Truth::Ramp(RampTruth {
+                    middle: 127.5,
+                    range: (probe.first_range() + probe.last_range()) / 2.0,
+                    per_mm: over(probe.last_range() - probe.first_range()),
+                    per_line_rad: over(probe.lines.last() - probe.lines.first()),
+                    // The motor goes up to one pitch further than the last frame's first line.
+                    per_motor_rad: over(probe.slices.last() - probe.slices.first() + 2.0 * probe.slices.pitch()),
+                })
+            }
+        };
+        Scatterers::Exact { truth, pitch: probe.sample_pitch }
+    }
+
+    pub fn truth(&self) -> Truth {
+        match self {
+            Scatterers::Head(_) => Truth::Head,
+            Scatterers::Exact { truth, .. } => truth.clone(),
+        }
+    }
+
+    /// What each sample of a line sends back.
+    pub fn along(&self, beam: &Beam, out: &mut [Echo]) {
+        match self {
+            Scatterers::Head(head) => head.along(beam, out),
+            Scatterers::Exact { truth, pitch } => {
+                for (sample, echo) in out.iter_mut().enumerate() {
+                    *echo = exact(truth, beam, sample, *pitch);
+                }
+            }
+        }
+    }
+}
+
+fn level(grey: f64) -> f32 {
+    ((grey / 255.0 - 1.0) * DYNAMIC_RANGE) as f32
+}
+
+fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
+    let place = beam.place(sample);
+    // From one side of an edge to the other within one sample: a harder edge could not be placed between samples.
+    let edge = |beyond: f64, near: f64, far: f64| near + (far - near) * (beyond / pitch + 0.5).clamp(0.0, 1.0);
+    let diffuse = match truth {
+        Truth::Sphere { centre, radius, inside, outside } => {
+            edge(radius - (place - centre).length(), *outside, *inside)
+        }
+        Truth::Step { y, above, below } => edge(place.y - y, *above, *below),
+        Truth::Wires { wires, peak, per_mm2, outside } => {
+            let nearest = wires.iter().map(|wire| wire.distance(place)).fold(f64::MAX, f64::min);
+            let bump = peak - per_mm2 * nearest * nearest;
+            let mirror = if bump > *outside { level(bump) } else { Echo::SILENT.mirror };
+            return if mirror > Echo::SILENT.mirror {
+                Echo { diffuse: Echo::SILENT.diffuse, mirror }
+            } else {
+                Echo { diffuse: level(*outside), mirror }
+            };
+        }
+        Truth::Constant { grey } => *grey,
+        Truth::Ramp(ramp) => ramp.grey(beam.range + pitch * sample as f64, beam.line_angle, beam.motor_angle),
+        Truth::Head => return Echo::SILENT,
+    };
+    Echo { diffuse: level(diffuse), ..Echo::SILENT }
+}

@@ -1,0 +1,206 @@
+//! The phantom: sweeps of a body that is known exactly, as a wobbling abdominal probe would see it.
+//!
+//! Each scan line looks along its own straight line through the body, at the motor's angle and the time at which that line
+//! is fired ([`beam`]); what it meets is an echogenicity ([`body`], [`head`]), to which [`speckle`] gives the grain of a real
+//! picture. The same options give the same bytes on any machine with the same mathematics library, on any number of threads.
+
+mod anatomy;
+mod beam;
+mod body;
+mod head;
+mod shape;
+mod speckle;
+mod write;
+
+pub use body::{Body, RampTruth, Truth, Wire};
+
+use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
+use crate::source::{Frame, InputError};
+use beam::Beam;
+use body::Scatterers;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Geometry of an abdominal wobbler: Ra 40..42 mm, Rw 22..27 mm, 70..77 deg, are common.
+const ARRAY_RADIUS: f64 = 40.0;
+const WOBBLE_RADIUS: f64 = 25.0;
+const SECTOR_ANGLE_DEG: f64 = 75.0;
+const FAN_ANGLE_DEG: f64 = 61.0;
+/// Depth of the last sample, mm.
+const END_DEPTH: f64 = 120.0;
+/// m/s.
+const SOUND_SPEED: f64 = 1540.0;
+
+/// The grey scale: 255 is 0 dB, 0 is this far below. dB.
+pub const DYNAMIC_RANGE: f64 = 50.0;
+
+/// Most samples of one volume; its complex field takes eight bytes a sample.
+const LARGEST_VOLUME: usize = 1 << 26;
+
+/// What is to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Other seeds give other speckle; the body stays.
+    pub seed: u64,
+    pub body: Body,
+    /// Volumes, one after the other in time, 1..=10000.
+    pub volumes: usize,
+    /// Every second volume is swept backwards.
+    pub both_ways: bool,
+    /// Without it samples are the bare echogenicity: for exact answers.
+    pub speckle: bool,
+    /// Share of the way to the next frame that the motor travels while one frame is acquired, 0..=1.
+    pub speed_ratio: f64,
+    /// Frames a volume, 2..=1024.
+    pub frames: usize,
+    /// Scan lines a frame, 2..=1024.
+    pub lines: usize,
+    /// Samples a line, 16..=8192, over a depth of 120 mm.
+    pub samples: usize,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            seed: 1,
+            body: Body::Head,
+            volumes: 1,
+            both_ways: false,
+            speckle: true,
+            speed_ratio: 0.0,
+            frames: 37,
+            lines: 128,
+            samples: 512,
+        }
+    }
+}
+
+/// Options that were checked, and the probe that they make. Frames are computed when asked for.
+pub struct Phantom {
+    options: Options,
+    /// Swept forwards, without its advance.
+    probe: Probe,
+    volumes: Volumes,
+    scatterers: Scatterers,
+}
+
+impl Phantom {
+    /// Refuses what cannot be swept, on one line.
+    pub fn new(options: Options) -> Result<Phantom, InputError> {
+        let whole = |field, value: usize, least: usize, most: usize| match (least..=most).contains(&value) {
+            true => Ok(()),
+            false => Err(refusal(field, format!("is {value}, must lie in {least}..={most}"))),
+        };
+        whole("volumes", options.volumes, 1, 10_000)?;
+        whole("frames", options.frames, 2, 1024)?;
+        whole("lines", options.lines, 2, 1024)?;
+        whole("samples", options.samples, 16, 8192)?;
+        // Cannot overflow: 2^10 frames of 2^10 lines of 2^13 samples.
+        if options.frames * options.lines * options.samples > LARGEST_VOLUME {
+            return Err(refusal("samples", format!("more than {LARGEST_VOLUME} in a volume")));
+        }
+        if !(0.0..=1.0).contains(&options.speed_ratio) {
+            return Err(refusal("speed_ratio", format!("is {}, must lie in 0..=1", options.speed_ratio)));
+        }
+        let volumes = Volumes {
+            both_ways: options.both_ways,
+            speed_ratio: options.speed_ratio,
+            ..Volumes::forward(options.frames, options.volumes)
+        };
+        let spread = |angle_deg: f64, count: usize| Axis::centred(angle_deg.to_radians() / (count - 1) as f64, count);
+        let probe = Probe {
+            array: Array::Curved { radius: ARRAY_RADIUS },
+            lines: spread(SECTOR_ANGLE_DEG, options.lines),
+            start_depth: 0.0,
+            sample_pitch: END_DEPTH / (options.samples - 1) as f64,
+            samples: options.samples,
+            motion: Motion::Fan { wobble_radius: WOBBLE_RADIUS },
+            slices: spread(FAN_ANGLE_DEG, options.frames),
+            advance: Advance::None,
+            sound_speed: SOUND_SPEED,
+        };
+        let scatterers = Scatterers::new(options.body, &probe);
+        let phantom = Phantom { options, probe, volumes, scatterers };
+        for volume in 0..phantom.options.volumes.min(2) {
+            phantom.probe(volume).check().map_err(|e| refusal(e.field, e.fault))?;
+        }
+        Ok(phantom)
+    }
+
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    pub fn volumes(&self) -> usize {
+        self.volumes.count
+    }
+
+    /// Where the samples of a volume lie, the motor's way during each frame included.
+    pub fn probe(&self, volume: usize) -> Probe {
+        Probe { advance: self.volumes.advance(volume, &self.probe.slices), ..self.probe.clone() }
+    }
+
+    /// What the body is, in the space of [`Probe`] and in grey values without speckle.
+    pub fn truth(&self) -> Truth {
+        self.scatterers.truth()
+    }
+
+    /// The frames of a volume in the order in which they are acquired: u8, log-compressed, over [`DYNAMIC_RANGE`].
+    pub fn volume(&self, volume: usize) -> Vec<Frame> {
+        let probe = self.probe(volume);
+        let backward = self.volumes.backward(volume);
+        let frames = self.options.frames;
+        let number_of = |slice: usize| if backward { frames - 1 - slice } else { slice };
+        // A line takes 2 d / c (thesis 4.3), and the next follows at once.
+        let line_time = probe.acquisition_time() / (frames * self.options.lines) as f64;
+        let time_of = |slice: usize| ((volume * frames + number_of(slice)) * self.options.lines) as f64 * line_time;
+
+        let echoes: Vec<Vec<body::Echo>> = (0..frames)
+            .into_par_iter()
+            .map(|slice| {
+                let mut echoes = vec![body::Echo::SILENT; self.options.lines * self.options.samples];
+                for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
+                    let time = time_of(slice) + line as f64 * line_time;
+                    self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
+                }
+                echoes
+            })
+            .collect();
+        // Scatterers that stay give the same speckle every time; in a body that moves, they do not stay.
+        let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
+        let slices: Vec<Vec<u8>> = match self.options.speckle {
+            true => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
+            false => echoes.par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect(),
+        };
+        let mut made: Vec<Frame> = slices
+            .into_iter()
+            .enumerate()
+            .map(|(slice, bytes)| Frame {
+                volume: volume as u32,
+                number: number_of(slice) as u32,
+                slice,
+                backward,
+                time: Some(time_of(slice)),
+                bytes,
+            })
+            .collect();
+        made.sort_by_key(|frame| frame.number);
+        made
+    }
+
+    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml` beside it. Both appear whole or
+    /// not at all.
+    pub fn write(&self, path: &Path) -> Result<(), InputError> {
+        write::sweep(self, path)
+    }
+}
+
+/// Grey value of an echo in dB re full scale.
+fn grey(level: f32) -> u8 {
+    // A float turns into the nearest end of u8 where it lies outside.
+    ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
+}
+
+fn refusal(field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
+    InputError::new(Path::new("phantom"), field, fault)
+}

@@ -1,0 +1,188 @@
+//! Speckle: what becomes of an echogenicity when scatterers too many to tell apart send it back.
+//!
+//! Complex Gaussian noise times the root of the echogenicity, convolved in polar space with a separable point-spread
+//! function; its magnitude is the envelope. Where the medium is constant that is fully developed speckle: Rayleigh in
+//! amplitude (mean / sd 1.913), Fisher-Tippett in dB (sd 5.57 dB).
+
+use super::body::Echo;
+use super::grey;
+use crate::probe::Probe;
+use rayon::prelude::*;
+
+/// Standard deviations of the point-spread function of the field: in samples along the line,
+const AXIAL: f32 = 1.5;
+/// in lines at the focus, and how much more at 40 mm from it,
+const LATERAL: f32 = 1.35;
+const DEFOCUS: f32 = 0.5;
+/// and in frames.
+const ELEVATION: f32 = 0.7;
+/// Depth of the focus, mm.
+const FOCUS: f64 = 55.0;
+
+/// Complex samples of one slice, line by line.
+struct Field {
+    re: Vec<f32>,
+    im: Vec<f32>,
+}
+
+/// Grey values of all slices of a volume, in geometric order like `echoes`.
+pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64) -> Vec<Vec<u8>> {
+    let blur = Blur::new(probe);
+    let fields: Vec<Field> = echoes
+        .par_iter()
+        .enumerate()
+        .map(|(slice, echoes)| blur.apply(scattered(echoes, stream(seed, volume, slice as u64))))
+        .collect();
+    let reach = (3.0 * ELEVATION).ceil() as isize;
+    (0..fields.len())
+        .into_par_iter()
+        .map(|slice| {
+            let near = (-reach..=reach)
+                .filter_map(|k| fields.get(slice.checked_add_signed(k)?).map(|f| (f, bell(k as f32, ELEVATION))));
+            // At the ends of the fan the frames that are there carry all the power.
+            let power: f32 = near.clone().map(|(_, w)| w * w).sum();
+            let mut sum = Field::silent(echoes[slice].len());
+            for (field, weight) in near {
+                sum.add(field, weight / power.sqrt());
+            }
+            sum.re.iter().zip(&sum.im).map(|(re, im)| grey(10.0 * (re * re + im * im + 1e-20).log10())).collect()
+        })
+        .collect()
+}
+
+/// Noise of unit power times the root of the echogenicity, and the mirrors' echo in phase.
+fn scattered(echoes: &[Echo], stream: u64) -> Field {
+    let mut field = Field::silent(echoes.len());
+    for (i, echo) in echoes.iter().enumerate() {
+        let (re, im) = gaussian_pair(stream, i as u64);
+        let amplitude = root(echo.diffuse) * std::f32::consts::FRAC_1_SQRT_2;
+        field.re[i] = re * amplitude;
+        field.im[i] = im * amplitude;
+        if echo.mirror > Echo::SILENT.mirror {
+            field.re[i] += root(echo.mirror);
+        }
+    }
+    field
+}
+
+/// Amplitude of a level in dB.
+fn root(level: f32) -> f32 {
+    // 10^(level / 20) as a power of two.
+    (level * 0.166_096_4).exp2()
+}
+
+impl Field {
+    fn silent(length: usize) -> Field {
+        Field { re: vec![0.0; length], im: vec![0.0; length] }
+    }
+
+    fn add(&mut self, other: &Field, weight: f32) {
+        for (sum, value) in self.re.iter_mut().zip(&other.re) {
+            *sum += weight * value;
+        }
+        for (sum, value) in self.im.iter_mut().zip(&other.im) {
+            *sum += weight * value;
+        }
+    }
+}
+
+/// The point-spread function within a slice, each part of unit power, so that speckle keeps the mean of the echogenicity.
+struct Blur {
+    samples: usize,
+    axial: Vec<f32>,
+    /// Weights of each line from -reach to reach, one a sample: the beam widens away from its focus.
+    lateral: Vec<Vec<f32>>,
+}
+
+impl Blur {
+    fn new(probe: &Probe) -> Blur {
+        let width = |sample: usize| {
+            let depth = probe.start_depth + probe.sample_pitch * sample as f64;
+            LATERAL + DEFOCUS * ((depth - FOCUS) / 40.0).powi(2).min(2.0) as f32
+        };
+        let reach = |sd: f32| (3.0 * sd).ceil() as isize;
+        let widest = (0..probe.samples).map(width).fold(0.0, f32::max);
+        let bells = |sd: f32, reach: isize| {
+            let bells: Vec<f32> = (-reach..=reach).map(|d| bell(d as f32, sd)).collect();
+            let power: f32 = bells.iter().map(|w| w * w).sum();
+            bells.into_iter().map(move |w| w / power.sqrt()).collect::<Vec<f32>>()
+        };
+        let reach_across = reach(widest);
+        let mut lateral = vec![vec![0.0; probe.samples]; 2 * reach_across as usize + 1];
+        for sample in 0..probe.samples {
+            for (weights, w) in lateral.iter_mut().zip(bells(width(sample), reach_across)) {
+                weights[sample] = w;
+            }
+        }
+        Blur { samples: probe.samples, axial: bells(AXIAL, reach(AXIAL)), lateral }
+    }
+
+    fn apply(&self, field: Field) -> Field {
+        let pass = |part: Vec<f32>| self.across(&self.along(&part));
+        Field { re: pass(field.re), im: pass(field.im) }
+    }
+
+    /// Along the lines.
+    fn along(&self, part: &[f32]) -> Vec<f32> {
+        let reach = self.axial.len() / 2;
+        let mut out = vec![0.0; part.len()];
+        for (line, out) in part.chunks_exact(self.samples).zip(out.chunks_exact_mut(self.samples)) {
+            for (tap, weight) in self.axial.iter().enumerate() {
+                // out[i] += weight * line[i + tap - reach], where both are there.
+                let (from, to) = (tap.saturating_sub(reach), reach.saturating_sub(tap));
+                for (sum, value) in out.iter_mut().skip(to).zip(line.iter().skip(from)) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        out
+    }
+
+    /// From line to line.
+    fn across(&self, part: &[f32]) -> Vec<f32> {
+        let reach = (self.lateral.len() / 2) as isize;
+        let lines = part.len() / self.samples;
+        let mut out = vec![0.0; part.len()];
+        for (line, out) in out.chunks_exact_mut(self.samples).enumerate() {
+            for (tap, weights) in self.lateral.iter().enumerate() {
+                let Some(other) = line.checked_add_signed(tap as isize - reach).filter(|l| *l < lines) else { continue };
+                let other = &part[other * self.samples..][..self.samples];
+                for ((sum, value), weight) in out.iter_mut().zip(other).zip(weights) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        out
+    }
+}
+
+fn bell(distance: f32, sd: f32) -> f32 {
+    (-0.5 * (distance / sd).powi(2)).exp()
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea, Flood 2014): a counter goes in, 64 independent-looking bits come out.
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Start of the counter of one slice.
+fn stream(seed: u64, volume: u64, slice: u64) -> u64 {
+    [volume, slice].into_iter().fold(mix(seed.wrapping_add(GOLDEN)), |state, part| {
+        mix(state ^ mix(part.wrapping_add(1).wrapping_mul(GOLDEN)))
+    })
+}
+
+/// Two independent standard normal numbers (Box and Muller 1958). By counter, not by state: any thread may ask for any one.
+fn gaussian_pair(stream: u64, counter: u64) -> (f32, f32) {
+    let bits = mix(stream.wrapping_add(counter.wrapping_mul(GOLDEN)));
+    // Never 0, whose logarithm is infinite.
+    let share = ((bits >> 40) as f32 + 0.5) / (1u64 << 24) as f32;
+    let turn = (bits & 0xff_ffff) as f32 / (1u64 << 24) as f32;
+    let radius = (-2.0 * share.ln()).sqrt();
+    let (sin, cos) = (turn * std::f32::consts::TAU).sin_cos();
+    (radius * cos, radius * sin)
+}
