@@ -129,7 +129,8 @@ void main() {
         if (PEAK == 1) {
             // The edge lies in the middle of the ring where the difference peaks; a parabola through the neighbours refines.
             float bend = before - 2.0 * best + after;
-            float shift = bend < 0.0 && before < best && after < best ? 0.5 * (before - after) / bend : 0.0;
+            // Two equal differences put it in the middle between them, whichever came out larger by rounding.
+            float shift = bend < 0.0 ? clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
             place += shift - 0.5 * float(RING - 1);
         }
         float at = (place + 0.5) * step_length;

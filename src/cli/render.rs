@@ -30,9 +30,9 @@ pub struct Render {
     /// Settings in TOML
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Settings that suit a kind of picture: bmode, bone, fetal
+    /// Settings that suit a kind of picture: bmode, bone, fetal, thesis; may be given again, the later over the earlier
     #[arg(long, value_name = "NAME")]
-    preset: Option<String>,
+    preset: Vec<String>,
     /// Width and height of the picture, pixels
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
@@ -132,7 +132,7 @@ impl Render {
 
     fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
         let mut layers = Layers::default();
-        if let Some(preset) = &self.preset {
+        for preset in &self.preset {
             layers.preset(preset).map_err(input)?;
         }
         if let Some(file) = &self.scene {

@@ -168,6 +168,11 @@ impl Scene {
         }
     }
 
+    /// The look of skin, if it is one: without wrapping and translucency nothing is left of it.
+    pub fn skin(&self) -> Option<Skin> {
+        self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
+    }
+
     /// Where a near light is, in space.
     pub fn light_place(&self) -> Option<DVec3> {
         self.settings.light.position.map(|p| self.rays.target + self.rays.from_camera(p))

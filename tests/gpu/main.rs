@@ -10,3 +10,4 @@ mod passes;
 mod pictures;
 mod recordings;
 mod reruns;
+mod shading;

@@ -189,7 +189,7 @@ fn place(
     // Without the sample after it, it may not be the peak: the ray left the insonified region on a rising edge.
     let after = difference(best_at + 1, 1, since)?;
     let bend = before - 2.0 * best + after;
-    let peaked = bend < 0.0 && before < best && after < best;
-    let shift = if peaked { 0.5 * (before - after) / bend } else { 0.0 };
+    // Two equal differences put it in the middle between them.
+    let shift = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
     Some((best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at)?))
 }

@@ -37,12 +37,12 @@ pub const PASS: Pass = Pass {
             .vec3("surface_colour", light.surface_colour)
             .f32("texture_share", light.texture)
             .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
-            .vec3("wrap", wrap(light.skin))
-            .vec3("through", through(light.skin))
+            .vec3("wrap", wrap(s.skin()))
+            .vec3("through", through(s.skin()))
     },
     constants: |s| {
         let light = &s.settings.light;
-        vec![("POINT", light.position.is_some() as i32), ("SKIN", light.skin.is_some() as i32)]
+        vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)]
     },
     tolerance: Tolerance {
         absolute: 6e-3,
@@ -91,15 +91,15 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<DVec3> {
         false => 1.0,
     });
     let open = if super::occlusion::PASS.is_needed(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
-    let (diffused, glow) = match light.skin {
+    let (diffused, glow) = match scene.skin() {
         None => (DVec3::splat(facing * arrives), DVec3::ZERO),
         Some(_) => {
-            let wrap = wrap(light.skin);
+            let wrap = wrap(scene.skin());
             let wrapped = ((DVec3::splat(cosine) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
             // What a shadow leaves is red first.
             let softened = DVec3::splat(arrives) + (1.0 - arrives) * 0.5 * wrap;
             let thin = found * (1.0 - behind.clamp(0.0, 1.0));
-            (wrapped * softened, through(light.skin) * thin * (0.35 + 0.65 * (-cosine).max(0.0)))
+            (wrapped * softened, through(scene.skin()) * thin * (0.35 + 0.65 * (-cosine).max(0.0)))
         }
     };
     let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };

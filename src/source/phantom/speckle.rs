@@ -19,6 +19,9 @@ const ELEVATION: f32 = 0.7;
 /// Depth of the focus, mm.
 const FOCUS: f64 = 55.0;
 
+/// A mirror's echoes add up over the point-spread function, in phase, where those of scatterers do not: so much less of it.
+const MIRROR: f32 = 0.3;
+
 /// Complex samples of one slice, line by line.
 struct Field {
     re: Vec<f32>,
@@ -59,7 +62,7 @@ fn scattered(echoes: &[Echo], stream: u64) -> Field {
         field.re[i] = re * amplitude;
         field.im[i] = im * amplitude;
         if echo.mirror > Echo::SILENT.mirror {
-            field.re[i] += root(echo.mirror);
+            field.re[i] += root(echo.mirror) * MIRROR;
         }
     }
     field

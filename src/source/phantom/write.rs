@@ -7,6 +7,9 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+/// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
+const MOST_FRAMES: usize = 20_000;
+
 /// A file under a name of its own until it is whole; gone if it is dropped before.
 struct Unfinished {
     path: PathBuf,
@@ -63,6 +66,10 @@ pub(super) fn sweep(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
     beside.push(".probe.toml");
     let beside = path.with_file_name(beside);
 
+    let frames = phantom.options().frames * phantom.volumes();
+    if frames > MOST_FRAMES {
+        return Err(InputError::new(path, "volumes", format!("make {frames} frames, a file holds at most {MOST_FRAMES}")));
+    }
     let (mut samples, mut file) = Unfinished::create(path)?;
     file.write_all(header(phantom).as_bytes()).map_err(|e| unwritable(path, &e))?;
     for volume in 0..phantom.volumes() {
@@ -103,7 +110,7 @@ fn header(phantom: &Phantom) -> String {
     }
     let frame_time = probe.acquisition_time() / options.frames as f64;
     for frame in 0..frames {
-        say(format!("Seq_Frame{frame:04}_Timestamp = {}", frame as f64 * frame_time));
+        say(format!("Seq_Frame{frame:04}_Timestamp = {:.6}", frame as f64 * frame_time));
     }
     text.push_str("ElementDataFile = LOCAL\n");
     text
