@@ -31,13 +31,18 @@ void main() {
         write_at(at, MISS);
         return;
     }
-    // Selection by halving the value range (Torben's method): every round ends on values that are there, so the result is
-    // exact, and no window has to be held in registers.
+    // Selection by narrowing the value range (after Torben Mogensen's method): every round ends on values that are there, so
+    // the result is exact, and no window has to be held in registers. The guess goes by rank, as if values lay evenly, which
+    // on a smooth surface they do; every other round halves the range, so that a cliff costs no more than a logarithm.
     int rank = (valid - 1) / 2;
+    int under_low = 0, within = valid; // values below `low`, and from `low` to `high`
     float found = low;
+    bool halve = false;
     while (low < high) {
-        // Clamped: halves of the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
-        float guess = clamp(0.5 * low + 0.5 * high, low, high);
+        float share = halve ? 0.5 : (float(rank - under_low) + 0.5) / float(within);
+        halve = !halve;
+        // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
+        float guess = clamp(low + share * (high - low), low, high);
         int below = 0, equal = 0;
         float under = low, over = high;
         for (int y = -RADIUS; y <= RADIUS; ++y) {
@@ -57,6 +62,7 @@ void main() {
         if (rank < below) {
             high = under;
             found = under;
+            within = below - under_low;
         } else if (rank < below + equal) {
             low = guess;
             high = guess;
@@ -64,6 +70,8 @@ void main() {
         } else {
             low = over;
             found = over;
+            within -= below + equal - under_low;
+            under_low = below + equal;
         }
     }
     write_at(at, found);

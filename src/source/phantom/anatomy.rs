@@ -17,7 +17,7 @@ pub(super) fn skin(p: Vec3, mouth: f32) -> f32 {
     }
     d = join(d, ellipsoid(q, vec3(0.0, -11.0, -24.0), vec3(27.0, 27.0, 24.5)), 8.0);
     let jaw = vec3(0.0, -27.0 - 0.7 * mouth, -19.0);
-    d = join(d, ellipsoid(p, jaw, vec3(19.5, 15.5, 19.0)), 8.0);
+    d = join(d, ellipsoid(p, jaw, vec3(23.0, 15.5, 19.5)), 8.0);
     d = join(d, ball(p, vec3(0.0, -39.5 - mouth, -6.0), 7.4), 6.0);
     d = join(d, ellipsoid(q, vec3(17.5, -17.0, -9.5), vec3(11.0, 11.5, 10.5)), 6.0);
     d = eyes(q, d);
@@ -57,8 +57,8 @@ fn lips(p: Vec3, q: Vec3, skin: f32, mouth: f32) -> f32 {
     let fold = vec3(0.0, -35.6 - mouth, 3.0);
     d = carve(d, rod(q, fold, fold + vec3(8.0, 1.0, -3.0), [1.8, 1.4]), 3.0);
     // The upper lip dips in the middle: the bow.
-    let upper = rod(q, vec3(0.0, -24.0, 2.6), vec3(3.8, -23.2, 2.8), [2.7, 3.0])
-        .min(rod(q, vec3(3.8, -23.2, 2.8), vec3(11.5, -26.5, -2.4), [3.0, 1.4]));
+    let upper = rod(q, vec3(0.0, -23.9, 2.1), vec3(3.8, -23.2, 2.4), [2.5, 2.8])
+        .min(rod(q, vec3(3.8, -23.2, 2.4), vec3(12.0, -26.3, -2.2), [2.8, 1.5]));
     d = join(d, upper, 1.4);
     let lower = -31.0 - mouth;
     d = join(d, rod(q, vec3(0.0, lower, 2.2), vec3(4.8, lower + 0.2, 1.6), [3.2, 3.0]), 1.4);
@@ -66,7 +66,7 @@ fn lips(p: Vec3, q: Vec3, skin: f32, mouth: f32) -> f32 {
     d = join(d, rod(q, vec3(4.8, lower + 0.2, 1.6), corner, [3.0, 1.4]), 1.4);
     d = carve(d, rod(p, vec3(0.0, -19.6, 4.8), vec3(0.0, -22.2, 6.6), [1.6, 1.6]), 1.4);
     let middle = -27.4 - 0.5 * mouth;
-    let slit = ellipsoid(q, vec3(0.0, middle, 3.2), vec3(12.0, 1.4 + 0.5 * mouth, 6.0));
+    let slit = ellipsoid(q, vec3(0.0, middle, 3.2), vec3(12.5, 1.7 + 0.5 * mouth, 6.5));
     carve(d, slit, 1.0)
 }
 
