@@ -101,14 +101,16 @@ fn first_words(text: &str, start: &str) -> Vec<String> {
 
 #[test]
 fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help() {
-    let wrong = "/render/info/bogus/--bogus/devices extra/info a.mha b.mha/render a.mha --bogus/\
+    let wrong = "/phantom/info/bogus/--bogus/devices extra/info a.mha b.mha/render a.mha --bogus/\
                  render a.mha --volume x/render a.mha --volume -1/render a.mha --size/render a.mha --mode vr --mode sr";
     for arguments in wrong.split('/').map(|w| w.split_whitespace().collect::<Vec<_>>()) {
         let (code, out, err) = run(&arguments);
         assert_eq!((code, out.as_str()), (Some(2), ""), "{arguments:?}: {err}");
         assert!(err.contains("--help") && !err.contains("panicked"), "{arguments:?}: {err}");
     }
-    for (command, named) in [("render", "--explain"), ("info", "--probe"), ("devices", "--verbose")] {
+    for (command, named) in
+        [("render", "--explain"), ("phantom", "--seed"), ("info", "--probe"), ("devices", "--verbose")]
+    {
         assert!(done(&["--help"]).contains(command) && done(&[command, "--help"]).contains(named), "{command}");
     }
 }
@@ -333,6 +335,23 @@ fn a_pipe_as_any_input_does_not_wait_for_ever() {
     for arguments in [&["info", &pipe][..], &["info", SWEEP, "--probe", &pipe], &["render", SWEEP, "--scene", &pipe]] {
         refuses(arguments, &finish(Command::new("timeout").args(["20", PROGRAM]).args(arguments)), 2, &["pipe"]);
     }
+}
+
+#[test]
+fn no_file_is_needed_to_see_a_face_and_a_phantom_is_a_recording_like_any_other() {
+    let folder = Folder::new("phantom");
+    let (face, sweep, again) = (folder.path("face.png"), folder.path("head.mha"), folder.path("again.png"));
+    done(&["render", "-o", &face, "--size", "64x48", "--validate"]);
+    done(&["phantom", "-o", &sweep, "--volumes", "2", "--both-ways", "--speed-ratio", "0"]);
+    assert!(done(&["info", &sweep]).contains("2 of 37 frames"));
+    render(&sweep, &again, &["--preset", "phantom"]);
+    assert_eq!(fs::read(&face).expect("the face"), fs::read(&again).expect("the same from a file"));
+    for (arguments, named) in [(["--body", "tail"], "head, sphere"), (["--volumes", "0"], "volumes")] {
+        let output = folder.path("x.mha");
+        let all = [&["phantom", "-o", &output], &arguments[..]].concat();
+        refuses(&all, &run(&all), 2, &[named]);
+    }
+    assert!(!folder.names().iter().any(|n| n.starts_with('x')), "{:?}", folder.names());
 }
 
 #[cfg(unix)]

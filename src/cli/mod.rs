@@ -2,6 +2,7 @@
 
 mod devices;
 mod info;
+mod phantom;
 mod render;
 
 use clap::{Parser, Subcommand};
@@ -33,7 +34,7 @@ fn print(line: std::fmt::Arguments) {
     version,
     about = "Renders sweeps of a 3D/4D ultrasound probe, on Vulkan",
     long_about = "Renders sweeps of a mechanically wobbling 3D/4D ultrasound probe, on Vulkan.\n\n\
-                  Try: echolume render sweep.mha -o picture.png --preset fetal\n\
+                  Try: echolume render -o face.png\n                       echolume render sweep.mha -o picture.png --preset fetal\n\
                   Not a medical device."
 )]
 struct Arguments {
@@ -49,8 +50,10 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Render a recording to a picture
+    /// Render a recording, or without one a synthetic fetal head, to a picture
     Render(Box<render::Render>),
+    /// Write a synthetic sweep: a fetal head, or a body with an exact answer
+    Phantom(phantom::MakePhantom),
     /// Say what is in a recording (never who)
     Info(info::Info),
     /// List the Vulkan devices, what each lacks, and which one would be used
@@ -86,6 +89,7 @@ pub fn run() -> ExitCode {
     };
     let done = start_log(arguments.verbose, arguments.log_file.as_deref()).and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
+        Command::Phantom(phantom) => phantom.run(),
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),
     });

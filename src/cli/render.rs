@@ -7,7 +7,9 @@ use echolume::plan::Plan;
 use echolume::report::{dump, times};
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene};
-use echolume::source::Recording;
+use echolume::source::phantom::{self, Phantom};
+use echolume::source::played::Played;
+use echolume::source::{Recording, Source};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -19,8 +21,8 @@ use std::path::{Path, PathBuf};
                         echolume render bone.mha --preset bone --roi depth=20:50 --explain"
 )]
 pub struct Render {
-    /// MetaImage (.mha, .mhd) or Kretz (.vol) file
-    input: PathBuf,
+    /// MetaImage (.mha, .mhd) or Kretz (.vol) file; without one a synthetic fetal head is drawn (preset phantom)
+    input: Option<PathBuf>,
     /// The picture to write (PNG)
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
@@ -30,7 +32,7 @@ pub struct Render {
     /// Settings in TOML
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Settings that suit a kind of picture: bmode, bone, fetal, thesis; may be given again, the later over the earlier
+    /// Settings that suit a kind of picture: bmode, bone, fetal, phantom, thesis; may be given again, the later over the earlier
     #[arg(long, value_name = "NAME")]
     preset: Vec<String>,
     /// Width and height of the picture, pixels
@@ -74,14 +76,14 @@ pub struct Render {
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
-        let mut recording = Recording::open(&self.input, self.probe.as_deref()).map_err(input)?;
-        if self.volume >= recording.volumes() {
-            let (file, asked, there) = (self.input.display(), self.volume, recording.volumes());
-            return Err(input(format!("{file}: --volume {asked}: the recording has {there}, numbered from 0")));
+        let mut source = self.source()?;
+        if self.volume >= source.volumes() {
+            let (asked, there) = (self.volume, source.volumes());
+            return Err(input(format!("{}: --volume {asked}: there are {there}, numbered from 0", self.shown())));
         }
         self.keep_inputs()?;
-        let geometry = recording.geometry(self.volume);
-        let samples = Input { stored: recording.stored_type(), range: recording.range() };
+        let geometry = source.geometry(self.volume);
+        let samples = Input { stored: source.stored_type(), range: source.range() };
         let scene = Scene::new(geometry, samples, self.settings()?).map_err(input)?;
         if self.explain {
             let plan = Plan::new(&scene);
@@ -102,7 +104,7 @@ impl Render {
         let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
         say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
         let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(failed)?;
-        self.send(&mut recording, &mut renderer)?;
+        self.send(&mut *source, &mut renderer)?;
         let picture = renderer.picture().map_err(failed)?;
         picture.save(&self.output).map_err(failed)?;
         say!("picture: {}", self.output.display());
@@ -120,10 +122,21 @@ impl Render {
         }
     }
 
+    fn source(&self) -> Result<Box<dyn Source>, Failure> {
+        match &self.input {
+            Some(file) => Ok(Box::new(Recording::open(file, self.probe.as_deref()).map_err(input)?)),
+            None => Ok(Box::new(Played::new(Phantom::new(phantom::Options::default()).map_err(input)?))),
+        }
+    }
+
+    fn shown(&self) -> String {
+        self.input.as_ref().map_or("phantom".into(), |file| file.display().to_string())
+    }
+
     /// Refuses to write over what is read.
     fn keep_inputs(&self) -> Result<(), Failure> {
         let Ok(output) = self.output.canonicalize() else { return Ok(()) };
-        let inputs = [Some(&self.input), self.probe.as_ref(), self.scene.as_ref()];
+        let inputs = [self.input.as_ref(), self.probe.as_ref(), self.scene.as_ref()];
         match inputs.into_iter().flatten().find(|i| i.canonicalize().is_ok_and(|i| i == output)) {
             Some(read) => Err(input(format!("-o {}: would replace an input", read.display()))),
             None => Ok(()),
@@ -132,6 +145,9 @@ impl Render {
 
     fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
         let mut layers = Layers::default();
+        if self.input.is_none() {
+            layers.preset("phantom").map_err(input)?;
+        }
         for preset in &self.preset {
             layers.preset(preset).map_err(input)?;
         }
@@ -185,12 +201,12 @@ impl Render {
     }
 
     /// Every frame of the volume through stage 1.
-    fn send(&self, recording: &mut Recording, renderer: &mut Renderer) -> Result<(), Failure> {
-        recording.skip_to_volume(self.volume).map_err(input)?;
-        let frames = recording.frames_per_volume();
+    fn send(&self, source: &mut dyn Source, renderer: &mut Renderer) -> Result<(), Failure> {
+        source.skip_to_volume(self.volume).map_err(input)?;
+        let frames = source.frames_per_volume();
         let bar = indicatif::ProgressBar::new(frames as u64).with_message("frames");
         for _ in 0..frames {
-            let Some(frame) = recording.next_frame().map_err(input)? else { break };
+            let Some(frame) = source.next_frame().map_err(input)? else { break };
             renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
             bar.inc(1);
         }

@@ -14,6 +14,7 @@ pub const PRESETS: &[(&str, &str)] = &[
     ("bmode", include_str!("presets/bmode.toml")),
     ("bone", include_str!("presets/bone.toml")),
     ("fetal", include_str!("presets/fetal.toml")),
+    ("phantom", include_str!("presets/phantom.toml")),
     ("thesis", include_str!("presets/thesis.toml")),
 ];
 

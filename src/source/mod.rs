@@ -5,7 +5,9 @@ mod contents;
 pub mod error;
 mod kretz;
 mod metaimage;
+pub mod phantom;
 mod pixels;
+pub mod played;
 pub mod recording;
 pub mod samples;
 mod words;
@@ -54,5 +56,50 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
         metaimage::read(path)
     } else {
         Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
+    }
+}
+
+/// Where frames come from, in order of acquisition.
+pub trait Source {
+    /// Where the samples of a volume lie; the direction of its sweep decides about the motor's advance.
+    fn geometry(&self, volume: usize) -> Geometry;
+    fn stored_type(&self) -> StoredType;
+    /// Stored values that become 0 and 1.
+    fn range(&self) -> [f64; 2];
+    fn volumes(&self) -> usize;
+    fn frames_per_volume(&self) -> usize;
+    /// The next frame is the first of that volume.
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
+    /// None after the last.
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
+}
+
+impl Source for Recording {
+    fn geometry(&self, volume: usize) -> Geometry {
+        self.geometry(volume)
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.stored_type()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.range()
+    }
+
+    fn volumes(&self) -> usize {
+        self.volumes()
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.frames_per_volume()
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        self.skip_to_volume(volume)
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        self.next_frame()
     }
 }

@@ -1,6 +1,7 @@
 //! The motor moves while a frame is acquired: what stands still must not move between sweeps forth and back.
 
 use crate::common::*;
+use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::probe::{Advance, Axis, Geometry, Indices, Probe};
 use echolume::scene::Scene;
@@ -213,4 +214,51 @@ fn a_ball_swept_both_ways_does_not_move() {
     assert!(uncorrected > 0.5, "a pitch is 1.3 mm there, half the lines fire by the middle: {uncorrected}");
     assert!(corrected < uncorrected / 5.0, "{corrected} of {uncorrected}");
     assert!(reversed > uncorrected);
+}
+
+/// The phantom's ball, swept forth and back with the motor moving: the two distance maps, in one view.
+#[test]
+fn the_phantom_stands_still_between_sweeps_forth_and_back() {
+    use echolume::source::phantom::{Body, Options as Made, Phantom, Truth};
+    let device = Device::new();
+    let made =
+        Made { body: Body::Sphere, volumes: 2, both_ways: true, speckle: false, speed_ratio: 0.9, ..Made::default() };
+    let phantom = Phantom::new(made).expect("phantom");
+    let Truth::Sphere { centre, radius, .. } = phantom.truth() else { panic!("a sphere") };
+    let depth = centre.y - phantom.probe(0).array_radius();
+    let toml = format!(
+        "mode = 'sr'\npicture = {{ size = [64, 64] }}\nray = {{ step = 0.25 }}\nsurface = {{ threshold = 0.1 }}\n\
+         slices = {{ pixels = 400, smooth = {{ lateral = 0.6, depth = 0.6, elevation = 0.6 }} }}\n\
+         region = {{ lateral = [{}, {}], depth = [{}, {}], elevation = [{}, {}] }}\ncamera = {{ elevation = 25 }}",
+        centre.x - 0.8 * radius,
+        centre.x + 0.8 * radius,
+        depth - 1.3 * radius,
+        depth,
+        centre.z - 0.8 * radius,
+        centre.z + 0.8 * radius,
+    );
+    // The volume of a sweep, drawn with the advance of that sweep times `told`.
+    let surface = |volume: usize, told: f64| -> Texels {
+        let Advance::Same(advance) = phantom.probe(volume).advance else { panic!("even") };
+        let probe = Probe { advance: Advance::Same(told * advance), ..phantom.probe(volume) };
+        let mut renderer =
+            Renderer::new(&device, scene(Geometry::Sweep(probe), BYTES, &toml), &Options::default()).expect("renderer");
+        for frame in phantom.volume(volume) {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+        }
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        renderer.read(Slot::Distance).expect("read").expect("there")
+    };
+    let apart = |told: f64| {
+        let (forth, back) = (surface(0, told), surface(1, told));
+        let both = forth.values.iter().zip(&back.values).filter(|(a, b)| is_hit(**a) && is_hit(**b));
+        let differences: Vec<f64> = both.map(|(a, b)| (a - b).abs()).collect();
+        assert!(differences.len() > 1000, "{} rays hit both", differences.len());
+        differences.iter().sum::<f64>() / differences.len() as f64
+    };
+    let (corrected, uncorrected, reversed) = (apart(1.0), apart(0.0), apart(-1.0));
+    println!("phantom: {corrected:.4} mm apart corrected, {uncorrected:.4} uncorrected, {reversed:.4} reversed");
+    assert!(corrected < uncorrected / 5.0, "{corrected} of {uncorrected}");
+    assert!(reversed > uncorrected, "{reversed} of {uncorrected}");
 }

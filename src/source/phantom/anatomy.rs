@@ -11,10 +11,6 @@ pub(super) fn skin(p: Vec3, mouth: f32) -> f32 {
     // Paired parts are made once: q is p, or its mirror image.
     let q = vec3(p.x.abs(), p.y, p.z);
     let mut d = ellipsoid(p, vec3(0.0, 22.0, -42.0), vec3(38.0, 42.0, 45.5));
-    let ears = ear(q);
-    if d > 45.0 && ears > 20.0 && face_is_far(p) {
-        return d.min(ears).min(35.0);
-    }
     d = join(d, ellipsoid(q, vec3(0.0, -11.0, -24.0), vec3(27.0, 27.0, 24.5)), 8.0);
     let jaw = vec3(0.0, -27.0 - 0.7 * mouth, -19.0);
     d = join(d, ellipsoid(p, jaw, vec3(23.0, 15.5, 19.5)), 8.0);
@@ -23,22 +19,22 @@ pub(super) fn skin(p: Vec3, mouth: f32) -> f32 {
     d = eyes(q, d);
     d = nose(p, q, d);
     d = lips(p, q, d, mouth);
-    d = join(d, ears, 2.0);
+    d = join(d, ear(q), 2.0);
     // Neck.
     join(d, rod(p, vec3(0.0, -18.0, -40.0), vec3(0.0, -62.0, -44.0), [20.0, 20.0]), 12.0)
-}
-
-fn face_is_far(p: Vec3) -> bool {
-    ball(p, vec3(0.0, -15.0, -15.0), 45.0) > 5.0
 }
 
 /// Brows, sockets, closed and swollen lids with the slit between them.
 fn eyes(q: Vec3, skin: f32) -> f32 {
     let mut d = join(skin, rod(q, vec3(6.0, 8.5, -5.0), vec3(23.0, 8.0, -12.5), [4.6, 4.4]), 5.0);
     d = carve(d, ellipsoid(q, vec3(15.5, -0.5, 3.0), vec3(10.5, 7.0, 10.5)), 3.5);
-    d = join(d, ellipsoid(q, vec3(15.5, -0.5, -10.5), vec3(8.4, 5.6, 8.8)), 1.2);
-    let slit = rod(q, vec3(8.0, -1.2, -4.0), vec3(15.5, -3.4, -1.8), [1.0, 1.3])
-        .min(rod(q, vec3(15.5, -3.4, -1.8), vec3(23.0, -1.0, -5.0), [1.3, 1.0]));
+    d = join(d, ellipsoid(q, vec3(15.5, -0.2, -10.5), vec3(8.6, 6.2, 9.3)), 1.2);
+    let slit = rod(q, vec3(7.5, -1.6, -4.0), vec3(15.5, -4.4, -1.6), [1.2, 1.8]).min(rod(
+        q,
+        vec3(15.5, -4.4, -1.6),
+        vec3(23.5, -1.6, -5.0),
+        [1.8, 1.2],
+    ));
     carve(d, slit, 1.0)
 }
 
@@ -57,16 +53,20 @@ fn lips(p: Vec3, q: Vec3, skin: f32, mouth: f32) -> f32 {
     let fold = vec3(0.0, -35.6 - mouth, 3.0);
     d = carve(d, rod(q, fold, fold + vec3(8.0, 1.0, -3.0), [1.8, 1.4]), 3.0);
     // The upper lip dips in the middle: the bow.
-    let upper = rod(q, vec3(0.0, -23.9, 2.1), vec3(3.8, -23.2, 2.4), [2.5, 2.8])
-        .min(rod(q, vec3(3.8, -23.2, 2.4), vec3(12.0, -26.3, -2.2), [2.8, 1.5]));
+    let upper = rod(q, vec3(0.0, -23.6, 2.6), vec3(3.8, -22.9, 3.0), [2.5, 2.8]).min(rod(
+        q,
+        vec3(3.8, -22.9, 3.0),
+        vec3(12.0, -26.3, -2.2),
+        [2.8, 1.5],
+    ));
     d = join(d, upper, 1.4);
     let lower = -31.0 - mouth;
-    d = join(d, rod(q, vec3(0.0, lower, 2.2), vec3(4.8, lower + 0.2, 1.6), [3.2, 3.0]), 1.4);
+    d = join(d, rod(q, vec3(0.0, lower, 2.4), vec3(4.8, lower + 0.2, 1.8), [3.2, 3.0]), 1.4);
     let corner = vec3(10.5, -27.8 - 0.4 * mouth, -2.4);
-    d = join(d, rod(q, vec3(4.8, lower + 0.2, 1.6), corner, [3.0, 1.4]), 1.4);
+    d = join(d, rod(q, vec3(4.8, lower + 0.2, 1.8), corner, [3.0, 1.4]), 1.4);
     d = carve(d, rod(p, vec3(0.0, -19.6, 4.8), vec3(0.0, -22.2, 6.6), [1.6, 1.6]), 1.4);
     let middle = -27.4 - 0.5 * mouth;
-    let slit = ellipsoid(q, vec3(0.0, middle, 3.2), vec3(12.5, 1.7 + 0.5 * mouth, 6.5));
+    let slit = ellipsoid(q, vec3(0.0, middle, 3.2), vec3(12.5, 2.1 + 0.5 * mouth, 7.0));
     carve(d, slit, 1.0)
 }
 
@@ -101,20 +101,23 @@ pub(super) fn brain(p: Vec3) -> f32 {
 /// A hand beside the cheek, its back to the probe, fingers up; in the head's axes, but it does not turn with it.
 /// `curl` bends the fingers, 0..1.
 pub(super) fn hand(p: Vec3, curl: f32) -> f32 {
-    let bound = ball(p, vec3(38.0, -27.0, -8.0), 34.0);
+    // Beside the cheek, clear of it.
+    let p = p - vec3(4.0, -3.0, -2.0);
+    let bound = ball(p, vec3(40.0, -38.0, -10.0), 48.0);
     if bound > 6.0 {
         return bound;
     }
     let mut d = ellipsoid(p, vec3(38.0, -34.0, -9.0), vec3(9.5, 9.5, 4.6));
     d = join(d, rod(p, vec3(39.0, -41.0, -10.5), vec3(43.0, -66.0, -17.0), [6.2, 7.5]), 6.0);
     // Four fingers of two joints: root, and how far they reach.
-    const FINGERS: [(f32, f32, f32); 4] = [(31.4, -28.0, 9.5), (36.2, -26.4, 11.0), (41.0, -26.6, 10.4), (45.4, -28.6, 8.0)];
+    const FINGERS: [(f32, f32, f32); 4] =
+        [(31.4, -28.0, 9.5), (36.2, -26.4, 11.0), (41.0, -26.6, 10.4), (45.4, -28.6, 8.0)];
     for (x, y, length) in FINGERS {
-        let spread = (x - 38.0) * 0.035;
+        let spread = (x - 38.0) * 0.075;
         let root = vec3(x, y, -7.0);
         let knuckle = root + vec3(spread, 1.0, 0.35) * (length * 0.62);
         let tip = knuckle + vec3(spread, 0.85 - 0.9 * curl, -0.35 - 0.6 * curl) * (length * 0.75);
-        d = join(d, rod(p, root, knuckle, [2.5, 2.3]).min(rod(p, knuckle, tip, [2.3, 1.9])), 1.3);
+        d = join(d, rod(p, root, knuckle, [2.4, 2.1]).min(rod(p, knuckle, tip, [2.1, 1.8])), 1.3);
     }
     // The thumb points at the cheek.
     let thumb = vec3(28.2, -30.5, -3.5);
@@ -133,7 +136,8 @@ pub(super) fn cord(p: Vec3) -> f32 {
         Vec3::new(-26.0, -48.0, -12.0),
         Vec3::new(-10.0, -58.0, -12.0),
     ];
-    let bound = ellipsoid(p, vec3(-38.0, -20.0, -12.0), vec3(36.0, 48.0, 20.0));
+    let p = p + vec3(5.0, 2.0, 2.0);
+    let bound = ellipsoid(p, vec3(-36.0, -22.0, -13.0), vec3(48.0, 58.0, 24.0));
     if bound > 8.0 {
         return bound.min(30.0);
     }

@@ -12,12 +12,12 @@ const FLUID: f32 = -46.0;
 /// The receiver's own noise: no shadow is darker.
 const FLOOR: f32 = -48.0;
 /// Skin seen edge on, and what more it sends when it faces the beam.
-const SKIN: f32 = -10.5;
-const SKIN_FACING: f32 = 5.0;
+const SKIN: f32 = -9.0;
+const SKIN_FACING: f32 = 4.0;
 /// The skin's mirror echo when it faces the beam; the sum over the point-spread function adds about 15 dB.
-const SKIN_MIRROR: f32 = -16.0;
-const SOFT: f32 = -13.0;
-const BONE: f32 = -8.0;
+const SKIN_MIRROR: f32 = -12.0;
+const SOFT: f32 = -11.0;
+const BONE: f32 = -4.5;
 const BRAIN: f32 = -32.0;
 const WALL: f32 = -19.0;
 const LINING: f32 = -11.0;
@@ -65,8 +65,8 @@ impl Pose {
         let pitch = (2.0 - 3.0 * swing(7.0)).to_radians();
         let roll = 4.0f32.to_radians();
         let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(yaw);
-        // A yawn every five seconds.
-        Pose { turn, mouth: 5.0 * swing(5.0).powi(3), curl: 0.25 + 0.6 * swing(6.0) }
+        // The lips are a little apart; a yawn every five seconds.
+        Pose { turn, mouth: 1.4 + 5.0 * swing(5.0).powi(3), curl: 0.25 + 0.6 * swing(6.0) }
     }
 }
 
@@ -160,7 +160,9 @@ impl Head {
         let near = 88.0 - (place - vec3(0.0, self.face - 72.0, 0.0)).length();
         let far = (place - vec3(0.0, self.face + 22.0, 0.0)).length() - 90.0;
         let cavity = near.max(far);
-        cavity + 0.9 * (place.x * 0.11 + 0.6).sin() * (place.z * 0.13).cos() + 0.4 * (place.x * 0.31 - place.z * 0.23).sin()
+        cavity
+            + 0.9 * (place.x * 0.11 + 0.6).sin() * (place.z * 0.13).cos()
+            + 0.4 * (place.x * 0.31 - place.z * 0.23).sin()
     }
 
     /// Echo and loss (dB/mm) inside the fetus.

@@ -1,7 +1,7 @@
 //! The phantom: sweeps of a body that is known exactly, as a wobbling abdominal probe would see it.
 //!
 //! Each scan line looks along its own straight line through the body, at the motor's angle and the time at which that line
-//! is fired ([`beam`]); what it meets is an echogenicity ([`body`], [`head`]), to which [`speckle`] gives the grain of a real
+//! is fired (`beam`); what it meets is an echogenicity (`body`, `head`), to which `speckle` gives the grain of a real
 //! picture. The same options give the same bytes on any machine with the same mathematics library, on any number of threads.
 
 mod anatomy;
@@ -35,7 +35,7 @@ const SOUND_SPEED: f64 = 1540.0;
 pub const DYNAMIC_RANGE: f64 = 50.0;
 
 /// Most samples of one volume; its complex field takes eight bytes a sample.
-const LARGEST_VOLUME: usize = 1 << 26;
+const LARGEST_VOLUME: usize = 1 << 25;
 
 /// What is to be made.
 #[derive(Clone, Debug, PartialEq)]

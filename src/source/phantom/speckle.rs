@@ -148,7 +148,9 @@ impl Blur {
         let mut out = vec![0.0; part.len()];
         for (line, out) in out.chunks_exact_mut(self.samples).enumerate() {
             for (tap, weights) in self.lateral.iter().enumerate() {
-                let Some(other) = line.checked_add_signed(tap as isize - reach).filter(|l| *l < lines) else { continue };
+                let Some(other) = line.checked_add_signed(tap as isize - reach).filter(|l| *l < lines) else {
+                    continue;
+                };
                 let other = &part[other * self.samples..][..self.samples];
                 for ((sum, value), weight) in out.iter_mut().zip(other).zip(weights) {
                     *sum += weight * value;
@@ -174,9 +176,9 @@ const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Start of the counter of one slice.
 fn stream(seed: u64, volume: u64, slice: u64) -> u64 {
-    [volume, slice].into_iter().fold(mix(seed.wrapping_add(GOLDEN)), |state, part| {
-        mix(state ^ mix(part.wrapping_add(1).wrapping_mul(GOLDEN)))
-    })
+    [volume, slice]
+        .into_iter()
+        .fold(mix(seed.wrapping_add(GOLDEN)), |state, part| mix(state ^ mix(part.wrapping_add(1).wrapping_mul(GOLDEN))))
 }
 
 /// Two independent standard normal numbers (Box and Muller 1958). By counter, not by state: any thread may ask for any one.

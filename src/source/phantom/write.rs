@@ -68,7 +68,11 @@ pub(super) fn sweep(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
 
     let frames = phantom.options().frames * phantom.volumes();
     if frames > MOST_FRAMES {
-        return Err(InputError::new(path, "volumes", format!("make {frames} frames, a file holds at most {MOST_FRAMES}")));
+        return Err(InputError::new(
+            path,
+            "volumes",
+            format!("make {frames} frames, a file holds at most {MOST_FRAMES}"),
+        ));
     }
     let (mut samples, mut file) = Unfinished::create(path)?;
     file.write_all(header(phantom).as_bytes()).map_err(|e| unwritable(path, &e))?;
