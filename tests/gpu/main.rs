@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod common;
+mod detector;
 mod faults;
 mod goldens;
 mod known_answers;
@@ -11,3 +12,4 @@ mod pictures;
 mod recordings;
 mod reruns;
 mod shading;
+mod truth;
