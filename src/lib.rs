@@ -21,6 +21,8 @@ pub mod plan;
 pub mod probe;
 pub mod report;
 pub mod scene;
+#[cfg(feature = "hot-reload")]
+mod shader_compile;
 pub mod shader_source;
 pub mod source;
 pub mod spirv;

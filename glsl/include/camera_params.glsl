@@ -1,7 +1,2 @@
-    vec3 origin;
-    vec3 origin_dx;
-    vec3 origin_dy;
-    vec3 direction;
-    vec3 direction_dx;
-    vec3 direction_dy;
+#include "ray_block.glsl"
     float cliff; // mm between neighbours that are two surfaces

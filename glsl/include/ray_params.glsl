@@ -1,10 +1,4 @@
-    // Rays, affine in the pixel's place.
-    vec3 origin;
-    vec3 origin_dx;
-    vec3 origin_dy;
-    vec3 direction;
-    vec3 direction_dx;
-    vec3 direction_dy;
+#include "ray_block.glsl"
     // What is rendered, mm.
     vec3 box_low;
     vec3 box_high;

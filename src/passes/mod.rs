@@ -191,6 +191,18 @@ impl Params {
     }
 }
 
+/// The rays of a scene, as every shader that casts or retraces them names them.
+pub fn ray_params(scene: &Scene) -> Params {
+    let rays = &scene.rays;
+    Params::default()
+        .vec3("origin", rays.origin)
+        .vec3("origin_dx", rays.origin_dx)
+        .vec3("origin_dy", rays.origin_dy)
+        .vec3("direction", rays.direction)
+        .vec3("direction_dx", rays.direction_dx)
+        .vec3("direction_dy", rays.direction_dy)
+}
+
 /// One compute dispatch: the only place where it is described.
 pub struct Pass {
     /// Debug label, time stamp and test case; unique.

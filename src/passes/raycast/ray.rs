@@ -67,16 +67,9 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 pub(super) fn params(scene: &Scene) -> Params {
-    let rays = &scene.rays;
     let grid = &scene.grid;
     let [window_low, window_high] = scene.window();
-    let params = Params::default()
-        .vec3("origin", rays.origin)
-        .vec3("origin_dx", rays.origin_dx)
-        .vec3("origin_dy", rays.origin_dy)
-        .vec3("direction", rays.direction)
-        .vec3("direction_dx", rays.direction_dx)
-        .vec3("direction_dy", rays.direction_dy)
+    let params = ray_params(scene)
         .vec3("box_low", scene.low)
         .vec3("box_high", scene.high)
         .f32("step_length", scene.step)

@@ -4,20 +4,12 @@ pub mod light;
 pub mod occlusion;
 pub mod shadow;
 
-use crate::passes::{Params, Texels, is_hit};
+use crate::passes::{Params, Texels, is_hit, ray_params};
 use crate::scene::Scene;
 use glam::DVec3;
 
 fn camera_params(scene: &Scene) -> Params {
-    let rays = &scene.rays;
-    Params::default()
-        .vec3("origin", rays.origin)
-        .vec3("origin_dx", rays.origin_dx)
-        .vec3("origin_dy", rays.origin_dy)
-        .vec3("direction", rays.direction)
-        .vec3("direction_dx", rays.direction_dx)
-        .vec3("direction_dy", rays.direction_dy)
-        .f32("cliff", scene.settings.light.cliff)
+    ray_params(scene).f32("cliff", scene.settings.light.cliff)
 }
 
 /// Unit direction to a light that is far away, or the place of one that is near, in space.

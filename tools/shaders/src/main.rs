@@ -5,6 +5,8 @@
 
 #[path = "../../../src/shader_source.rs"]
 mod shader_source;
+#[path = "../../../src/shader_compile.rs"]
+mod shader_compile;
 
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -25,23 +27,8 @@ fn main() -> Result<(), String> {
         let hash: String = Sha256::digest(source.fingerprint()).iter().map(|b| format!("{b:02x}")).collect();
         let file = spirv.join(format!("{}.spv", source.name));
         if known.get(&source.name) != Some(&hash) || !file.exists() {
-            let mut options = shaderc::CompileOptions::new().map_err(|e| e.to_string())?;
-            options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
-            options.set_target_spirv(shaderc::SpirvVersion::V1_5);
-            options.set_optimization_level(shaderc::OptimizationLevel::Performance);
-            // Optimising strips the names that bindings go by, unless debug names are asked for.
-            options.set_generate_debug_info();
-            options.set_auto_bind_uniforms(true);
-            for define in &source.defines {
-                options.add_macro_definition(define, Some("1"));
-            }
-            let binary = compiler
-                .compile_into_spirv(&source.text, shaderc::ShaderKind::Compute, &source.name, "main", Some(&options))
-                .map_err(|e| format!("{}: {e}", source.name))?;
-            if binary.get_num_warnings() > 0 {
-                return Err(format!("{}: {}", source.name, binary.get_warning_messages()));
-            }
-            write(&file, &strip_source(binary.as_binary()))?;
+            let words = shader_compile::compile(&compiler, source)?;
+            write(&file, &strip_source(&words))?;
             compiled += 1;
         }
         let _ = writeln!(hashes, "{hash}  {}", source.name);
