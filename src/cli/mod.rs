@@ -34,7 +34,7 @@ fn print(line: std::fmt::Arguments) {
     version,
     about = "Renders sweeps of a 3D/4D ultrasound probe, on Vulkan",
     long_about = "Renders sweeps of a mechanically wobbling 3D/4D ultrasound probe, on Vulkan.\n\n\
-                  Try: echolume render -o face.png\n                       echolume render sweep.mha -o picture.png --preset fetal\n\
+                  Try: echolume render -o face.png\n     echolume render sweep.mha -o picture.png --preset fetal\n\
                   Not a medical device."
 )]
 struct Arguments {
