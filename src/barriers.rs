@@ -172,7 +172,8 @@ mod tests {
 
     fn needs_order(a: &Access, b: &Access) -> bool {
         let shared = (0..64).any(|part| a.parts.contains(&part) && b.parts.contains(&part));
-        let mixed = matches!(a.resource, Resource::Slot(Slot::Volume, _)) && a.write != b.write;
+        let is_volume = matches!(a.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume, _));
+        let mixed = is_volume && a.write != b.write;
         a.resource == b.resource && (a.write || b.write) && (shared || mixed)
     }
 
@@ -218,6 +219,47 @@ mod tests {
                     prop_assert!(uncovered(&operations, &without).is_some(), "barrier {} is not needed", dropped);
                 }
             }
+        }
+    }
+
+    /// Two volumes of frames and two pictures of a scene with every filter, as the renderer records them.
+    #[test]
+    fn every_barrier_of_a_real_plan_is_needed_and_none_is_missing() {
+        use crate::passes::{PASSES, When};
+        use crate::probe::{Geometry, Grid};
+        let settings =
+            "slices = { median = true, sigma = {}, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }
+            distance = { median = 3, bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 }, sigma = {} }
+            light = { shadow = {}, occlusion = {} }
+            post = { sigma = {}, enhanced_sigma = {} }";
+        let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
+        let input = crate::scene::Input { stored: crate::source::StoredType::U8, range: [0.0, 255.0] };
+        let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();
+        let mut operations: Vec<Operation> = Vec::new();
+        let run = |when: When, turn: Turn, operations: &mut Vec<Operation>| {
+            for pass in PASSES.iter().filter(|p| p.when == when && p.is_needed(&scene)) {
+                for iteration in 0..(pass.repeat)(&scene) {
+                    operations.push(accesses(&scene, pass, &Turn { iteration, ..turn }));
+                }
+            }
+        };
+        for image in 0..2 {
+            for slice in 0..6 {
+                let turn = Turn { layer: slice % 4, slice, image, ..Turn::default() };
+                let layer = turn.layer..turn.layer + 1;
+                operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, Worker::Copy)]);
+                run(When::Frame, turn, &mut operations);
+            }
+            run(When::Volume, Turn { image, ..Turn::default() }, &mut operations);
+            run(When::Picture, Turn { image, ..Turn::default() }, &mut operations);
+        }
+        let barriers = derive(&operations);
+        assert!(barriers.iter().flatten().count() > 40);
+        assert_eq!(uncovered(&operations, &barriers), None);
+        for dropped in (0..barriers.len()).filter(|n| barriers[*n].is_some()) {
+            let mut without = barriers.clone();
+            without[dropped] = None;
+            assert!(uncovered(&operations, &without).is_some(), "barrier {dropped} is not needed");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
 use echolume::passes::slots::Format;
-use echolume::passes::{Slot, Texels};
+use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene, Settings};
@@ -173,4 +173,25 @@ pub fn difference(a: &Picture, b: &Picture) -> (f64, f64) {
 pub fn as_picture(texels: &Texels) -> Picture {
     let rgba = texels.encode(Format::Rgba8);
     Picture { width: texels.size[0] as u32, height: texels.size[1] as u32, rgba }
+}
+
+/// Rays that meet a sphere within 0.8 of its radius (further out the chord is shorter than the detector's ring), and the
+/// largest error of their distances, mm. A hole fails.
+pub fn sphere_error(scene: &Scene, distances: &Texels, centre: glam::DVec3, radius: f64) -> (u32, f64) {
+    let (mut hits, mut worst) = (0, 0.0f64);
+    for y in 0..distances.size[1] {
+        for x in 0..distances.size[0] {
+            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+            let along = (centre - origin).dot(direction);
+            let offset = (origin + direction * along).distance(centre);
+            if offset > 0.8 * radius {
+                continue;
+            }
+            let got = distances.one(x, y, 0);
+            assert!(is_hit(got), "a hole at {x}, {y}");
+            worst = worst.max((got - along + (radius * radius - offset * offset).sqrt()).abs());
+            hits += 1;
+        }
+    }
+    (hits, worst)
 }

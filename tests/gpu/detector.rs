@@ -140,23 +140,8 @@ fn a_sphere_is_within_a_tenth_of_a_step_from_any_side() {
             if sign == "bright" { share } else { 1.0 - share }
         });
         let map = distances(&device, &scene, &frames);
-        let (mut hits, mut worst) = (0, 0.0f64);
-        for y in 0..72 {
-            for x in 0..72 {
-                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-                let along = (centre - origin).dot(direction);
-                let offset = (origin + direction * along).distance(centre);
-                // Further out the chord is shorter than the ring.
-                if offset > 0.8 * radius {
-                    continue;
-                }
-                let expected = along - (radius * radius - offset * offset).sqrt();
-                let got = map.one(x, y, 0);
-                assert!(is_hit(got), "a hole at {x}, {y}");
-                worst = worst.max((got - expected).abs() / STEP);
-                hits += 1;
-            }
-        }
+        let (hits, worst) = sphere_error(&scene, &map, centre, radius);
+        let worst = worst / STEP;
         println!("sphere, {sign}, {camera}: {worst:.3} steps at most over {hits} rays");
         assert!(hits > 200 && worst < 0.1, "{sign}, {camera}: {worst} steps off over {hits} rays");
     }

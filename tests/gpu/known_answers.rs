@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use echolume::passes::shade::normal;
-use echolume::passes::{MISS, Slot, Texels, is_hit};
+use echolume::passes::{MISS, Slot, Texels};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 use glam::DVec3;
@@ -59,41 +59,6 @@ fn ten_thousand_thin_samples_and_an_opaque_one_keep_their_digits() {
     }
 }
 
-/// A wall seen face on: the surface lies at the wall, however the samples fall.
-#[test]
-fn a_step_wall_is_found_within_a_tenth_of_a_step() {
-    let device = Device::new();
-    let geometry = block(0.25, [16, 120, 16]);
-    for (wall, height) in [(12.0, 1.0), (12.13, 0.5), (17.31, 0.25)] {
-        let toml = "mode = 'sr'\npicture = { size = [9, 7] }\nray = { step = 0.4, sampling = 'exact' }
-                    slices = { format = 'r32f' }\nsurface = { threshold = 0.1 }";
-        let scene = scene(geometry.clone(), FLOATS, toml);
-        // A ramp of two voxels about the wall, so that its place between voxels is in the data.
-        let frames = body_frames(&scene, |p| height * ((p.y - wall) / 0.5 + 0.5).clamp(0.0, 1.0));
-        let mut renderer = rendered(&device, scene.clone(), &frames);
-        renderer.picture().expect("picture");
-        let distances = renderer.read(Slot::Distance).expect("read").expect("there");
-        let mut found = 0;
-        for y in 0..7 {
-            for x in 0..9 {
-                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-                // The picture is wider than the block.
-                if origin.x < scene.low.x
-                    || origin.x > scene.high.x
-                    || origin.z < scene.low.z
-                    || origin.z > scene.high.z
-                {
-                    continue;
-                }
-                found += 1;
-                let place = origin + direction * distances.one(x, y, 0);
-                assert!((place.y - wall).abs() < 0.04, "wall at {wall} found at {}", place.y);
-            }
-        }
-        assert!(found > 40, "{found}");
-    }
-}
-
 /// A sphere through scan conversion, sweep map and detector.
 #[test]
 fn a_sphere_in_a_sweep_is_where_it_is() {
@@ -111,23 +76,7 @@ fn a_sphere_in_a_sweep_is_where_it_is() {
     let mut renderer = rendered(&device, scene.clone(), &frames);
     renderer.picture().expect("picture");
     let distances = renderer.read(Slot::Distance).expect("read").expect("there");
-    let (mut hits, mut worst) = (0, 0.0f64);
-    for y in 0..64 {
-        for x in 0..64 {
-            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-            let along = (centre - origin).dot(direction);
-            let offset = (origin + direction * along).distance(centre);
-            // Away from the limb, where a ray crosses the edge at a slant.
-            if offset > 0.8 * radius {
-                continue;
-            }
-            let expected = along - (radius * radius - offset * offset).sqrt();
-            let got = distances.one(x, y, 0);
-            assert!(is_hit(got), "a hole at {x}, {y}");
-            worst = worst.max((got - expected).abs());
-            hits += 1;
-        }
-    }
+    let (hits, worst) = sphere_error(&scene, &distances, centre, radius);
     assert!(hits > 400, "the sphere fills the picture: {hits}");
     // Half a step: the lattice of frames, 0.013 rad at 45 mm, is 0.6 mm wide across a curved edge.
     assert!(worst < 0.1, "off by {worst} mm");
