@@ -62,7 +62,7 @@ impl Plan {
             }
             match (pass.needed)(scene) {
                 Ok(why) => {
-                    let [x, y, z] = (pass.extent)(scene);
+                    let [x, y, z] = (pass.extent)(scene, &Turn::default());
                     let each = match pass.when {
                         When::Frame => "each frame",
                         When::Volume => "each volume",
@@ -82,7 +82,7 @@ impl Plan {
                         text,
                         "    {:<19} {}: {} -> {}",
                         "",
-                        (pass.shader)(scene),
+                        (pass.shader)(scene, &turn),
                         names(reads),
                         names(writes)
                     );
@@ -186,10 +186,10 @@ impl Step {
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {
         let (a, b) = (self.pass, other.pass);
         let turn = self.turn();
-        (a.shader)(old) == (b.shader)(new)
-            && (a.constants)(old) == (b.constants)(new)
+        (a.shader)(old, &turn) == (b.shader)(new, &turn)
+            && (a.constants)(old, &turn) == (b.constants)(new, &turn)
             && (a.params)(old, &turn) == (b.params)(new, &turn)
-            && (a.extent)(old) == (b.extent)(new)
+            && (a.extent)(old, &turn) == (b.extent)(new, &turn)
             && (a.reads)(old, &turn) == (b.reads)(new, &turn)
             && (a.writes)(old, &turn) == (b.writes)(new, &turn)
     }

@@ -1,7 +1,7 @@
 //! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
 //! Needs no GPU.
 
-use echolume::passes::{PASSES, Pass, contract};
+use echolume::passes::{PASSES, Pass, Turn, contract};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene};
 use echolume::shader_source;
@@ -152,11 +152,16 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
     let mut used = Vec::new();
     for scene in scenes() {
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
-            let shader = (pass.shader)(&scene);
-            let bytes = spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
-            let module = spirv::reflect(&spirv::words(bytes)).expect("reflection");
-            contract::check(pass, &scene, &module).unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
-            used.push(shader);
+            for iteration in 0..(pass.repeat)(&scene) {
+                let turn = Turn { iteration, ..Turn::default() };
+                let shader = (pass.shader)(&scene, &turn);
+                let bytes =
+                    spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
+                let module = spirv::reflect(&spirv::words(bytes)).expect("reflection");
+                let agreed = contract::check(pass, &scene, &turn, &module);
+                agreed.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                used.push(shader);
+            }
         }
     }
     for (name, _) in spirv::EMBEDDED {
@@ -172,13 +177,13 @@ fn a_disagreement_names_both_sides() {
     let changed = |change: fn(&mut Pass)| {
         let mut pass = Pass { ..*tone };
         change(&mut pass);
-        contract::check(&pass, &scene, &module).unwrap_err()
+        contract::check(&pass, &scene, &Turn::default(), &module).unwrap_err()
     };
     let error = changed(|p| p.reads = |_, _| vec![echolume::passes::whole("pictur", echolume::passes::Slot::Picture)]);
     assert!(error.contains("pictur") && error.contains("reads"), "{error}");
     let error = changed(|p| p.params = |_, _| echolume::passes::Params::default().i32("brightness", 1));
     assert!(error.contains("brightness") && error.contains("float"), "{error}");
-    let error = changed(|p| p.constants = |_| vec![("COLOUR", 1)]);
+    let error = changed(|p| p.constants = |_, _| vec![("COLOUR", 1)]);
     assert!(error.contains("COLOUR"), "{error}");
     let error = changed(|p| p.writes = |_, _| vec![echolume::passes::whole("screen", echolume::passes::Slot::Volume)]);
     assert!(error.contains("Three") && error.contains("Two"), "{error}");

@@ -3,7 +3,7 @@
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
-use crate::passes::{Pass, contract};
+use crate::passes::{Pass, Turn, contract};
 use crate::scene::Scene;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
@@ -67,15 +67,15 @@ impl Pipelines {
     ///
     /// # Errors
     /// A shader that is not there, or that disagrees with the pass's declaration.
-    pub fn get(&mut self, pass: &Pass, scene: &Scene) -> Result<Arc<Pipeline>, GpuError> {
-        let key = ((pass.shader)(scene), (pass.constants)(scene));
+    pub fn get(&mut self, pass: &Pass, scene: &Scene, turn: &Turn) -> Result<Arc<Pipeline>, GpuError> {
+        let key = ((pass.shader)(scene, turn), (pass.constants)(scene, turn));
         if let Some(pipeline) = self.made.get(&key) {
             return Ok(pipeline.clone());
         }
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
-        contract::check(pass, scene, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
+        contract::check(pass, scene, turn, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
         let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, &key, &words, module)?);
         self.made.insert(key, pipeline.clone());
         Ok(pipeline)

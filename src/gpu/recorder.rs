@@ -184,7 +184,7 @@ impl Recorder {
         let block = contract::pack(&pipeline.module, &(pass.params)(scene, turn));
         let offset = self.place_params(&block)?;
         self.bind(work, offset, block.len() as u64);
-        let extent = (pass.extent)(scene);
+        let extent = (pass.extent)(scene, turn);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
         // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
         unsafe {

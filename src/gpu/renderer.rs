@@ -338,7 +338,7 @@ impl Renderer {
 }
 
 fn pipelines_of(pipelines: &mut Pipelines, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-    plan.steps.iter().map(|step| pipelines.get(step.pass, scene)).collect()
+    plan.steps.iter().map(|step| pipelines.get(step.pass, scene, &step.turn())).collect()
 }
 
 fn frame_bytes(scene: &Scene) -> u64 {

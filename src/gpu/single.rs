@@ -42,7 +42,7 @@ impl Single {
         let mut timeline = Timeline::new(&self.context)?;
         let mut recorder = Recorder::new(&self.context, pass.name)?;
         let mut order = Order::default();
-        let pipeline = self.pipelines.get(pass, scene)?;
+        let pipeline = self.pipelines.get(pass, scene, turn)?;
         let new = slots.fit(&plan, scene)?;
 
         let mut staged = Vec::new();

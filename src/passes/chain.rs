@@ -2,7 +2,7 @@
 //! the last, and a filter that is not needed leaves no copy behind.
 
 use super::{PASSES, Pass, Slot, Turn};
-use crate::scene::Scene;
+use crate::scene::{Layout, Scene};
 
 /// The slices of stage 1, the distance maps of stage 3, and the pictures of stage 4.
 struct Chain {
@@ -72,14 +72,20 @@ impl Chain {
     }
 }
 
+/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or planes stand beside it.
+pub fn rendered(scene: &Scene) -> Slot {
+    let is_picture = scene.settings.ray.rays == 1 && scene.settings.layout == Layout::Single;
+    if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
+}
+
 /// What a pass of stage 1 reads and writes.
 pub fn slice_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
     SLICES.link(scene, name, turn)
 }
 
 /// Whether a pass of stage 1 writes into the 3D texture itself.
-pub fn writes_volume(scene: &Scene, name: &str) -> bool {
-    matches!(SLICES.link(scene, name, &Turn::default()).1, Slot::Volume | Slot::SharpVolume)
+pub fn writes_volume(scene: &Scene, name: &str, turn: &Turn) -> bool {
+    matches!(SLICES.link(scene, name, turn).1, Slot::Volume | Slot::SharpVolume)
 }
 
 pub fn distance_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {

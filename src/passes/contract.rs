@@ -6,9 +6,8 @@ use crate::scene::Scene;
 use crate::spirv::{Access, Dimension, Kind, Member, Module};
 
 /// The first disagreement, naming both sides.
-pub fn check(pass: &Pass, scene: &Scene, module: &Module) -> Result<(), String> {
-    let turn = Turn::default();
-    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+pub fn check(pass: &Pass, scene: &Scene, turn: &Turn, module: &Module) -> Result<(), String> {
+    let (reads, writes) = ((pass.reads)(scene, turn), (pass.writes)(scene, turn));
     for bind in &reads {
         check_bind(scene, module, bind, Access::Read)?;
     }
@@ -20,8 +19,8 @@ pub fn check(pass: &Pass, scene: &Scene, module: &Module) -> Result<(), String> 
             return Err(format!("glsl declares '{}', the pass neither reads nor writes it", binding.name));
         }
     }
-    check_params(module, &(pass.params)(scene, &turn))?;
-    let constants = (pass.constants)(scene);
+    check_params(module, &(pass.params)(scene, turn))?;
+    let constants = (pass.constants)(scene, turn);
     for (name, _) in &constants {
         if !module.constants.iter().any(|c| c.name == *name) {
             return Err(format!("the pass sets constant '{name}', glsl has none of that name"));

@@ -4,6 +4,7 @@
 pub mod chain;
 pub mod contract;
 pub mod slots;
+pub mod tables;
 pub mod texels;
 
 pub mod preprocess {
@@ -210,18 +211,18 @@ pub struct Pass {
     pub stage: Stage,
     pub when: When,
     /// Path below glsl/ and variant.
-    pub shader: fn(&Scene) -> &'static str,
+    pub shader: fn(&Scene, &Turn) -> &'static str,
     pub needed: fn(&Scene) -> Need,
     pub reads: fn(&Scene, &Turn) -> Vec<Bind>,
     pub writes: fn(&Scene, &Turn) -> Vec<Bind>,
     /// Invocations, not workgroups.
-    pub extent: fn(&Scene) -> [u32; 3],
+    pub extent: fn(&Scene, &Turn) -> [u32; 3],
     /// Dispatches in a row, with [`Turn::iteration`] counting.
     pub repeat: fn(&Scene) -> u32,
     /// Numbers: they move while a picture lives.
     pub params: fn(&Scene, &Turn) -> Params,
     /// Structure: a change of it is another pipeline.
-    pub constants: fn(&Scene) -> Vec<(&'static str, i32)>,
+    pub constants: fn(&Scene, &Turn) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
     /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched.
     pub reference: fn(&Scene, &Turn, &Arrays, &mut Arrays),
@@ -251,14 +252,19 @@ pub fn once(_: &Scene) -> u32 {
     1
 }
 
-pub fn no_constants(_: &Scene) -> Vec<(&'static str, i32)> {
+pub fn no_constants(_: &Scene, _: &Turn) -> Vec<(&'static str, i32)> {
     Vec::new()
 }
 
-pub fn slice_extent(scene: &Scene) -> [u32; 3] {
+pub fn slice_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
     [scene.grid.size[0], scene.grid.size[1], 1]
 }
 
-pub fn picture_extent(scene: &Scene) -> [u32; 3] {
+pub fn picture_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
     [scene.picture_size()[0], scene.picture_size()[1], 1]
+}
+
+/// Of stages 2 and 3.
+pub fn ray_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
+    [scene.ray_size()[0], scene.ray_size()[1], 1]
 }

@@ -1,15 +1,12 @@
 //! Slots: the GPU resources that passes read and write. A slot's shape and format follow from the scene; a slot that no pass
 //! of a plan names does not exist.
 
-use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+use super::tables::{self, LUT_ENTRIES};
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
 
 /// Frames that may be on their way into slices at once: layers of the frame array, and slots of the staging ring.
 pub const FRAMES_IN_FLIGHT: u32 = 4;
-/// Entries of the sweep and line look-up tables. The half tangent is smooth: linear interpolation between 1025 entries is
-/// off by h^2/8 times its second derivative, under 1e-6 slices for a sweep of 142 frames over 85 deg.
-pub const LUT_ENTRIES: usize = 1025;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Slot {
@@ -38,7 +35,11 @@ pub enum Slot {
     Shadow,
     /// Ambient light that arrives, 0..1.
     Occlusion,
-    /// The lit or composited picture.
+    /// What stages 2 and 3 rendered, where it becomes the picture only by averaging or beside planes.
+    Rendered,
+    /// The planes of a 4-up picture; black where the rendering goes.
+    Planes,
+    /// The picture of stages 2 and 3 before the filters of stage 4.
     Picture,
     SmoothPicture,
     SmoothPictureB,
@@ -119,7 +120,7 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 20] = [
+    pub const ALL: [Slot; 22] = [
         Slot::Frames,
         Slot::ScanLut,
         Slot::SliceA,
@@ -136,6 +137,8 @@ impl Slot {
         Slot::Surface,
         Slot::Shadow,
         Slot::Occlusion,
+        Slot::Rendered,
+        Slot::Planes,
         Slot::Picture,
         Slot::SmoothPicture,
         Slot::SmoothPictureB,
@@ -161,6 +164,8 @@ impl Slot {
             Slot::Surface => "surface",
             Slot::Shadow => "shadow",
             Slot::Occlusion => "occlusion",
+            Slot::Rendered => "rendered",
+            Slot::Planes => "planes",
             Slot::Picture => "picture",
             Slot::SmoothPicture => "smooth_picture",
             Slot::SmoothPictureB => "smooth_picture_b",
@@ -177,13 +182,11 @@ impl Slot {
             Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * LUT_ENTRIES as u32),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
-            Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.picture_size()),
-            Slot::Shadow
-            | Slot::Occlusion
-            | Slot::Picture
-            | Slot::SmoothPicture
-            | Slot::SmoothPictureB
-            | Slot::Screen => Shape::Two(scene.picture_size()),
+            Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
+            Slot::Shadow | Slot::Occlusion | Slot::Rendered => Shape::Two(scene.ray_size()),
+            Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
+                Shape::Two(scene.picture_size())
+            }
         }
     }
 
@@ -207,6 +210,7 @@ impl Slot {
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
             Slot::Shadow | Slot::Occlusion => Format::R16f,
+            Slot::Rendered | Slot::Planes => Format::Rgba16f,
             Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB => Format::Rgba16f,
             Slot::Screen => Format::Rgba8,
         }
@@ -215,13 +219,11 @@ impl Slot {
     pub fn filled(self) -> Filled {
         match self {
             Slot::Frames => Filled::ByFrames,
-            Slot::ScanLut => Filled::ByScene(scan_lut),
-            Slot::SweepLut => Filled::ByScene(sweep_lut),
-            Slot::LineLut => Filled::ByScene(line_lut),
-            Slot::SliceTable => Filled::ByScene(slice_table),
-            Slot::Transfer => {
-                Filled::ByScene(|s| floats(transfer::table(&s.settings.volume.transfer).iter().flatten().copied()))
-            }
+            Slot::ScanLut => Filled::ByScene(tables::scan_lut),
+            Slot::SweepLut => Filled::ByScene(tables::sweep_lut),
+            Slot::LineLut => Filled::ByScene(tables::line_lut),
+            Slot::SliceTable => Filled::ByScene(tables::slice_table),
+            Slot::Transfer => Filled::ByScene(tables::transfer_table),
             _ => Filled::ByPasses,
         }
     }
@@ -238,116 +240,5 @@ impl Slot {
 
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
-    }
-}
-
-fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
-    values.into_iter().map(|v| v as f32).collect()
-}
-
-/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the PLUS toolkit's rule
-/// holds: both neighbours must exist in both directions, so the last sample and line themselves are out.
-pub fn scan_lut(scene: &Scene) -> Vec<f32> {
-    let Some(probe) = scene.probe() else { return Vec::new() };
-    let [width, height] = scene.grid.size;
-    let mut lut = Vec::with_capacity(2 * width as usize * height as usize);
-    for row in 0..height {
-        for column in 0..width {
-            let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
-            let (sample, line) = scan_index(scene, probe, x, y).unwrap_or((-1.0, -1.0));
-            lut.extend([sample as f32, line as f32]);
-        }
-    }
-    lut
-}
-
-/// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none.
-pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
-    let (sample, line) = probe.plane_indices(x, y);
-    let (last_sample, last_line) = ((probe.samples - 1) as f64, (probe.lines.len() - 1) as f64);
-    if scene.apron <= 0.0 {
-        let inside = sample >= 0.0 && sample < last_sample && line >= 0.0 && line < last_line;
-        return inside.then_some((sample, line));
-    }
-    let (near_sample, near_line) = (sample.clamp(0.0, last_sample), line.clamp(0.0, last_line));
-    let (near_x, near_y) = probe.plane_point(near_sample, near_line);
-    let [px, py] = scene.grid.pitch;
-    let away = ((x - near_x) / px).hypot((y - near_y) / py);
-    (away <= scene.apron).then_some((near_sample, near_line))
-}
-
-/// The parameter that the sweep look-up table is entered by: the tangent of half the angle about the wobble axis, or mm.
-pub fn sweep_parameter(motion: Motion, position: f64) -> f64 {
-    match motion {
-        Motion::Fan { .. } => (position / 2.0).tan(),
-        _ => position,
-    }
-}
-
-fn sweep_position(motion: Motion, parameter: f64) -> f64 {
-    match motion {
-        Motion::Fan { .. } => 2.0 * parameter.atan(),
-        _ => parameter,
-    }
-}
-
-/// The parameter that the line look-up table is entered by: the tangent of half the in-plane angle, or mm.
-pub fn line_parameter(array: Array, position: f64) -> f64 {
-    match array {
-        Array::Curved { .. } => (position / 2.0).tan(),
-        Array::Linear => position,
-    }
-}
-
-/// Lowest and highest parameter of the sweep table.
-pub fn sweep_span(probe: &Probe) -> (f64, f64) {
-    let (first, last) = probe.slice_bounds();
-    (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
-}
-
-/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index itself for an even sweep.
-fn sweep_lut(scene: &Scene) -> Vec<f32> {
-    let Some(probe) = scene.probe() else { return Vec::new() };
-    let (low, high) = sweep_span(probe);
-    floats((0..LUT_ENTRIES).map(|i| {
-        let parameter = low + (high - low) * i as f64 / (LUT_ENTRIES - 1) as f64;
-        (sweep_position(probe.motion, parameter) - probe.slices.first()) / probe.slices.pitch()
-    }))
-}
-
-/// Share of a frame's lines that fired before the line at each parameter.
-fn line_lut(scene: &Scene) -> Vec<f32> {
-    let Some(probe) = scene.probe() else { return Vec::new() };
-    let low = line_parameter(probe.array, probe.lines.first());
-    let high = line_parameter(probe.array, probe.lines.last());
-    floats((0..LUT_ENTRIES).map(|i| {
-        let parameter = low + (high - low) * i as f64 / (LUT_ENTRIES - 1) as f64;
-        let position = match probe.array {
-            Array::Curved { .. } => 2.0 * parameter.atan(),
-            Array::Linear => parameter,
-        };
-        probe.lines.index_of(position) / probe.lines.len() as f64
-    }))
-}
-
-/// Position and advance of every slice, in mean pitches from slice 0.
-fn slice_table(scene: &Scene) -> Vec<f32> {
-    let Some(probe) = scene.probe() else { return Vec::new() };
-    let pitch = probe.slices.pitch();
-    floats((0..probe.slices.len()).flat_map(|k| {
-        let advance = match &probe.advance {
-            Advance::None => 0.0,
-            Advance::Same(a) => *a,
-            Advance::Each(table) => table.get(k).copied().unwrap_or(0.0),
-        };
-        [(probe.slices.at(k as f64) - probe.slices.first()) / pitch, advance / pitch]
-    }))
-}
-
-/// Whether slices lie unevenly or were taken in mixed directions, so that a slice is found by bracketing.
-pub fn is_uneven(geometry: &Geometry) -> bool {
-    match geometry {
-        Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),
-        Geometry::Cartesian(_) => false,
     }
 }

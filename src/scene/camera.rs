@@ -1,6 +1,6 @@
 //! The camera as rays: every pixel's origin and direction are affine in the pixel's place, in parallel and perspective alike.
 
-use super::Settings;
+use super::{Layout, Settings};
 use glam::DVec3;
 
 /// Ray of the pixel with its centre at (px, py): origin + px origin_dx + py origin_dy, and the direction likewise, then
@@ -36,6 +36,15 @@ impl Rays {
     }
 }
 
+/// Width and height of the lattice of rays: a quarter of a 4-up picture (rounded up), and several rays for each pixel.
+pub fn ray_size(settings: &Settings) -> [u32; 2] {
+    let tile = match settings.layout {
+        Layout::Single => settings.picture.size,
+        Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),
+    };
+    tile.map(|n| n * settings.ray.rays)
+}
+
 /// Frames the box (`low`, `high`) as the settings say. `depth_offset` turns depths below the face into Y.
 /// A single frame is looked at from the side, as a B-mode picture is, with the probe on top.
 pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, still: bool) -> Rays {
@@ -55,7 +64,7 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     };
     // Half extents of the box along the camera's axes.
     let along = |axis: DVec3| axis.abs().dot(half);
-    let [width, height] = settings.picture.size.map(f64::from);
+    let [width, height] = ray_size(settings).map(f64::from);
     let fit = (along(up) / height).max(along(right) / width);
     // mm a pixel where the target is.
     let pixel = 2.0 * fit / camera.zoom;

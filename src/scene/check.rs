@@ -1,12 +1,20 @@
 //! What no scene may ask for, told by name and limit.
 
-use super::{Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use super::{Layout, Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
 
 /// Everything that can be told without a geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     let [width, height] = settings.picture.size;
     if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
         return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
+    }
+    within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
+    let [width, height] = super::camera::ray_size(settings);
+    if width > MAX_PICTURE || height > MAX_PICTURE {
+        return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));
+    }
+    if settings.layout == Layout::Four && settings.mode.is_flat() {
+        return refuse("layout", "four shows three planes and a rendering: the mode must be one that renders");
     }
     let s = &settings.slices;
     within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
@@ -26,8 +34,13 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
         within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
     }
-    for (field, [low, high]) in [("volume.window", settings.volume.window), ("surface.window", settings.surface.window)]
-    {
+    for (field, [low, high]) in [
+        ("volume.window", settings.volume.window),
+        ("surface.window", settings.surface.window),
+        ("projection.window", settings.projection.window),
+        ("planes.window", settings.planes.window),
+        ("cube.window", settings.cube.window),
+    ] {
         if !(low.is_finite() && high.is_finite() && low < high) {
             return refuse(field, format!("[{low}, {high}] must be finite and rise"));
         }

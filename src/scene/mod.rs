@@ -5,7 +5,6 @@ pub mod camera;
 mod check;
 pub mod load;
 pub mod settings;
-mod settings_shade;
 pub mod transfer;
 
 pub use camera::Rays;
@@ -139,18 +138,50 @@ impl Scene {
         [self.grid.size[0], self.grid.size[1], self.slices()]
     }
 
+    /// Width and height of the result.
     pub fn picture_size(&self) -> [u32; 2] {
         self.settings.picture.size
     }
 
-    pub fn is_surface(&self) -> bool {
-        self.settings.mode == Mode::Surface
+    /// Width and height of what stages 2 and 3 work on: a tile of a 4-up picture, and several rays for each pixel.
+    pub fn ray_size(&self) -> [u32; 2] {
+        camera::ray_size(&self.settings)
     }
 
+    /// Whether a surface detector runs.
+    pub fn detects_surface(&self) -> bool {
+        matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
+    }
+
+    /// Whether stage 3 has a distance map to light.
+    pub fn has_distance(&self) -> bool {
+        self.detects_surface()
+    }
+
+    /// Whether samples are composited through the transfer function.
+    pub fn composites(&self) -> bool {
+        matches!(self.settings.mode, Mode::Volume | Mode::Mixed)
+    }
+
+    /// Whether planes are cut: a mode of planes, or the three of a 4-up picture.
+    pub fn cuts_planes(&self) -> bool {
+        self.is_flat() || self.settings.layout == Layout::Four
+    }
+
+    /// Whether the mode cuts planes and casts no ray.
+    pub fn is_flat(&self) -> bool {
+        self.settings.mode.is_flat()
+    }
+
+    /// The window of samples that a detector or a compositor of this scene uses.
     pub fn window(&self) -> [f64; 2] {
-        match self.settings.mode {
-            Mode::Volume => self.settings.volume.window,
-            Mode::Surface => self.settings.surface.window,
+        let settings = &self.settings;
+        match settings.mode {
+            Mode::Volume => settings.volume.window,
+            Mode::Surface | Mode::Mixed => settings.surface.window,
+            Mode::Mip | Mode::MinIp | Mode::Mean => settings.projection.window,
+            Mode::Plane | Mode::Orthogonal | Mode::Tomography => settings.planes.window,
+            Mode::Cube => settings.cube.window,
         }
     }
 
@@ -260,7 +291,9 @@ fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(DVec3, DVec3
     }
     let (field, start) = match settings.mode {
         Mode::Volume => ("volume.start_depth", settings.volume.start_depth),
-        Mode::Surface => ("surface.start_depth", settings.surface.start_depth),
+        Mode::Surface | Mode::Mixed => ("surface.start_depth", settings.surface.start_depth),
+        Mode::Mip | Mode::MinIp | Mode::Mean => ("projection.start_depth", settings.projection.start_depth),
+        Mode::Plane | Mode::Orthogonal | Mode::Tomography | Mode::Cube => ("region.depth", None),
     };
     if let Some(start) = start {
         if !start.is_finite() || start + offset >= high.y {

@@ -10,15 +10,15 @@ pub const DISTANCE: Pass = Pass {
     name: NAME,
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |_| "filter/bilateral.distance",
-    needed: |s| match (s.is_surface(), s.settings.distance.bilateral) {
+    shader: |_, _| "filter/bilateral.distance",
+    needed: |s| match (s.has_distance(), s.settings.distance.bilateral) {
         (false, _) => Err("no distance map in this mode"),
         (true, None) => Err("not asked for"),
         _ => Ok("asked for"),
     },
     reads: |s, t| vec![whole("source", distance_link(s, NAME, t).0)],
     writes: |s, t| vec![whole("target", distance_link(s, NAME, t).1)],
-    extent: picture_extent,
+    extent: ray_extent,
     repeat: |s| settings(s).repeat,
     params: |s, t| {
         let b = settings(s);
@@ -27,7 +27,7 @@ pub const DISTANCE: Pass = Pass {
             .f32("distance_narrowness", 0.5 / (b.distance * b.distance))
             .i32("slice", t.slice)
     },
-    constants: |s| vec![("RADIUS", radius(s) as i32)],
+    constants: |s, _| vec![("RADIUS", radius(s) as i32)],
     tolerance: Tolerance {
         absolute: 2e-5,
         relative: 1e-6,

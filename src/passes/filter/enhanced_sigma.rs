@@ -11,7 +11,7 @@ pub const PICTURE: Pass = Pass {
     name: NAME,
     stage: Stage::Postprocess,
     when: When::Picture,
-    shader: |_| "filter/enhanced_sigma.picture",
+    shader: |_, _| "filter/enhanced_sigma.picture",
     needed: |s| match s.settings.post.enhanced_sigma {
         Some(e) if e.sigma > 0.0 => Ok("asked for"),
         Some(_) => Err("a sigma of 0 changes nothing"),
@@ -25,7 +25,7 @@ pub const PICTURE: Pass = Pass {
         let e = settings(s);
         Params::default().f32("range", 2.0 * e.sigma).f32("few", f64::from(few(e))).i32("slice", t.slice)
     },
-    constants: |s| vec![("RADIUS", (settings(s).window / 2) as i32), ("LARGEST", (settings(s).largest / 2) as i32)],
+    constants: |s, _| vec![("RADIUS", (settings(s).window / 2) as i32), ("LARGEST", (settings(s).largest / 2) as i32)],
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 1e-3,

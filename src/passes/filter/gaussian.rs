@@ -12,26 +12,30 @@ pub const LATERAL: Pass = Pass {
     name: "gaussian_lateral",
     stage: Stage::Preprocess,
     when: When::Frame,
-    shader: |s| if writes_volume(s, "gaussian_lateral") { "filter/gaussian.slice" } else { "filter/gaussian.plane" },
+    shader: |s, t| {
+        if writes_volume(s, "gaussian_lateral", t) { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
+    },
     needed: |s| asked(s, 0),
     reads: |s, t| vec![whole("source", slice_link(s, "gaussian_lateral", t).0)],
     writes: |s, t| vec![slice("target", slice_link(s, "gaussian_lateral", t).1)],
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(s, 0, t),
-    constants: |s| constants(s, 0),
+    constants: |s, _| constants(s, 0),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| reference(s, 0, t, reads, writes),
 };
 
 pub const DEPTH: Pass = Pass {
     name: "gaussian_depth",
-    shader: |s| if writes_volume(s, "gaussian_depth") { "filter/gaussian.slice" } else { "filter/gaussian.plane" },
+    shader: |s, t| {
+        if writes_volume(s, "gaussian_depth", t) { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
+    },
     needed: |s| asked(s, 1),
     reads: |s, t| vec![whole("source", slice_link(s, "gaussian_depth", t).0)],
     writes: |s, t| vec![slice("target", slice_link(s, "gaussian_depth", t).1)],
     params: |s, t| params(s, 1, t),
-    constants: |s| constants(s, 1),
+    constants: |s, _| constants(s, 1),
     reference: |s, t, reads, writes| reference(s, 1, t, reads, writes),
     ..LATERAL
 };
@@ -40,14 +44,14 @@ pub const ELEVATION: Pass = Pass {
     name: "gaussian_elevation",
     stage: Stage::Preprocess,
     when: When::Volume,
-    shader: |_| "filter/gaussian.volume",
+    shader: |_, _| "filter/gaussian.volume",
     needed: |s| asked(s, 2),
     reads: |_, _| vec![whole("source", Slot::SharpVolume)],
     writes: |_, _| vec![whole("target", Slot::Volume)],
-    extent: |s| s.volume_size(),
+    extent: |s, _| s.volume_size(),
     repeat: once,
     params: |s, t| params(s, 2, t),
-    constants: |s| constants(s, 2),
+    constants: |s, _| constants(s, 2),
     tolerance: TOLERANCE,
     reference: |s, t, reads, writes| reference(s, 2, t, reads, writes),
 };

@@ -8,7 +8,7 @@ pub const PASS: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
     when: When::Picture,
-    shader: |_| "postprocess/tone",
+    shader: |_, _| "postprocess/tone",
     needed: |_| Ok("every picture ends in 8 bits"),
     reads: |s, _| vec![whole("picture", picture_end(s))],
     writes: |_, _| vec![whole("screen", Slot::Screen)],
@@ -27,7 +27,7 @@ pub const PASS: Pass = Pass {
             .vec3("map_3", d)
             .vec3("map_4", e)
     },
-    constants: |s| vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)],
+    constants: |s, _| vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)],
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,

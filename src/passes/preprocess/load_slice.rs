@@ -10,7 +10,9 @@ pub const PASS: Pass = Pass {
     name: NAME,
     stage: Stage::Preprocess,
     when: When::Frame,
-    shader: |s| if writes_volume(s, NAME) { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" },
+    shader: |s, t| {
+        if writes_volume(s, NAME, t) { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
+    },
     needed: |s| match s.probe() {
         None => Ok("the volume is Cartesian already: its slices are only scaled"),
         Some(_) => Err("frames are polar"),

@@ -1,7 +1,7 @@
 //! Scan conversion of one polar frame into one slice, through the look-up table (thesis 4.3, Fig. 31).
 
 use crate::passes::chain::{slice_link, writes_volume};
-use crate::passes::slots::scan_index;
+use crate::passes::tables::scan_index;
 use crate::passes::*;
 use crate::source::StoredType;
 
@@ -11,7 +11,9 @@ pub const PASS: Pass = Pass {
     name: NAME,
     stage: Stage::Preprocess,
     when: When::Frame,
-    shader: |s| if writes_volume(s, NAME) { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" },
+    shader: |s, t| {
+        if writes_volume(s, NAME, t) { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" }
+    },
     needed: |s| match s.probe() {
         Some(_) => Ok("frames are polar"),
         None => Err("the volume is Cartesian already"),

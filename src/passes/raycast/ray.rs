@@ -1,6 +1,6 @@
 //! What both ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
-use crate::passes::slots::{LUT_ENTRIES, is_uneven, line_parameter, sweep_span};
+use crate::passes::tables::{LUT_ENTRIES, is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{Sampling, Scene};

@@ -9,11 +9,11 @@ pub const PASS: Pass = Pass {
     name: "raycast_surface",
     stage: Stage::Raycast,
     when: When::Picture,
-    shader: |s| ray::variant!(s, "raycast/surface"),
-    needed: |s| if s.is_surface() { Ok("mode is surface") } else { Err("mode is volume") },
+    shader: |s, _| ray::variant!(s, "raycast/surface"),
+    needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
     reads: |s, _| ray::reads(s),
     writes: |_, _| vec![whole("distance_map", Slot::Distance), whole("surface", Slot::Surface)],
-    extent: picture_extent,
+    extent: ray_extent,
     repeat: once,
     params: |s, _| {
         let surface = &s.settings.surface;
@@ -22,7 +22,7 @@ pub const PASS: Pass = Pass {
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
     },
-    constants: |s| {
+    constants: |s, _| {
         let mut constants = ray::constants(s);
         constants.push(("ROUGH", s.settings.surface.rough as i32));
         constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));

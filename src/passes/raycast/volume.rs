@@ -8,22 +8,22 @@ pub const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
     when: When::Picture,
-    shader: |s| ray::variant!(s, "raycast/volume"),
-    needed: |s| if s.is_surface() { Err("mode is surface") } else { Ok("mode is volume") },
+    shader: |s, _| ray::variant!(s, "raycast/volume"),
+    needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
         let mut reads = ray::reads(s);
         reads.push(whole("transfer", Slot::Transfer));
         reads
     },
-    writes: |_, _| vec![whole("picture", Slot::Picture)],
-    extent: picture_extent,
+    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    extent: ray_extent,
     repeat: once,
     params: |s, _| {
         ray::params(s)
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
     },
-    constants: |s| {
+    constants: |s, _| {
         let mut constants = ray::constants(s);
         constants.push(("EARLY_END", (s.settings.ray.early_end > 0.0) as i32));
         constants

@@ -9,21 +9,21 @@ pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |s| match (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s)) {
+    shader: |s, _| match (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s)) {
         (false, false) => "shade/light.plain",
         (true, false) => "shade/light.shadowed",
         (false, true) => "shade/light.occluded",
         (true, true) => "shade/light.shadowed_occluded",
     },
-    needed: |s| if s.is_surface() { Ok("a surface is lit") } else { Err("no surface in this mode") },
+    needed: |s| if s.has_distance() { Ok("a surface is lit") } else { Err("no surface in this mode") },
     reads: |s, _| {
         let mut reads = vec![whole("distance_map", distance_end(s)), whole("surface", Slot::Surface)];
         reads.extend(super::shadow::PASS.is_needed(s).then_some(whole("shadow", Slot::Shadow)));
         reads.extend(super::occlusion::PASS.is_needed(s).then_some(whole("occlusion", Slot::Occlusion)));
         reads
     },
-    writes: |_, _| vec![whole("picture", Slot::Picture)],
-    extent: picture_extent,
+    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    extent: ray_extent,
     repeat: once,
     params: |s, _| {
         let light = &s.settings.light;
@@ -40,7 +40,7 @@ pub const PASS: Pass = Pass {
             .vec3("wrap", wrap(s.skin()))
             .vec3("through", through(s.skin()))
     },
-    constants: |s| {
+    constants: |s, _| {
         let light = &s.settings.light;
         vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)]
     },

@@ -17,8 +17,8 @@ pub const PASS: Pass = Pass {
     name: "occlusion",
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |_| "shade/occlusion",
-    needed: |s| match (s.is_surface(), s.settings.light.occlusion) {
+    shader: |_, _| "shade/occlusion",
+    needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
         (false, _) => Err("no surface in this mode"),
         (true, None) => Err("not asked for"),
         (true, Some(occlusion)) if occlusion.strength == 0.0 => Err("a strength of 0 takes nothing"),
@@ -26,13 +26,13 @@ pub const PASS: Pass = Pass {
     },
     reads: |s, _| vec![whole("distance_map", distance_end(s))],
     writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
-    extent: picture_extent,
+    extent: ray_extent,
     repeat: once,
     params: |s, _| {
         let occlusion = s.settings.light.occlusion.unwrap_or_default();
         camera_params(s).f32("radius", occlusion.radius).f32("strength", occlusion.strength)
     },
-    constants: |_| vec![("SAMPLES", SAMPLES as i32)],
+    constants: |_, _| vec![("SAMPLES", SAMPLES as i32)],
     tolerance: Tolerance {
         absolute: 4e-3,
         relative: 0.0,

@@ -13,8 +13,8 @@ pub const PASS: Pass = Pass {
     name: "shadow",
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |_| "shade/shadow",
-    needed: |s| match (s.is_surface(), s.settings.light.shadow) {
+    shader: |_, _| "shade/shadow",
+    needed: |s| match (s.has_distance(), s.settings.light.shadow) {
         (false, _) => Err("no surface in this mode"),
         (true, None) => Err("not asked for"),
         (true, Some(shadow)) if shadow.strength == 0.0 => Err("a strength of 0 casts none"),
@@ -22,7 +22,7 @@ pub const PASS: Pass = Pass {
     },
     reads: |s, _| vec![whole("distance_map", distance_end(s))],
     writes: |_, _| vec![whole("shadow", Slot::Shadow)],
-    extent: picture_extent,
+    extent: ray_extent,
     repeat: once,
     params: |s, _| {
         let shadow = s.settings.light.shadow.unwrap_or_default();
@@ -34,7 +34,7 @@ pub const PASS: Pass = Pass {
             .f32("bias", shadow.bias)
             .f32("softness", shadow.softness)
     },
-    constants: |s| {
+    constants: |s, _| {
         let soft = s.settings.light.shadow.is_some_and(|s| s.softness > 0.0);
         vec![
             ("POINT", s.settings.light.position.is_some() as i32),

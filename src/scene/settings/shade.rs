@@ -1,6 +1,6 @@
 //! Settings of stage 3: filters of the distance map, lights, shadow, occlusion, skin. Lengths in mm.
 
-use super::settings::Sigma;
+use super::slices::Sigma;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,116 @@
+//! Settings of stage 2 by mode.
+
+use serde::{Deserialize, Serialize};
+
+/// Mode VR.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Volume {
+    /// Samples are stretched from this interval to 0..1 before anything else.
+    pub window: [f64; 2],
+    /// Nothing above this depth is drawn, mm below the probe's face (Cartesian: along the depth axis).
+    pub start_depth: Option<f64>,
+    pub transfer: Transfer,
+}
+
+impl Default for Volume {
+    fn default() -> Self {
+        Volume { window: [0.0, 1.0], start_depth: None, transfer: Transfer::Named(TransferName::Grey) }
+    }
+}
+
+/// A named transfer function, or its points.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "must be grey, sepia, skin, bone, or a list of points { at, colour, opacity }")]
+pub enum Transfer {
+    Named(TransferName),
+    Points(Vec<TransferPoint>),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TransferName {
+    Grey,
+    Sepia,
+    Skin,
+    Bone,
+}
+
+/// Colour and opacity at a sample value, linear in between. Opacity is that of one voxel (one slice pixel).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct TransferPoint {
+    pub at: f64,
+    pub colour: [f64; 3],
+    pub opacity: f64,
+}
+
+/// Mode SR: the surface detector (thesis 4-3).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Surface {
+    pub window: [f64; 2],
+    pub start_depth: Option<f64>,
+    /// The detector fires above this difference of the means of the newer and the older half of its ring.
+    pub threshold: f64,
+    /// The rough detector's own threshold. Absent: the fine one's.
+    pub rough_threshold: Option<f64>,
+    /// Steps of the rough detector in fine steps, 1..=8; 1 is no rough detector.
+    pub rough: u32,
+    pub sign: Sign,
+    pub place: Place,
+    /// Which surface of the ray, 1..=8: 1 is the outermost, 2 the next behind it.
+    pub number: u32,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        Surface {
+            window: [0.0, 1.0],
+            start_depth: None,
+            threshold: 0.1,
+            rough_threshold: None,
+            rough: 2,
+            sign: Sign::Bright,
+            place: Place::Peak,
+            number: 1,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sign {
+    /// Bright tissue in dark fluid.
+    #[default]
+    Bright,
+    /// A dark cavity in bright tissue.
+    Dark,
+}
+
+/// Where on the edge the surface is put.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Place {
+    /// Where the difference is largest within a ring's length, refined by a parabola: does not depend on the edge's height.
+    #[default]
+    Peak,
+    /// Where the difference first exceeds the threshold: the thesis' own.
+    FirstCrossing,
+}
+
+/// Modes MIP, MinIP and mean.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Projection {
+    /// Samples are stretched from this interval to 0..1 before anything else.
+    pub window: [f64; 2],
+    /// Nothing above this depth is drawn, mm below the probe's face.
+    pub start_depth: Option<f64>,
+}
+
+impl Default for Projection {
+    fn default() -> Self {
+        Projection { window: [0.0, 1.0], start_depth: None }
+    }
+}

@@ -1,0 +1,45 @@
+//! Settings of stage 4.
+
+use super::slices::{EnhancedSigma, Sigma};
+use serde::{Deserialize, Serialize};
+
+/// Stage 4.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Post {
+    pub sigma: Option<Sigma>,
+    pub enhanced_sigma: Option<EnhancedSigma>,
+    /// Added, -1..1.
+    pub brightness: f64,
+    /// Multiplied about the middle grey, 0..10.
+    pub contrast: f64,
+    /// The exponent is 1 / gamma; above 1 lifts the dark parts. 0.1..10.
+    pub gamma: f64,
+    pub colour_map: ColourMap,
+}
+
+impl Default for Post {
+    fn default() -> Self {
+        Post {
+            sigma: None,
+            enhanced_sigma: None,
+            brightness: 0.0,
+            contrast: 1.0,
+            gamma: 1.0,
+            colour_map: ColourMap::None,
+        }
+    }
+}
+
+/// Recolours the picture's brightness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColourMap {
+    /// Colours stay.
+    #[default]
+    None,
+    Grey,
+    Sepia,
+    Skin,
+    Ice,
+}

@@ -1,0 +1,55 @@
+//! Settings of stage 2 that every mode shares: the camera and its rays.
+
+use serde::{Deserialize, Serialize};
+
+/// Where the picture is taken from. All zero looks from the probe into the body, lateral to the right.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Camera {
+    /// Turns the view towards +lateral, deg.
+    pub azimuth: f64,
+    /// Turns the view towards +elevation, deg.
+    pub elevation: f64,
+    /// Turns the picture clockwise, deg.
+    pub roll: f64,
+    /// 1 fits the region into the picture; larger is closer.
+    pub zoom: f64,
+    /// Vertical field of view, deg; 0 is parallel projection.
+    pub field_of_view: f64,
+    /// Looked at: lateral, depth, elevation in mm as in [`Region`]. Absent: the middle of the region.
+    pub target: Option<[f64; 3]>,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Camera { azimuth: 0.0, elevation: 0.0, roll: 0.0, zoom: 1.0, field_of_view: 0.0, target: None }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ray {
+    /// Distance between samples, mm. Absent: one slice pixel.
+    pub step: Option<f64>,
+    /// A ray of VR ends when less than this share of light is left; 0 never ends early. The error is at most this.
+    pub early_end: f64,
+    pub sampling: Sampling,
+    /// Rays for each pixel along each edge, 1..=4: the picture is rendered larger and averaged.
+    pub rays: u32,
+}
+
+impl Default for Ray {
+    fn default() -> Self {
+        Ray { step: None, early_end: 1.0 / 512.0, sampling: Sampling::Hardware, rays: 1 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sampling {
+    /// The device's own trilinear filter; its weights may have no more than 8 bits.
+    #[default]
+    Hardware,
+    /// Eight fetches and our own interpolation in f32.
+    Exact,
+}
