@@ -14,7 +14,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 fn main() -> Result<(), String> {
-    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // Another checkout may be named.
+    let top = std::env::args().nth(1).map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."), Into::into);
     let (glsl, spirv) = (top.join("glsl"), top.join("spirv"));
     let known = read_hashes(&spirv.join("SOURCES"));
 
