@@ -198,8 +198,11 @@ impl Step {
 /// Whether a slot that the CPU makes from the scene has other content now.
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Filled::ByScene(make) = slot.filled() else { return false };
-    if slot == Slot::Transfer {
-        return make(old) != make(new);
+    match slot {
+        Slot::Transfer => return make(old) != make(new),
+        // Follows from the other, which is shorter.
+        Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
+        _ => {}
     }
     // The rest follow from the geometry, and their content is too long to compare.
     (&old.geometry, old.grid, old.apron) != (&new.geometry, new.grid, new.apron)

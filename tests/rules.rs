@@ -133,13 +133,21 @@ fn scenes() -> Vec<Scene> {
         "slices = { median = true }",
         "slices = { sigma = {} }",
         "slices = { smooth = { lateral = 1.0 } }",
+        "ray = { rays = 2 }",
     ];
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let mut scenes = Vec::new();
     for geometry in &geometries {
         for filters in filters {
-            for mode in ["vr", "sr"] {
-                let settings = toml::from_str(&format!("mode = '{mode}'\n{filters}")).expect("settings");
+            for mode in [
+                "'vr'",
+                "'sr'",
+                "'mip'",
+                "'mixed'",
+                "'vr'\nvolume = { shading = 'first-hit' }",
+                "'vr'\nlayout = 'four'",
+            ] {
+                let settings = toml::from_str(&format!("mode = {mode}\n{filters}")).expect("settings");
                 scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
             }
         }

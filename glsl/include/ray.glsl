@@ -7,6 +7,9 @@
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved
 layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches
+layout(constant_id = 20) const int CLIPS = 0;   // planes that cut
+layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the samples of a convex sweep do
+layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 uniform sampler3D volume;
 #ifdef SWEPT
@@ -24,10 +27,51 @@ struct Ray {
     vec3 direction;
     float enter;
     float leave;
+    // Steps that grow: the n-th is `first` exp(n `growth`) mm long.
+    float first;
+    float growth;
 };
 
-// The ray of a pixel and where it lies in the box; leave < enter is a miss. A ray parallel to a face divides by zero: the
-// infinities are ordered rightly by min and max, and the 0/0 of a ray within the face's plane is avoided by the nudge.
+// (e^x - 1) / x without losing a small x.
+float growth_over(float x) {
+    float series = 1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * (1.0 + x / 7.0)))));
+    return abs(x) < 0.5 ? series : (exp(x) - 1.0) / x;
+}
+
+// ln(1 + x) / x, likewise.
+float decline_over(float x) {
+    float series = 1.0 - x * (1.0 / 2.0 - x * (1.0 / 3.0 - x * (1.0 / 4.0 - x * (1.0 / 5.0 - x * (1.0 / 6.0 - x / 7.0)))));
+    return abs(x) < 0.1 ? series : log(1.0 + x) / x;
+}
+
+// How much longer than `step_length` a step is at a place: in proportion to the range from the array's apex, at most 8.
+float widening(vec3 p) {
+    float x = p.x, y = p.y;
+    if (SWEEP == 1) {
+        float beyond = p.y - axis_depth;
+        y = sqrt(beyond * beyond + p.z * p.z) + axis_depth;
+    }
+    return 1.0 + spread * (clamp(sqrt(x * x + y * y) / spread_range, 1.0, 8.0) - 1.0);
+}
+
+// mm behind the ray's entry after n steps.
+float offset_of(Ray ray, float n) {
+    return SPREAD == 0 ? n * step_length : ray.first * n * growth_over(n * ray.growth) / growth_over(ray.growth);
+}
+
+// Length of the step that begins after n steps, mm.
+float length_of(Ray ray, float n) { return SPREAD == 0 ? step_length : ray.first * exp(n * ray.growth); }
+
+// Steps to an offset: the inverse of `offset_of`.
+float steps_to(Ray ray, float offset) {
+    if (SPREAD == 0) return offset / step_length;
+    float n = offset * growth_over(ray.growth) / ray.first;
+    return n * decline_over(max(n * ray.growth, -0.999999));
+}
+
+// The ray of a pixel and where it lies in the box, on the near side of every clip plane; leave < enter is a miss. A ray
+// parallel to a face divides by zero: the infinities are ordered rightly by min and max, and the 0/0 of a ray within the
+// face's plane is avoided by the nudge.
 Ray ray_of(ivec2 pixel) {
     vec2 at = vec2(pixel) + 0.5;
     Ray ray;
@@ -39,6 +83,24 @@ Ray ray_of(ivec2 pixel) {
     vec3 near = min(a, b), far = max(a, b);
     ray.enter = max(max(near.x, near.y), max(near.z, 0.0));
     ray.leave = min(far.x, min(far.y, far.z));
+    for (int i = 0; i < CLIPS; ++i) {
+        vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
+        float towards = dot(plane.xyz, ray.direction);
+        float room = plane.w - dot(plane.xyz, ray.origin);
+        // Parallel to the plane: all of the ray is kept, or none.
+        if (abs(towards) < 1e-12) ray.leave = room < 0.0 ? -1.0 : ray.leave;
+        else if (towards > 0.0) ray.leave = min(ray.leave, room / towards);
+        else ray.enter = max(ray.enter, room / towards);
+    }
+    ray.first = step_length;
+    ray.growth = 0.0;
+    if (SPREAD == 1 && ray.leave > ray.enter) {
+        // Linear between the ray's ends, so that the place of step n has a closed form.
+        float low = widening(ray.origin + ray.direction * ray.enter);
+        float high = widening(ray.origin + ray.direction * ray.leave);
+        ray.growth = step_length * (high - low) / (ray.leave - ray.enter);
+        ray.first = step_length * low * growth_over(ray.growth);
+    }
     return ray;
 }
 
@@ -100,9 +162,8 @@ bool locate(vec3 p, out vec3 texel) {
 
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 
-// The volume at texture indices, windowed to 0..1; beyond the border the nearest texel.
-float sample_volume(vec3 texel) {
-    float value;
+// The volume at texture indices; beyond the border the nearest texel.
+float raw_volume(vec3 texel) {
     ivec3 size = textureSize(volume, 0);
     if (SAMPLING == 1) {
         vec3 at = clamp(texel, vec3(0.0), vec3(size - 1));
@@ -112,9 +173,10 @@ float sample_volume(vec3 texel) {
         vec4 far = vec4(fetch(ivec3(low.xy, high.z)), fetch(ivec3(high.x, low.y, high.z)), fetch(ivec3(low.x, high.yz)), fetch(high));
         vec4 plane = mix(near, far, w.z);
         vec2 row = mix(plane.xz, plane.yw, w.x);
-        value = mix(row.x, row.y, w.y);
-    } else {
-        value = textureLod(volume, (texel + 0.5) / vec3(size), 0.0).x;
+        return mix(row.x, row.y, w.y);
     }
-    return clamp((value - window_low) * window_scale, 0.0, 1.0);
+    return textureLod(volume, (texel + 0.5) / vec3(size), 0.0).x;
 }
+
+float windowed(float value) { return clamp((value - window_low) * window_scale, 0.0, 1.0); }
+float sample_volume(vec3 texel) { return windowed(raw_volume(texel)); }

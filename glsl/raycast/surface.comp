@@ -15,6 +15,7 @@ layout(scalar) uniform Params {
     float polarity; // +1 bright tissue in dark fluid, -1 a dark cavity
 };
 #include "ray.glsl"
+#include "sliding.glsl"
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
@@ -25,10 +26,10 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
-    int count = ray.leave > ray.enter ? int((ray.leave - ray.enter) / step_length) : 0;
+    int count = ray.leave > ray.enter ? int(steps_to(ray, ray.leave - ray.enter)) : 0;
     // The region bounds where surfaces lie, not what the detector may look at: its ring is filled before the region begins,
     // and an edge that rises inside may peak behind it. Nothing lies behind the camera.
-    int first = max(-RING / 2 * ROUGH, int(ceil(-ray.enter / step_length - 0.5)));
+    int first = max(-RING / 2 * ROUGH, int(ceil(steps_to(ray, -ray.enter) - 0.5)));
     int end = count > 0 ? count + RING / 2 * ROUGH + RING : first;
 
     const int start = ROUGH > 1 ? SEARCH_ROUGH : SEARCH_FINE;
@@ -47,8 +48,9 @@ void main() {
     float best = 0.0, before = 0.0, after = 0.0, echo = 0.0;
     int best_at = 0;
 
+    Slices slices = no_slices();
     for (int i = first; i < end;) {
-        vec3 p = ray.origin + ray.direction * (ray.enter + (float(i) + 0.5) * step_length);
+        vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT));
         vec3 texel;
         if (!locate(p, texel)) {
             if (state == FOLLOW) break;
@@ -62,7 +64,7 @@ void main() {
             continue;
         }
         older = vec4(older.yzw, newer.x);
-        newer = vec4(newer.yzw, sample_volume(texel));
+        newer = vec4(newer.yzw, sample_along(ray, i, SAMPLE_AT, texel, slices));
         ++filled;
         float difference = polarity * dot(newer - older, vec4(0.25));
         bool ready = filled >= RING;
@@ -133,7 +135,7 @@ void main() {
             float shift = bend < 0.0 ? clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
             place += shift - 0.5 * float(RING - 1);
         }
-        float at = (place + 0.5) * step_length;
+        float at = offset_of(ray, place + SAMPLE_AT);
         found = at >= 0.0 && at <= ray.leave - ray.enter;
         if (found) {
             distance = ray.enter + at;

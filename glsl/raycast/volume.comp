@@ -1,16 +1,34 @@
-// VR: emission and absorption, front to back (thesis 4-1, 4-2).
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+// VR: emission and absorption, front to back (thesis 4-1, 4-2). Variants add to those of the sweep:
+//   VEIL  the ray ends at the surface, and what lies before it is a veil over it
+//   HIT   the place where the ray becomes opaque enough is stored, to be lit
+// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED; veil_plain VEIL; veil_even VEIL SWEPT; veil_moved VEIL SWEPT MOVED; veil_uneven VEIL SWEPT UNEVEN; veil_uneven_moved VEIL SWEPT UNEVEN MOVED; hit_plain HIT; hit_even HIT SWEPT; hit_moved HIT SWEPT MOVED; hit_uneven HIT SWEPT UNEVEN; hit_uneven_moved HIT SWEPT UNEVEN MOVED
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EARLY_END = 1;
+layout(constant_id = 4) const int COMPOSITING = 1; // 0 a = y, 1 a = 1 - exp(-y), 2 the same between two samples
+layout(constant_id = 5) const int DEPTH_CODED = 0; // 1: colours go from near to far tint
+layout(constant_id = 6) const int ENTRIES = 256;   // of the transfer table, along each side
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
     float absorption_scale; // step over the length that opacities are given for
     float opaque_enough;    // a ray ends at this opacity
+    float hit_opacity;      // and is taken to hit something at this one
+    vec3 near_tint;
+    vec3 far_tint;
+    vec3 depth_axis; // depth along the view: dot(place, axis) - depth_near is 0 at the nearest, 1 at the farthest
+    float depth_near;
 };
 #include "ray.glsl"
+#include "sliding.glsl"
+// Colour and absorption at a sample value; pre-integrated: their mean between two values, a row for each front value.
 readonly buffer TransferTable { vec4 entry[]; } transfer;
 uniform writeonly image2D picture;
+#ifdef VEIL
+uniform texture2D distance_map;
+#endif
+#ifdef HIT
+uniform writeonly image2D distance_map;
+#endif
 
 // 1 - exp(-y) without losing a small y: seven terms of the Taylor series below one half.
 float opacity_of(float y) {
@@ -18,29 +36,82 @@ float opacity_of(float y) {
     return y < 0.5 ? series : 1.0 - exp(-y);
 }
 
+vec4 looked_up(float value) {
+    float e = value * float(ENTRIES - 1);
+    int n = min(int(e), ENTRIES - 2);
+    return mix(transfer.entry[n], transfer.entry[n + 1], e - float(n));
+}
+
+vec4 looked_up_between(float front, float back) {
+    vec2 e = vec2(front, back) * float(ENTRIES - 1);
+    ivec2 n = min(ivec2(e), ivec2(ENTRIES - 2));
+    vec2 share = e - vec2(n);
+    int row = n.x * ENTRIES + n.y;
+    vec4 here = mix(transfer.entry[row], transfer.entry[row + 1], share.y);
+    vec4 next = mix(transfer.entry[row + ENTRIES], transfer.entry[row + ENTRIES + 1], share.y);
+    return mix(here, next, share.x);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     Ray ray = ray_of(pixel);
+#ifdef VEIL
+    ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
+#endif
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);
     float opacity = 0.0;
+    float hit = MISS;
     if (path > 0.0) {
-        int whole = int(path / step_length);
-        for (int i = 0; i <= whole; ++i) {
-            // Midpoints of the steps; the last step is as long as what is left.
-            float length = min(step_length, path - float(i) * step_length);
-            vec3 p = ray.origin + ray.direction * (ray.enter + float(i) * step_length + 0.5 * length);
+        Slices slices = no_slices();
+        const float sample_at = COMPOSITING == 2 ? 0.0 : SAMPLE_AT;
+        float front = 0.0;
+        bool front_inside = false;
+        if (COMPOSITING == 2) {
             vec3 texel;
-            if (length <= 0.0 || !locate(p, texel)) continue;
-            float e = sample_volume(texel) * float(transfer.entry.length() - 1);
-            int n = min(int(e), transfer.entry.length() - 2);
-            vec4 entry = mix(transfer.entry[n], transfer.entry[n + 1], e - float(n));
-            float a = opacity_of(entry.a * absorption_scale * (length / step_length));
+            front_inside = locate(ray.origin + ray.direction * ray.enter, texel);
+            if (front_inside) front = sample_along(ray, 0, sample_at, texel, slices);
+        }
+        // One more than there are, where their number comes from a logarithm.
+        int whole = int(steps_to(ray, path)) + SPREAD;
+        for (int i = 0; i <= whole; ++i) {
+            // Midpoints of the steps, or their ends; the last step is as long as what is left.
+            float from = offset_of(ray, float(i));
+            float length = min(length_of(ray, float(i)), path - from);
+            vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
+            vec3 texel;
+            if (length <= 0.0) continue;
+            bool inside = locate(p, texel);
+            vec4 entry;
+            if (COMPOSITING == 2) {
+                float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
+                bool both = inside && front_inside;
+                entry = looked_up_between(front, back);
+                front = back;
+                front_inside = inside;
+                if (!both) continue;
+            } else {
+                if (!inside) continue;
+                entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
+            }
+            float y = entry.a * absorption_scale * (length / step_length);
+            float a = COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+            if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
+            float before = opacity;
             colour += (1.0 - opacity) * a * entry.rgb;
             opacity += (1.0 - opacity) * a;
+#ifdef HIT
+            // Between two samples in proportion, so that the surface has no terraces.
+            if (hit == MISS && opacity >= hit_opacity) {
+                hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
+            }
+#endif
             if (EARLY_END == 1 && opacity >= opaque_enough) break;
         }
     }
     imageStore(picture, pixel, vec4(colour, opacity));
+#ifdef HIT
+    imageStore(distance_map, pixel, vec4(hit, 0.0, 0.0, 0.0));
+#endif
 }

@@ -1,5 +1,6 @@
 // Normals from the distance map, and Blinn-Phong (thesis 4-4..4-7); shadow and occlusion where the scene has them; skin.
-// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED
+// Variants by what is lit: a surface; VEILED, a surface behind a composited volume; COMPOSITED, the volume itself.
+// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED; veiled_plain VEILED; veiled_shadowed VEILED SHADOWED; veiled_occluded VEILED OCCLUDED; veiled_shadowed_occluded VEILED SHADOWED OCCLUDED; composited_plain COMPOSITED; composited_shadowed COMPOSITED SHADOWED; composited_occluded COMPOSITED OCCLUDED; composited_shadowed_occluded COMPOSITED SHADOWED OCCLUDED
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int POINT = 0; // 0: the light is far away, 1: it is at a place
@@ -17,9 +18,15 @@ layout(scalar) uniform Params {
     float shadow_strength;
     vec3 wrap;          // a channel
     vec3 through;       // colour of light through thin tissue, times translucency
+    float veil_share;   // of the composited volume over a surface
 };
 #include "distance_map.glsl"
+#ifndef COMPOSITED
 uniform texture2D surface; // echo, found, mean echo behind
+#endif
+#if defined(VEILED) || defined(COMPOSITED)
+uniform texture2D veil; // colours times opacity, opacity
+#endif
 #ifdef SHADOWED
 uniform texture2D shadow; // light that arrives, 0..1
 #endif
@@ -32,8 +39,15 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     float distance = distance_at(pixel);
+    vec4 before = vec4(0.0);
+#ifdef VEILED
+    before = veil_share * texelFetch(veil, pixel, 0);
+#endif
+#ifdef COMPOSITED
+    before = texelFetch(veil, pixel, 0);
+#endif
     if (!is_hit(distance)) {
-        imageStore(picture, pixel, vec4(0.0));
+        imageStore(picture, pixel, before);
         return;
     }
     vec3 along_ray = ray_direction(vec2(pixel) + 0.5);
@@ -53,8 +67,13 @@ void main() {
     float gloss = half_length > 1e-6 ? clamp(dot(normal, halfway) / half_length, 0.0, 1.0) : 0.0;
     // pow(0, 0) is undefined: a gloss of 0 shines nowhere unless the exponent is 0, when it shines evenly.
     float shine = shininess == 0.0 ? 1.0 : (gloss > 0.0 ? min(pow(gloss, shininess), 1.0) : 0.0);
+#ifdef COMPOSITED
+    const vec4 echo = vec4(1.0, 1.0, 1.0, 0.0); // nothing is known to be thin
+    const vec3 colour = vec3(1.0);
+#else
     vec4 echo = texelFetch(surface, pixel, 0);
     vec3 colour = surface_colour * mix(1.0, echo.x, texture_share * echo.y);
+#endif
 
     float lit = 1.0, open = 1.0;
 #ifdef SHADOWED
@@ -74,6 +93,11 @@ void main() {
         glow = through * thin * (0.35 + 0.65 * max(-cosine, 0.0));
     }
     vec3 sum = colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3)) + glow * open;
-    sum += vec3(specular * shine * lit * (facing > 0.0 ? 1.0 : 0.0));
-    imageStore(picture, pixel, vec4(light_colour * sum, 1.0));
+    vec3 highlight = vec3(specular * shine * lit * (facing > 0.0 ? 1.0 : 0.0));
+#ifdef COMPOSITED
+    // The less opaque, the less there is to be lit.
+    imageStore(picture, pixel, vec4(before.rgb * mix(vec3(1.0), light_colour * sum, before.a) + before.a * light_colour * highlight, before.a));
+#else
+    imageStore(picture, pixel, vec4(before.rgb + (1.0 - before.a) * light_colour * (sum + highlight), 1.0));
+#endif
 }

@@ -25,6 +25,8 @@ pub enum Slot {
     LineLut,
     SliceTable,
     Transfer,
+    /// The transfer function between every two sample values.
+    PreIntegrated,
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance,
     DistanceA,
@@ -35,6 +37,8 @@ pub enum Slot {
     Shadow,
     /// Ambient light that arrives, 0..1.
     Occlusion,
+    /// The composited volume, where stage 3 lights it or lays it over a surface.
+    Veil,
     /// What stages 2 and 3 rendered, where it becomes the picture only by averaging or beside planes.
     Rendered,
     /// The planes of a 4-up picture; black where the rendering goes.
@@ -120,7 +124,7 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 22] = [
+    pub const ALL: [Slot; 24] = [
         Slot::Frames,
         Slot::ScanLut,
         Slot::SliceA,
@@ -131,12 +135,14 @@ impl Slot {
         Slot::LineLut,
         Slot::SliceTable,
         Slot::Transfer,
+        Slot::PreIntegrated,
         Slot::Distance,
         Slot::DistanceA,
         Slot::DistanceB,
         Slot::Surface,
         Slot::Shadow,
         Slot::Occlusion,
+        Slot::Veil,
         Slot::Rendered,
         Slot::Planes,
         Slot::Picture,
@@ -158,12 +164,14 @@ impl Slot {
             Slot::LineLut => "line_lut",
             Slot::SliceTable => "slice_table",
             Slot::Transfer => "transfer",
+            Slot::PreIntegrated => "pre_integrated",
             Slot::Distance => "distance_map",
             Slot::DistanceA => "distance_a",
             Slot::DistanceB => "distance_b",
             Slot::Surface => "surface",
             Slot::Shadow => "shadow",
             Slot::Occlusion => "occlusion",
+            Slot::Veil => "veil",
             Slot::Rendered => "rendered",
             Slot::Planes => "planes",
             Slot::Picture => "picture",
@@ -182,8 +190,9 @@ impl Slot {
             Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * LUT_ENTRIES as u32),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
+            Slot::PreIntegrated => Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),
             Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
-            Slot::Shadow | Slot::Occlusion | Slot::Rendered => Shape::Two(scene.ray_size()),
+            Slot::Shadow | Slot::Occlusion | Slot::Veil | Slot::Rendered => Shape::Two(scene.ray_size()),
             Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
                 Shape::Two(scene.picture_size())
             }
@@ -205,12 +214,12 @@ impl Slot {
                 VolumeFormat::R16f => Format::R16f,
                 VolumeFormat::R32f => Format::R32f,
             },
-            Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer => Format::Floats,
+            Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => Format::Floats,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
             Slot::Shadow | Slot::Occlusion => Format::R16f,
-            Slot::Rendered | Slot::Planes => Format::Rgba16f,
+            Slot::Veil | Slot::Rendered | Slot::Planes => Format::Rgba16f,
             Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB => Format::Rgba16f,
             Slot::Screen => Format::Rgba8,
         }
@@ -224,6 +233,7 @@ impl Slot {
             Slot::LineLut => Filled::ByScene(tables::line_lut),
             Slot::SliceTable => Filled::ByScene(tables::slice_table),
             Slot::Transfer => Filled::ByScene(tables::transfer_table),
+            Slot::PreIntegrated => Filled::ByScene(tables::pre_integrated_table),
             _ => Filled::ByPasses,
         }
     }

@@ -120,5 +120,14 @@ pub fn is_uneven(geometry: &Geometry) -> bool {
 
 /// Red, green, blue and absorption over the sample value.
 pub fn transfer_table(scene: &Scene) -> Vec<f32> {
-    floats(transfer::table(&scene.settings.volume.transfer).iter().flatten().copied())
+    floats(transfer_of(scene).into_iter().flatten())
+}
+
+/// The same between every two sample values.
+pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
+    floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
+}
+
+fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
+    transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold)
 }

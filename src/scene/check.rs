@@ -1,6 +1,7 @@
 //! What no scene may ask for, told by name and limit.
 
-use super::{Layout, Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use super::{Clip, Layout, Light, MAX_CLIPS, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use glam::DVec3;
 
 /// Everything that can be told without a geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
@@ -8,6 +9,11 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
         return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
     }
+    within("ray.spread", settings.ray.spread, 0.0, 1.0)?;
+    if !matches!(settings.ray.sliding, 0 | 3 | 5) {
+        return refuse("ray.sliding", format!("is {}, must be 0 (none), 3 or 5", settings.ray.sliding));
+    }
+    check_clip(&settings.clip)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
@@ -68,6 +74,13 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
         return refuse("volume.transfer", fault);
     }
+    let v = &settings.volume;
+    within("volume.threshold", v.threshold, 0.0, 1.0)?;
+    within("volume.hit", v.hit, 1e-3, 1.0)?;
+    within("volume.veil", v.veil, 0.0, 1.0)?;
+    for tint in [v.near_tint, v.far_tint] {
+        tint.iter().try_for_each(|c| within("volume.near_tint, volume.far_tint", *c, 0.0, 10.0))?;
+    }
     let f = &settings.surface;
     within("surface.threshold", f.threshold, 1e-6, 1.0)?;
     within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
@@ -84,6 +97,22 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
     within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
     within("post.gamma", settings.post.gamma, 0.1, 10.0)
+}
+
+fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
+    if planes.len() > MAX_CLIPS {
+        return refuse("clip", format!("has {} planes, at most {MAX_CLIPS}", planes.len()));
+    }
+    for plane in planes {
+        for value in plane.at {
+            within("clip.at", value, -1e6, 1e6)?;
+        }
+        let normal = DVec3::from(plane.normal);
+        if !normal.is_finite() || normal.length() < 1e-9 {
+            return refuse("clip.normal", "must be finite and not zero");
+        }
+    }
+    Ok(())
 }
 
 fn check_light(l: &Light) -> Result<(), SceneError> {

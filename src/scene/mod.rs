@@ -10,7 +10,7 @@ pub mod transfer;
 pub use camera::Rays;
 pub use settings::*;
 
-use crate::probe::{Geometry, Motion, Probe};
+use crate::probe::{Array, Geometry, Motion, Probe};
 use crate::source::StoredType;
 use glam::DVec3;
 
@@ -22,6 +22,9 @@ pub const RING: u32 = 8;
 pub const MAX_DEVIATION: f64 = 32.0;
 /// Widest window of a filter, pixels.
 pub const MAX_WINDOW: u32 = 63;
+
+/// Most planes that cut a scene.
+pub const MAX_CLIPS: usize = 4;
 
 /// How the arriving samples are stored and what they mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,7 +158,27 @@ impl Scene {
 
     /// Whether stage 3 has a distance map to light.
     pub fn has_distance(&self) -> bool {
-        self.detects_surface()
+        self.detects_surface() || self.lights_volume()
+    }
+
+    /// Whether the place where each ray of a volume becomes opaque is lit.
+    pub fn lights_volume(&self) -> bool {
+        self.settings.mode == Mode::Volume && self.settings.volume.shading == Shading::FirstHit
+    }
+
+    /// Whether steps along a ray grow with the range.
+    pub fn spreads(&self) -> bool {
+        let curved = self.probe().is_some_and(|p| matches!(p.array, Array::Curved { .. }));
+        curved && self.settings.ray.spread > 0.0
+    }
+
+    /// Clip planes in space: what lies beyond is cut away, dot(n, p) > w for (n, w).
+    pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let offset = depth_offset(&self.geometry);
+        self.settings.clip.iter().map(move |c| {
+            let normal = DVec3::from(c.normal).normalize();
+            (normal, normal.dot(DVec3::from(c.at) + DVec3::Y * offset))
+        })
     }
 
     /// Whether samples are composited through the transfer function.

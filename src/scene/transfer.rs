@@ -19,18 +19,54 @@ pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
 }
 
-/// Red, green, blue and absorption at `ENTRIES` even sample values from 0 to 1.
-pub fn table(transfer: &Transfer) -> Vec<[f64; 4]> {
+/// Red, green, blue and absorption at `ENTRIES` even sample values from 0 to 1. Below `threshold` nothing is absorbed.
+pub fn table(transfer: &Transfer, threshold: f64) -> Vec<[f64; 4]> {
     let points = match transfer {
         Transfer::Named(name) => named(*name),
         Transfer::Points(points) => points.clone(),
     };
     (0..ENTRIES)
         .map(|i| {
-            let [r, g, b, a] = at(&points, i as f64 / (ENTRIES - 1) as f64);
-            [r, g, b, absorption(a)]
+            let value = i as f64 / (ENTRIES - 1) as f64;
+            let [r, g, b, a] = at(&points, value);
+            [r, g, b, if value < threshold { 0.0 } else { absorption(a) }]
         })
         .collect()
+}
+
+/// Mean absorption, and mean colour weighted by it, over the sample values between entries `front` and `back` of a table whose
+/// entries are joined by straight lines: what a step sees along which the value goes evenly from one to the other. Row
+/// `front`, column `back`.
+pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
+    // Integrals from entry 0: absorption, and colour times absorption. The product of two straight lines is a parabola.
+    let mut integrals = vec![[0.0; 4]];
+    for pair in table.windows(2) {
+        let [low, high] = [pair[0], pair[1]];
+        let last = integrals[integrals.len() - 1];
+        let colour = |c: usize| {
+            let (l, h) = (low[c], high[c]);
+            (2.0 * l * low[3] + l * high[3] + h * low[3] + 2.0 * h * high[3]) / 6.0
+        };
+        integrals.push(std::array::from_fn(|c| last[c] + if c < 3 { colour(c) } else { (low[3] + high[3]) / 2.0 }));
+    }
+    let between = |front: usize, back: usize| {
+        let (low, high) = (front.min(back), front.max(back));
+        let absorbed = integrals[high][3] - integrals[low][3];
+        // Nothing absorbed has the colour of what lies in the middle; it is not seen.
+        if low == high || absorbed <= 0.0 {
+            let middle = table[(low + high) / 2];
+            return [
+                middle[0],
+                middle[1],
+                middle[2],
+                absorbed / (high - low).max(1) as f64 + if low == high { middle[3] } else { 0.0 },
+            ];
+        }
+        let colour = |c: usize| (integrals[high][c] - integrals[low][c]) / absorbed;
+        [colour(0), colour(1), colour(2), absorbed / (high - low) as f64]
+    };
+    let n = table.len();
+    (0..n * n).map(|i| between(i / n, i % n)).collect()
 }
 
 /// Why these points are no transfer function.
@@ -84,6 +120,18 @@ fn named(name: TransferName) -> Vec<TransferPoint> {
             (0.5, [0.85, 0.55, 0.42], 0.06),
             (1.0, [1.0, 0.9, 0.82], 0.35),
         ]),
+        TransferName::Cool => points(&[
+            (0.0, [0.0, 0.02, 0.08], 0.0),
+            (0.15, [0.05, 0.18, 0.4], 0.0),
+            (0.5, [0.3, 0.6, 0.85], 0.06),
+            (1.0, [0.95, 1.0, 1.0], 0.3),
+        ]),
+        TransferName::Warm => points(&[
+            (0.0, [0.08, 0.0, 0.0], 0.0),
+            (0.15, [0.4, 0.08, 0.03], 0.0),
+            (0.5, [0.9, 0.45, 0.12], 0.06),
+            (1.0, [1.0, 0.97, 0.7], 0.3),
+        ]),
         TransferName::Bone => points(&[
             (0.0, [0.0, 0.0, 0.0], 0.0),
             (0.25, [0.25, 0.12, 0.08], 0.0),
@@ -123,7 +171,7 @@ mod tests {
         let transfer =
             Transfer::Points(points(&[(0.2, [0.0, 0.0, 0.0], 0.0), (0.6, [1.0, 0.5, 0.0], 0.5), (0.7, [0.0; 3], 1.0)]));
         assert_eq!(fault(&transfer), None);
-        let table = table(&transfer);
+        let table = table(&transfer, 0.0);
         assert_eq!(table[0], [0.0, 0.0, 0.0, 0.0]);
         assert!((table[102][0] - 0.5).abs() < 1e-9, "{:?}", table[102]);
         assert_eq!(table[255], [0.0, 0.0, 0.0, OPAQUE]);

@@ -32,8 +32,12 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
 fn scenes() -> Vec<(String, Scene)> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
-        for mode in ["sr", "vr"] {
-            let scene = scene(geometry.clone(), input, &format!("mode = '{mode}'\n{toml}"));
+        if toml.starts_with("mode") {
+            scenes.push((name.to_string(), scene(geometry.clone(), input, toml)));
+            return;
+        }
+        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }"] {
+            let scene = scene(geometry.clone(), input, &format!("mode = {mode}\n{toml}"));
             scenes.push((format!("{name}, {mode}"), scene));
         }
     };
@@ -108,13 +112,41 @@ fn scenes() -> Vec<(String, Scene)> {
             "both sigmas",
             "post = { sigma = { window = 3, sigma = 0.1 }, enhanced_sigma = { window = 5, largest = 5, sigma = inf } }\nslices = { pixels = 12 }",
         ),
+        ("smallest", "mode = 'minip'\nslices = { pixels = 30 }"),
+        ("mean", "mode = 'mean'\nslices = { pixels = 30 }"),
+        (
+            "clipped, lit volume",
+            "mode = 'vr'\nvolume = { shading = 'first-hit', hit = 0.1 }\nlight = { shadow = {}, occlusion = {} }\nslices = { pixels = 30 }
+             clip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }, { at = [5, 0, 0], normal = [1, 0, 0] }]",
+        ),
+        ("clipped surface", "slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]"),
+        ("veil over a surface", "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { occlusion = {} }\nslices = { pixels = 30 }"),
+        ("veil and shadow", "mode = 'mixed'\nlight = { shadow = {} }\nslices = { pixels = 30 }"),
+        ("lit volume, shadow", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {}, skin = {} }\nslices = { pixels = 12 }"),
+        ("lit volume, occlusion", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { occlusion = {} }\nslices = { pixels = 12 }"),
+        ("depth-coded", "mode = 'vr'\nvolume = { shading = 'depth-coded', transfer = 'warm' }\nslices = { pixels = 30 }"),
+        ("Riemann", "mode = 'vr'\nvolume = { compositing = 'riemann', transfer = 'cool' }\nslices = { pixels = 30 }"),
+        ("pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', threshold = 0.5 }\nslices = { pixels = 30 }"),
+        ("two rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2 }"),
+        ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
         ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
         ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
     ] {
-        let toml = format!(
-            "{toml}\npicture = {{ size = [23, 17] }}\nray = {{ sampling = 'exact', step = 0.7, early_end = 0.0 }}"
-        );
-        add(name, &sweep, BYTES, &toml);
+        let ray = "sampling = 'exact', step = 0.7, early_end = 0.0";
+        let toml = match toml.split_once("ray = { ") {
+            Some((before, after)) => format!("{before}ray = {{ {ray}, {after}"),
+            None => format!("{toml}\nray = {{ {ray} }}"),
+        };
+        add(name, &sweep, BYTES, &format!("{toml}\npicture = {{ size = [23, 17] }}"));
+    }
+    for ray in ["spread = 1.0", "sliding = 3", "sliding = 5, spread = 0.5"] {
+        for mode in ["'sr'", "'vr'", "'mean'", "'vr'\nvolume = { compositing = 'pre-integrated' }"] {
+            let toml = format!(
+                "mode = {mode}\nslices = {{ pixels = 30 }}\npicture = {{ size = [15, 11] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}]
+                 camera = {{ azimuth = 35, elevation = 8, roll = 11, field_of_view = 40 }}\nray = {{ sampling = 'exact', step = 0.9, early_end = 0.0, {ray} }}"
+            );
+            scenes.push((format!("{ray}, {mode}"), scene(sweep.clone(), BYTES, &toml)));
+        }
     }
     scenes
 }

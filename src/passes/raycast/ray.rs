@@ -1,19 +1,22 @@
-//! What both ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
+//! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
 use crate::passes::tables::{LUT_ENTRIES, is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
-use crate::scene::{Sampling, Scene};
+use crate::scene::{MAX_CLIPS, Sampling, Scene};
 
 /// Picks the variant that has the tables this geometry needs, and no other.
 macro_rules! variant {
     ($scene:expr, $shader:literal) => {
+        crate::passes::raycast::ray::variant!($scene, $shader, "")
+    };
+    ($scene:expr, $shader:literal, $kind:literal) => {
         match crate::passes::raycast::ray::tables($scene) {
-            (false, _, _) => concat!($shader, ".plain"),
-            (true, false, false) => concat!($shader, ".even"),
-            (true, false, true) => concat!($shader, ".moved"),
-            (true, true, false) => concat!($shader, ".uneven"),
-            (true, true, true) => concat!($shader, ".uneven_moved"),
+            (false, _, _) => concat!($shader, ".", $kind, "plain"),
+            (true, false, false) => concat!($shader, ".", $kind, "even"),
+            (true, false, true) => concat!($shader, ".", $kind, "moved"),
+            (true, true, false) => concat!($shader, ".", $kind, "uneven"),
+            (true, true, true) => concat!($shader, ".", $kind, "uneven_moved"),
         }
     };
 }
@@ -63,13 +66,36 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         Sampling::Hardware => 0,
         Sampling::Exact => 1,
     };
-    vec![("SWEEP", sweep), ("ARRAY", array), ("SAMPLING", sampling)]
+    vec![
+        ("SWEEP", sweep),
+        ("ARRAY", array),
+        ("SAMPLING", sampling),
+        ("CLIPS", scene.settings.clip.len() as i32),
+        ("SPREAD", scene.spreads() as i32),
+    ]
 }
 
-pub(super) fn params(scene: &Scene) -> Params {
+/// Constants of the passes that take samples along rays.
+pub(super) fn marching_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+    let mut constants = constants(scene);
+    constants.push(("SLIDING", scene.settings.ray.sliding as i32));
+    constants
+}
+
+pub(super) fn params(scene: &Scene, [window_low, window_high]: [f64; 2]) -> Params {
     let grid = &scene.grid;
-    let [window_low, window_high] = scene.window();
+    let mut clips = [[0.0; 4]; MAX_CLIPS];
+    for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
+        *clip = [normal.x, normal.y, normal.z, limit];
+    }
+    let [clip_0, clip_1, clip_2, clip_3] = clips;
     let params = ray_params(scene)
+        .f32("spread", scene.settings.ray.spread)
+        .f32("spread_range", scene.probe().map_or(1.0, spread_range).max(1e-6))
+        .vec4("clip_0", clip_0)
+        .vec4("clip_1", clip_1)
+        .vec4("clip_2", clip_2)
+        .vec4("clip_3", clip_3)
         .vec3("box_low", scene.low)
         .vec3("box_high", scene.high)
         .f32("step_length", scene.step)
@@ -116,7 +142,124 @@ fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]
         .f32("line_high", line_high)
 }
 
-/// Where a ray enters and leaves the box, mm; leave < enter is a miss.
+/// A pixel's ray in f64, and the volume that it goes through.
+pub(super) struct Ray<'a> {
+    scene: &'a Scene,
+    volume: &'a Texels,
+    window: [f64; 2],
+    origin: DVec3,
+    direction: DVec3,
+    /// Across the ray, unit length.
+    across: [DVec3; 2],
+    /// Where it lies in the box and on the near side of every clip plane, mm; leave < enter is a miss.
+    pub enter: f64,
+    pub leave: f64,
+    /// How much longer than the scene's step a step is at the entry, and how much more that becomes a mm.
+    wider: f64,
+    widening: f64,
+}
+
+impl<'a> Ray<'a> {
+    pub fn cast(scene: &'a Scene, volume: &'a Texels, window: [f64; 2], x: usize, y: usize) -> Ray<'a> {
+        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let (enter, leave) = span(scene, origin, direction);
+        let sideways = scene.rays.origin_dx + scene.rays.direction_dx;
+        let across = sideways.reject_from_normalized(direction).normalize();
+        let (wider, widening) = match scene.spreads() && leave > enter {
+            true => {
+                let (low, high) = (wider(scene, origin + direction * enter), wider(scene, origin + direction * leave));
+                (low, (high - low) / (leave - enter))
+            }
+            false => (1.0, 0.0),
+        };
+        let across = [across, across.cross(direction)];
+        Ray { scene, volume, window, origin, direction, across, enter, leave, wider, widening }
+    }
+
+    pub fn path(&self) -> f64 {
+        self.leave - self.enter
+    }
+
+    /// mm behind the entry after n steps: dt/dn = step (wider + widening t).
+    pub fn offset(&self, n: f64) -> f64 {
+        let rate = self.scene.step * self.widening;
+        match rate == 0.0 {
+            true => self.scene.step * self.wider * n,
+            false => self.wider / self.widening * (rate * n).exp_m1(),
+        }
+    }
+
+    /// Length of the step that begins after n steps, mm.
+    pub fn length(&self, n: f64) -> f64 {
+        self.offset(n + 1.0) - self.offset(n)
+    }
+
+    /// Steps to an offset.
+    pub fn steps_to(&self, offset: f64) -> f64 {
+        match self.widening == 0.0 {
+            true => offset / (self.scene.step * self.wider),
+            false => (self.widening / self.wider * offset).max(-0.999_999).ln_1p() / (self.scene.step * self.widening),
+        }
+    }
+
+    /// A place that many mm behind the entry.
+    pub fn place(&self, offset: f64) -> DVec3 {
+        self.origin + self.direction * (self.enter + offset)
+    }
+
+    /// The windowed sample at an offset, which is that of step `n`; none outside the insonified region. With the sliding
+    /// filter it is the weighted mean of what lies inside of a cube of samples about it.
+    pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
+        let at = texel(self.scene, self.place(offset))?;
+        let edge = i64::from(self.scene.settings.ray.sliding);
+        let value = match edge {
+            0 => self.volume.trilinear(at),
+            _ => self.filtered(n, edge / 2),
+        };
+        let [low, high] = self.window;
+        Some(((value - low) / (high - low)).clamp(0.0, 1.0))
+    }
+
+    fn filtered(&self, n: f64, reach: i64) -> f64 {
+        // Deviation sqrt(edge - 1) / 2.
+        let weight = |away: i64| (-(away * away) as f64 / (2.0 * reach as f64 / 2.0)).exp();
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for along in -reach..=reach {
+            let n = n + along as f64;
+            let (middle, apart) = (self.place(self.offset(n)), self.length(n - 0.5));
+            for (x, y) in (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| (x, y))) {
+                let place = middle + (self.across[0] * x as f64 + self.across[1] * y as f64) * apart;
+                if let Some(at) = texel(self.scene, place) {
+                    let w = weight(x) * weight(y) * weight(along);
+                    sum += w * self.volume.trilinear(at);
+                    weights += w;
+                }
+            }
+        }
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    }
+
+    /// The unfiltered sample at a distance along the ray.
+    pub fn echo(&self, distance: f64) -> Option<f64> {
+        let [low, high] = self.window;
+        let at = texel(self.scene, self.origin + self.direction * distance)?;
+        Some(((self.volume.trilinear(at) - low) / (high - low)).clamp(0.0, 1.0))
+    }
+}
+
+/// How much longer than the scene's step a step is at a place: in proportion to the range from the array's apex.
+fn wider(scene: &Scene, place: DVec3) -> f64 {
+    let Some(probe) = scene.probe() else { return 1.0 };
+    let (x, y, _) = probe.unswept(place);
+    1.0 + scene.settings.ray.spread * ((x.hypot(y) / spread_range(probe)).clamp(1.0, 8.0) - 1.0)
+}
+
+/// The range at which steps are not longer yet: that of the first sample, unless that is (nearly) the apex.
+fn spread_range(probe: &Probe) -> f64 {
+    probe.first_range().max(probe.last_range() / 8.0)
+}
+
+/// Where a ray enters and leaves what is rendered, mm; leave < enter is a miss.
 pub(super) fn span(scene: &Scene, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
@@ -130,6 +273,15 @@ pub(super) fn span(scene: &Scene, origin: DVec3, direction: DVec3) -> (f64, f64)
         let (a, b) = (low / direction[axis], high / direction[axis]);
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
+    }
+    for (normal, limit) in scene.clips() {
+        let (towards, room) = (normal.dot(direction), limit - normal.dot(origin));
+        match towards.abs() < 1e-12 {
+            true if room < 0.0 => return (0.0, -1.0),
+            true => {}
+            false if towards > 0.0 => leave = leave.min(room / towards),
+            false => enter = enter.max(room / towards),
+        }
     }
     (enter, leave)
 }
@@ -156,10 +308,4 @@ pub(super) fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
 fn inside(probe: &Probe, at: crate::probe::Indices) -> bool {
     let within = |index: f64, count: usize| index >= 0.0 && index <= (count - 1) as f64;
     within(at.sample, probe.samples) && within(at.line, probe.lines.len()) && within(at.slice, probe.slices.len())
-}
-
-/// The windowed sample at a place on a ray; none outside the insonified region.
-pub(super) fn sample(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
-    let [low, high] = scene.window();
-    texel(scene, place).map(|at| ((volume.trilinear(at) - low) / (high - low)).clamp(0.0, 1.0))
 }

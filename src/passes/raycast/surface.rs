@@ -17,13 +17,13 @@ pub const PASS: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let surface = &s.settings.surface;
-        ray::params(s)
+        ray::params(s, surface.window)
             .f32("threshold", surface.threshold)
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
     },
     constants: |s, _| {
-        let mut constants = ray::constants(s);
+        let mut constants = ray::marching_constants(s);
         constants.push(("ROUGH", s.settings.surface.rough as i32));
         constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));
         constants.push(("NUMBER", s.settings.surface.number as i32));
@@ -42,22 +42,20 @@ pub const PASS: Pass = Pass {
         let size = writes.get("distance_map").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-                let (enter, leave) = ray::span(scene, origin, direction);
-                let count = ((leave - enter) / scene.step).max(0.0).floor() as i64;
+                let ray = ray::Ray::cast(scene, volume, scene.settings.surface.window, x, y);
+                let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
                 // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
                 let half = i64::from(RING / 2 * scene.settings.surface.rough);
-                let first = (-half).max((-enter / scene.step - 0.5).ceil() as i64);
+                let first = (-half).max((ray.steps_to(-ray.enter) - 0.5).ceil() as i64);
                 let end = if count > 0 { count + half + i64::from(RING) } else { first };
-                let at = |i: i64| enter + (i as f64 + 0.5) * scene.step;
                 let samples: Vec<Option<f64>> =
-                    (first..end).map(|i| ray::sample(scene, volume, origin + direction * at(i))).collect();
-                let within = |place: f64| (0.0..=leave - enter).contains(&((place + 0.5) * scene.step));
+                    (first..end).map(|i| i as f64 + 0.5).map(|n| ray.sample(ray.offset(n), n)).collect();
+                let within = |place: f64| (0.0..=ray.path()).contains(&ray.offset(place + 0.5));
                 let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
                 let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
                     Some((place, echo)) => {
-                        let distance = enter + (place + 0.5) * scene.step;
-                        (distance, [echo, 1.0, behind(scene, volume, origin, direction, distance), 0.0])
+                        let distance = ray.enter + ray.offset(place + 0.5);
+                        (distance, [echo, 1.0, behind(scene, &ray, distance), 0.0])
                     }
                     None => (MISS, [0.0; 4]),
                 };
@@ -70,10 +68,9 @@ pub const PASS: Pass = Pass {
 };
 
 /// Mean echo over the samples that the skin look wants, one step after the other behind the surface.
-fn behind(scene: &Scene, volume: &Texels, origin: DVec3, direction: DVec3, distance: f64) -> f64 {
+fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
     let count = scene.samples_behind();
-    let at = |i: u32| origin + direction * (distance + f64::from(i) * scene.step);
-    let sum: f64 = (1..=count).filter_map(|i| ray::sample(scene, volume, at(i))).sum();
+    let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step)).sum();
     sum / f64::from(count.max(1))
 }
 

@@ -2,30 +2,57 @@
 
 use super::ray;
 use crate::passes::*;
-use crate::scene::transfer;
+use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
 
 pub const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
     when: When::Picture,
-    shader: |s, _| ray::variant!(s, "raycast/volume"),
+    shader: |s, _| match kind(s) {
+        Kind::Alone => ray::variant!(s, "raycast/volume", ""),
+        Kind::Veil => ray::variant!(s, "raycast/volume", "veil_"),
+        Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
+    },
     needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
         let mut reads = ray::reads(s);
-        reads.push(whole("transfer", Slot::Transfer));
+        reads.push(match s.settings.volume.compositing {
+            Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
+            _ => whole("transfer", Slot::Transfer),
+        });
+        reads.extend((kind(s) == Kind::Veil).then_some(whole("distance_map", Slot::Distance)));
         reads
     },
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    writes: |s, _| match kind(s) {
+        Kind::Alone => vec![whole("picture", chain::rendered(s))],
+        Kind::Veil => vec![whole("picture", Slot::Veil)],
+        Kind::Hit => vec![whole("picture", Slot::Veil), whole("distance_map", Slot::Distance)],
+    },
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
-        ray::params(s)
+        let volume = &s.settings.volume;
+        let (axis, near) = depth_axis(s);
+        ray::params(s, volume.window)
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
+            .f32("hit_opacity", volume.hit)
+            .vec3("near_tint", volume.near_tint)
+            .vec3("far_tint", volume.far_tint)
+            .vec3("depth_axis", axis)
+            .f32("depth_near", near)
     },
     constants: |s, _| {
-        let mut constants = ray::constants(s);
+        let mut constants = ray::marching_constants(s);
+        let compositing = match s.settings.volume.compositing {
+            Compositing::Riemann => 0,
+            Compositing::Corrected => 1,
+            Compositing::PreIntegrated => 2,
+        };
         constants.push(("EARLY_END", (s.settings.ray.early_end > 0.0) as i32));
+        constants.push(("COMPOSITING", compositing));
+        constants.push(("DEPTH_CODED", (s.settings.volume.shading == Shading::DepthCoded) as i32));
+        constants.push(("ENTRIES", transfer::ENTRIES as i32));
         constants
     },
     tolerance: Tolerance {
@@ -38,51 +65,122 @@ pub const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let table = reads.get("transfer");
-        let picture = writes.get_mut("picture");
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-                picture.set([x, y, 0], &composite(scene, volume, table, origin, direction));
+        let size = writes.get("picture").size;
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let mut ray = ray::Ray::cast(scene, volume, scene.settings.volume.window, x, y);
+                if kind(scene) == Kind::Veil {
+                    ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
+                }
+                let (colour, hit) = composite(scene, &ray, table);
+                writes.get_mut("picture").set([x, y, 0], &colour);
+                if kind(scene) == Kind::Hit {
+                    writes.get_mut("distance_map").set([x, y, 0], &[hit]);
+                }
             }
         }
     },
 };
+
+#[derive(PartialEq)]
+enum Kind {
+    /// The picture.
+    Alone,
+    /// What lies before a surface.
+    Veil,
+    /// What stage 3 lights, and where.
+    Hit,
+}
+
+fn kind(scene: &Scene) -> Kind {
+    match (scene.settings.mode, scene.lights_volume()) {
+        (Mode::Mixed, _) => Kind::Veil,
+        (_, true) => Kind::Hit,
+        (_, false) => Kind::Alone,
+    }
+}
 
 /// The length for which the transfer function's opacities are given: one slice pixel, mm.
 pub fn reference_length(scene: &Scene) -> f64 {
     scene.grid.pitch[0].min(scene.grid.pitch[1])
 }
 
-/// Red, green, blue and opacity of one ray: the midpoint rule over steps of `scene.step`, the last as long as what is left.
-fn composite(scene: &Scene, volume: &Texels, table: &Texels, origin: DVec3, direction: DVec3) -> [f64; 4] {
-    let (enter, leave) = ray::span(scene, origin, direction);
+/// Depth of a place along the view: its dot product with the first, less the second, is 0 at the box's nearest corner and 1 at
+/// its farthest.
+fn depth_axis(scene: &Scene) -> (DVec3, f64) {
+    let forward = scene.rays.forward;
+    let middle = (scene.low + scene.high) / 2.0;
+    let half = forward.abs().dot((scene.high - scene.low) / 2.0).max(1e-9);
+    (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
+}
+
+/// Red, green, blue and opacity of one ray, and where it has become as opaque as a hit is. The midpoint rule over its steps,
+/// the last as long as what is left; pre-integrated: the values at each step's two ends.
+fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
+    let settings = &scene.settings.volume;
+    let (axis, near) = depth_axis(scene);
     let mut light = [0.0; 3];
     let mut opacity = 0.0;
-    let mut i = 0;
-    while enter + f64::from(i) * scene.step < leave {
-        let from = enter + f64::from(i) * scene.step;
-        let length = scene.step.min(leave - from);
-        i += 1;
-        let Some(value) = ray::sample(scene, volume, origin + direction * (from + length / 2.0)) else { continue };
-        let [r, g, b, kappa] = looked_up(table, value);
-        let a = transfer::opacity(kappa * length / reference_length(scene));
-        for (light, colour) in light.iter_mut().zip([r, g, b]) {
-            *light += (1.0 - opacity) * a * colour;
+    let mut hit = MISS;
+    let steps = ray.steps_to(ray.path().max(0.0)).ceil() as u64;
+    for i in (0..steps).map(|i| i as f64) {
+        let from = ray.offset(i);
+        let length = ray.length(i).min(ray.path() - from);
+        let (seen, rgba) = match settings.compositing {
+            Compositing::PreIntegrated => {
+                let (front, back) = (ray.sample(from, i), ray.sample(from + length, i + 1.0));
+                (from + length, front.zip(back).map(|(front, back)| looked_up_between(table, front, back)))
+            }
+            _ => (from + length / 2.0, ray.sample(from + length / 2.0, i + 0.5).map(|v| looked_up(table, v))),
+        };
+        let Some([r, g, b, kappa]) = rgba.filter(|_| length > 0.0) else { continue };
+        let y = kappa * length / reference_length(scene);
+        let a = if settings.compositing == Compositing::Riemann { y.min(1.0) } else { transfer::opacity(y) };
+        let depth = (ray.place(seen).dot(axis) - near).clamp(0.0, 1.0);
+        for (c, (light, colour)) in light.iter_mut().zip([r, g, b]).enumerate() {
+            let tint = match settings.shading {
+                Shading::DepthCoded => settings.near_tint[c] + (settings.far_tint[c] - settings.near_tint[c]) * depth,
+                _ => 1.0,
+            };
+            *light += (1.0 - opacity) * a * colour * tint;
         }
+        let before = opacity;
         opacity += (1.0 - opacity) * a;
+        if !is_hit(hit) && opacity >= settings.hit {
+            hit = ray.enter + from + length * (settings.hit - before) / (opacity - before);
+        }
         if scene.settings.ray.early_end > 0.0 && opacity >= 1.0 - scene.settings.ray.early_end {
             break;
         }
     }
-    [light[0], light[1], light[2], opacity]
+    ([light[0], light[1], light[2], opacity], hit)
+}
+
+fn entry(table: &Texels, n: usize) -> [f64; 4] {
+    std::array::from_fn(|c| table.values[4 * n + c])
+}
+
+fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
+    std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
+}
+
+/// Entry before a value in 0..1, and the share of the way to the next.
+fn placed(value: f64) -> (usize, f64) {
+    let at = value * (transfer::ENTRIES - 1) as f64;
+    let n = (at.floor() as usize).min(transfer::ENTRIES - 2);
+    (n, at - n as f64)
 }
 
 fn looked_up(table: &Texels, value: f64) -> [f64; 4] {
-    let entries = table.values.len() / 4;
-    let at = value * (entries - 1) as f64;
-    let n = (at.floor() as usize).min(entries - 2);
-    std::array::from_fn(|c| {
-        let (low, high) = (table.values[4 * n + c], table.values[4 * n + 4 + c]);
-        low + (high - low) * (at - n as f64)
-    })
+    let (n, share) = placed(value);
+    between(entry(table, n), entry(table, n + 1), share)
+}
+
+fn looked_up_between(table: &Texels, front: f64, back: f64) -> [f64; 4] {
+    let ((row, down), (column, along)) = (placed(front), placed(back));
+    let at = |row: usize| {
+        let first = row * transfer::ENTRIES + column;
+        between(entry(table, first), entry(table, first + 1), along)
+    };
+    between(at(row), at(row + 1), down)
 }

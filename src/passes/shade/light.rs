@@ -3,21 +3,38 @@
 use super::{camera_params, light_at, normal, to_light};
 use crate::passes::chain::distance_end;
 use crate::passes::*;
-use crate::scene::{Scene, Skin};
+use crate::scene::{Mode, Scene, Skin};
 
 pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
     when: When::Picture,
-    shader: |s, _| match (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s)) {
-        (false, false) => "shade/light.plain",
-        (true, false) => "shade/light.shadowed",
-        (false, true) => "shade/light.occluded",
-        (true, true) => "shade/light.shadowed_occluded",
+    shader: |s, _| {
+        let arrives = (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s));
+        match (lit_thing(s), arrives) {
+            (Lit::Surface, (false, false)) => "shade/light.plain",
+            (Lit::Surface, (true, false)) => "shade/light.shadowed",
+            (Lit::Surface, (false, true)) => "shade/light.occluded",
+            (Lit::Surface, (true, true)) => "shade/light.shadowed_occluded",
+            (Lit::Veiled, (false, false)) => "shade/light.veiled_plain",
+            (Lit::Veiled, (true, false)) => "shade/light.veiled_shadowed",
+            (Lit::Veiled, (false, true)) => "shade/light.veiled_occluded",
+            (Lit::Veiled, (true, true)) => "shade/light.veiled_shadowed_occluded",
+            (Lit::Composited, (false, false)) => "shade/light.composited_plain",
+            (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
+            (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
+            (Lit::Composited, (true, true)) => "shade/light.composited_shadowed_occluded",
+        }
     },
-    needed: |s| if s.has_distance() { Ok("a surface is lit") } else { Err("no surface in this mode") },
+    needed: |s| match (s.has_distance(), s.lights_volume()) {
+        (true, false) => Ok("a surface is lit"),
+        (true, true) => Ok("the volume is lit where rays hit it first"),
+        (false, _) => Err("no surface in this mode"),
+    },
     reads: |s, _| {
-        let mut reads = vec![whole("distance_map", distance_end(s)), whole("surface", Slot::Surface)];
+        let mut reads = vec![whole("distance_map", distance_end(s))];
+        reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
+        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("veil", Slot::Veil)));
         reads.extend(super::shadow::PASS.is_needed(s).then_some(whole("shadow", Slot::Shadow)));
         reads.extend(super::occlusion::PASS.is_needed(s).then_some(whole("occlusion", Slot::Occlusion)));
         reads
@@ -39,6 +56,7 @@ pub const PASS: Pass = Pass {
             .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
             .vec3("wrap", wrap(s.skin()))
             .vec3("through", through(s.skin()))
+            .f32("veil_share", s.settings.volume.veil)
     },
     constants: |s, _| {
         let light = &s.settings.light;
@@ -55,12 +73,52 @@ pub const PASS: Pass = Pass {
         let picture = writes.get_mut("picture");
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                let colour = lit(scene, reads, x, y);
-                picture.set([x, y, 0], &colour.map_or([0.0; 4], |c| [c.x, c.y, c.z, 1.0]));
+                let light = lit(scene, reads, x, y);
+                picture.set([x, y, 0], &seen(scene, reads, light, x, y));
             }
         }
     },
 };
+
+#[derive(PartialEq)]
+enum Lit {
+    Surface,
+    /// A surface behind a composited volume.
+    Veiled,
+    /// The volume itself, where rays hit it first.
+    Composited,
+}
+
+fn lit_thing(scene: &Scene) -> Lit {
+    match (scene.lights_volume(), scene.settings.mode) {
+        (true, _) => Lit::Composited,
+        (false, Mode::Mixed) => Lit::Veiled,
+        (false, _) => Lit::Surface,
+    }
+}
+
+/// What a pixel shows: its light (body and highlight), with the composited volume before it or in it.
+fn seen(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
+    let veil = |share: f64| {
+        let veil = reads.get("veil").get([x, y, 0]);
+        (DVec3::new(veil[0], veil[1], veil[2]) * share, veil[3] * share)
+    };
+    let (colour, opacity) = match (lit_thing(scene), light) {
+        (Lit::Surface, light) => light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0)),
+        (Lit::Veiled, light) => {
+            let (before, opacity) = veil(scene.settings.volume.veil);
+            light.map_or((before, opacity), |(body, highlight)| (before + (1.0 - opacity) * (body + highlight), 1.0))
+        }
+        (Lit::Composited, light) => {
+            let (colour, opacity) = veil(1.0);
+            match light {
+                Some((body, highlight)) => (colour * (1.0 - opacity + opacity * body) + opacity * highlight, opacity),
+                None => (colour, opacity),
+            }
+        }
+    };
+    [colour.x, colour.y, colour.z, opacity]
+}
 
 /// Red wraps furthest: light travels furthest through skin at long wavelengths.
 fn wrap(skin: Option<Skin>) -> DVec3 {
@@ -71,7 +129,8 @@ fn through(skin: Option<Skin>) -> DVec3 {
     skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
 }
 
-fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<DVec3> {
+/// Light that comes from a pixel's surface: from its body, and its highlight.
+fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec3)> {
     let distances = reads.get("distance_map");
     let (place, _) = super::place(scene, distances, x as i64, y as i64)?;
     let normal = normal(scene, distances, x as i64, y as i64)?;
@@ -82,9 +141,14 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<DVec3> {
     let facing = cosine.max(0.0);
     let halfway = (to_light - along).try_normalize().unwrap_or(DVec3::ZERO);
     let gloss = normal.dot(halfway).max(0.0).powf(light.shininess);
-    let surface = reads.get("surface").get([x, y, 0]);
-    let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
-    let colour = DVec3::from(light.surface_colour) * (1.0 + (echo - 1.0) * light.texture * found);
+    let (colour, found, behind) = match lit_thing(scene) {
+        Lit::Composited => (DVec3::ONE, 1.0, 1.0),
+        _ => {
+            let surface = reads.get("surface").get([x, y, 0]);
+            let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
+            (DVec3::from(light.surface_colour) * (1.0 + (echo - 1.0) * light.texture * found), found, behind)
+        }
+    };
 
     let arrives = light.shadow.map_or(1.0, |s| match super::shadow::PASS.is_needed(scene) {
         true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
@@ -104,5 +168,6 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<DVec3> {
     };
     let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
     let body = colour * (light.ambient * open + light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0)));
-    Some(DVec3::from(light.colour) * (body + glow * open + shine))
+    let colour = DVec3::from(light.colour);
+    Some((colour * (body + glow * open), colour * shine))
 }

@@ -11,17 +11,69 @@ pub struct Volume {
     /// Nothing above this depth is drawn, mm below the probe's face (Cartesian: along the depth axis).
     pub start_depth: Option<f64>,
     pub transfer: Transfer,
+    /// Samples below this are transparent, 0..1 after the window.
+    pub threshold: f64,
+    pub compositing: Compositing,
+    pub shading: Shading,
+    /// Depth-coded: colours are multiplied by this where the box is nearest to the viewer ...
+    pub near_tint: [f64; 3],
+    /// ... and by this where it is farthest, 0..10.
+    pub far_tint: [f64; 3],
+    /// First hit: the opacity at which a ray has hit what is lit, 0.001..1.
+    pub hit: f64,
+    /// Mode mixed: how much of the composited volume is laid over the surface, 0..1.
+    pub veil: f64,
 }
 
 impl Default for Volume {
     fn default() -> Self {
-        Volume { window: [0.0, 1.0], start_depth: None, transfer: Transfer::Named(TransferName::Grey) }
+        Volume {
+            window: [0.0, 1.0],
+            start_depth: None,
+            transfer: Transfer::Named(TransferName::Grey),
+            threshold: 0.0,
+            compositing: Compositing::Corrected,
+            shading: Shading::None,
+            near_tint: [1.05, 1.0, 0.9],
+            far_tint: [0.3, 0.42, 0.75],
+            hit: 0.3,
+            veil: 1.0,
+        }
     }
+}
+
+/// How samples become opacity over a step of length h; y = kappa h, kappa the absorption of the transfer function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Compositing {
+    /// a = y, at most 1: right for thin steps only.
+    Riemann,
+    /// a = 1 - exp(-y): right for any step through an even medium.
+    #[default]
+    Corrected,
+    /// The same with the mean absorption, and the mean colour weighted by it, between the values at the step's two ends: no
+    /// layer of the transfer function is stepped over (Engel, Kraus, Ertl 2001).
+    PreIntegrated,
+}
+
+/// What gives a volume its depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shading {
+    #[default]
+    None,
+    /// Colours go from a near to a far tint.
+    DepthCoded,
+    /// The place where each ray becomes opaque enough is lit as a surface is, by stage 3.
+    FirstHit,
 }
 
 /// A named transfer function, or its points.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-#[serde(untagged, expecting = "must be grey, sepia, skin, bone, or a list of points { at, colour, opacity }")]
+#[serde(
+    untagged,
+    expecting = "must be grey, sepia, skin, bone, cool, warm, a .toml file of points, or a list of points { at, colour, opacity }"
+)]
 pub enum Transfer {
     Named(TransferName),
     Points(Vec<TransferPoint>),
@@ -34,6 +86,10 @@ pub enum TransferName {
     Sepia,
     Skin,
     Bone,
+    /// Blue to white.
+    Cool,
+    /// Red to yellow.
+    Warm,
 }
 
 /// Colour and opacity at a sample value, linear in between. Opacity is that of one voxel (one slice pixel).

@@ -34,13 +34,19 @@ pub struct Ray {
     /// A ray of VR ends when less than this share of light is left; 0 never ends early. The error is at most this.
     pub early_end: f64,
     pub sampling: Sampling,
+    /// How far steps grow with the range, as the samples of a convex sweep spread apart: 0 even steps, 1 in proportion to the
+    /// range (twice as far from the array's apex twice as long, at most 8 times). Curved arrays only.
+    pub spread: f64,
+    /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each edge about every sample, made while the ray
+    /// is cast; 0 for none.
+    pub sliding: u32,
     /// Rays for each pixel along each edge, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
 }
 
 impl Default for Ray {
     fn default() -> Self {
-        Ray { step: None, early_end: 1.0 / 512.0, sampling: Sampling::Hardware, rays: 1 }
+        Ray { step: None, early_end: 1.0 / 512.0, sampling: Sampling::Hardware, spread: 0.0, sliding: 0, rays: 1 }
     }
 }
 

@@ -1,0 +1,56 @@
+// The 3D filter of the thesis (4.3): a Gaussian about each sample of the ray, across it and along it, made while the ray is
+// cast. Only the front slice is new at each step; the sums of the slices behind it are kept. Taps outside the insonified
+// region are left out and the rest renormalised.
+
+const float SAMPLE_AT = 0.5; // samples lie in the middle of their steps
+
+struct Slices {
+    vec2 a, b, c, d, e; // weighted sums and weights of the last slices, the newest last
+    int newest;
+};
+
+// Deviation sqrt(n - 1) / 2 steps, as the binomial of that length has.
+float tap_weight(int away) { return exp(-float(away * away) * 2.0 / float(max(SLIDING - 1, 1))); }
+
+vec2 front_slice(Ray ray, int i, float sample_at) {
+    float at = float(i) + sample_at;
+    vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, at));
+    // Across the ray, a step apart as along it.
+    vec3 sideways = origin_dx + direction_dx;
+    vec3 across = normalize(sideways - ray.direction * dot(sideways, ray.direction));
+    vec3 upwards = cross(across, ray.direction);
+    float apart = length_of(ray, at - 0.5);
+    vec2 sum = vec2(0.0);
+    for (int n = 0; n < SLIDING * SLIDING; ++n) {
+        int x = n % SLIDING - SLIDING / 2, y = n / SLIDING - SLIDING / 2;
+        vec3 texel;
+        if (locate(p + (across * float(x) + upwards * float(y)) * apart, texel)) {
+            sum += tap_weight(x) * tap_weight(y) * vec2(raw_volume(texel), 1.0);
+        }
+    }
+    return sum;
+}
+
+Slices no_slices() { return Slices(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), -0x40000000); }
+
+// The filtered sample i of a ray. Steps may be skipped or taken back: what is missing is summed anew.
+float slid(Ray ray, int i, float sample_at, inout Slices s) {
+    const int half_width = SLIDING / 2;
+    if (s.newest > i + half_width || s.newest < i - half_width - 1) s.newest = i - half_width - 1;
+    while (s.newest < i + half_width) {
+        ++s.newest;
+        s.a = s.b;
+        s.b = s.c;
+        s.c = s.d;
+        s.d = s.e;
+        s.e = front_slice(ray, s.newest, sample_at);
+    }
+    float near = tap_weight(1), far = SLIDING == 5 ? tap_weight(2) : 0.0;
+    vec2 sum = SLIDING == 5 ? s.c + near * (s.b + s.d) + far * (s.a + s.e) : s.d + near * (s.c + s.e);
+    return sum.y > 0.0 ? windowed(sum.x / sum.y) : 0.0;
+}
+
+// Sample i, whose own place has these texture indices.
+float sample_along(Ray ray, int i, float sample_at, vec3 texel, inout Slices s) {
+    return SLIDING == 0 ? sample_volume(texel) : slid(ray, i, sample_at, s);
+}

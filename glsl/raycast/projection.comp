@@ -1,0 +1,52 @@
+// The largest, the smallest, or the mean of the samples that each ray meets within the insonified region.
+// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+#version 460
+#include "common.glsl"
+layout(constant_id = 3) const int KEPT = 0; // 0 largest, 1 smallest, 2 mean
+layout(scalar) uniform Params {
+#include "ray_params.glsl"
+};
+#include "ray.glsl"
+#include "sliding.glsl"
+uniform writeonly image2D picture;
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
+    Ray ray = ray_of(pixel);
+    float path = ray.leave - ray.enter;
+    float kept = KEPT == 1 ? 1.0 : 0.0;
+    float met = 0.0; // mm within the region
+    if (path > 0.0) {
+        Slices slices = no_slices();
+        int whole = int(steps_to(ray, path)) + SPREAD;
+        // Sums of 64 samples first: one sum of 65536 would lose four of f32's seven digits.
+        float some = 0.0, some_met = 0.0;
+        for (int i = 0; i <= whole; ++i) {
+            float from = offset_of(ray, float(i));
+            float length = min(length_of(ray, float(i)), path - from);
+            vec3 texel;
+            if (length <= 0.0 || !locate(ray.origin + ray.direction * (ray.enter + from + 0.5 * length), texel)) continue;
+            float value = sample_along(ray, i, SAMPLE_AT, texel, slices);
+            if (KEPT == 2) {
+                some += value * length;
+                some_met += length;
+                if ((i & 63) == 63) {
+                    kept += some;
+                    met += some_met;
+                    some = 0.0;
+                    some_met = 0.0;
+                }
+            } else {
+                kept = KEPT == 0 ? max(kept, value) : min(kept, value);
+                met += length;
+                // Nothing can go beyond the window's ends.
+                if (kept == (KEPT == 0 ? 1.0 : 0.0)) break;
+            }
+        }
+        kept += some;
+        met += some_met;
+    }
+    float value = KEPT == 2 ? kept / max(met, 1e-20) : kept;
+    imageStore(picture, pixel, met > 0.0 ? vec4(vec3(value), 1.0) : vec4(0.0));
+}

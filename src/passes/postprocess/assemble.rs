@@ -1,0 +1,60 @@
+//! From what was rendered to the picture: the mean of several rays a pixel, and its place beside the planes of a 4-up picture.
+
+use crate::passes::*;
+use crate::scene::Layout;
+
+pub const PASS: Pass = Pass {
+    name: "assemble",
+    stage: Stage::Postprocess,
+    when: When::Picture,
+    shader: |s, _| match s.settings.layout {
+        Layout::Single => "postprocess/assemble.alone",
+        Layout::Four => "postprocess/assemble.four",
+    },
+    needed: |s| match (chain::rendered(s), s.settings.layout) {
+        (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
+        (_, Layout::Four) => Ok("the rendering stands beside three planes"),
+        (_, Layout::Single) => Ok("several rays make a pixel"),
+    },
+    reads: |s, _| {
+        let mut reads = vec![whole("rendered", Slot::Rendered)];
+        reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
+        reads
+    },
+    writes: |_, _| vec![whole("picture", Slot::Picture)],
+    extent: picture_extent,
+    repeat: once,
+    params: |_, _| Params::default(),
+    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32)],
+    tolerance: Tolerance {
+        absolute: 1e-3,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4",
+    },
+    reference: |scene, _, reads, writes| {
+        let rendered = reads.get("rendered");
+        let picture = writes.get_mut("picture");
+        let rays = scene.settings.ray.rays as usize;
+        let corner = match scene.settings.layout {
+            Layout::Single => [0, 0],
+            // The lower right tile.
+            Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
+        };
+        for y in 0..picture.size[1] {
+            for x in 0..picture.size[0] {
+                if x < corner[0] || y < corner[1] {
+                    let plane = reads.get("planes").get([x, y, 0]).to_vec();
+                    picture.set([x, y, 0], &plane);
+                    continue;
+                }
+                let mut mean = [0.0; 4];
+                for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
+                    let ray = rendered.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
+                    mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
+                }
+                picture.set([x, y, 0], &mean);
+            }
+        }
+    },
+};
