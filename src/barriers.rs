@@ -86,6 +86,10 @@ pub fn accesses(scene: &Scene, pass: &Pass, turn: &Turn) -> Vec<Access> {
             Part::Whole => 0..bind.slot.shape(scene).parts(),
             Part::Slice => turn.slice..turn.slice + 1,
             Part::Layer => turn.layer..turn.layer + 1,
+            Part::Around(more) => {
+                let all = bind.slot.shape(scene).parts();
+                turn.slice.saturating_sub(more)..(turn.slice + turn.slices + more).min(all)
+            }
         };
         let image = if bind.slot.takes_turns() { turn.image } else { 0 };
         Access::of_slot(bind.slot, image, parts, write, Worker::Compute)
@@ -250,7 +254,7 @@ mod tests {
                 operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, Worker::Copy)]);
                 run(When::Frame, turn, &mut operations);
             }
-            run(When::Volume, Turn { image, ..Turn::default() }, &mut operations);
+            run(When::Volume, Turn { image, slices: scene.slices(), ..Turn::default() }, &mut operations);
             run(When::Picture, Turn { image, ..Turn::default() }, &mut operations);
         }
         let barriers = derive(&operations);

@@ -1,10 +1,11 @@
 //! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
 
 use crate::passes::slots::Filled;
-use crate::passes::{PASSES, Pass, Slot, Turn, When};
+use crate::passes::{PASSES, Part, Pass, Slot, Turn, When};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::ops::Range;
 
 /// One dispatch of a plan; a pass that repeats has several.
 #[derive(Clone, Copy)]
@@ -62,7 +63,7 @@ impl Plan {
             }
             match (pass.needed)(scene) {
                 Ok(why) => {
-                    let [x, y, z] = (pass.extent)(scene, &Turn::default());
+                    let [x, y, z] = (pass.extent)(scene, &Turn { slices: scene.slices(), ..Turn::default() });
                     let each = match pass.when {
                         When::Frame => "each frame",
                         When::Volume => "each volume",
@@ -159,7 +160,26 @@ impl Plan {
     }
 }
 
+/// Runs of slices that have to be made anew where those marked have changed and each depends on `reach` on either side.
+pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
+    let mut runs: Vec<Range<u32>> = Vec::new();
+    for slice in (0..changed.len() as u32).filter(|s| changed[*s as usize]) {
+        let near = slice.saturating_sub(reach)..(slice + reach + 1).min(changed.len() as u32);
+        match runs.last_mut() {
+            Some(last) if last.end >= near.start => last.end = near.end,
+            _ => runs.push(near),
+        }
+    }
+    runs
+}
+
 impl Step {
+    /// How many slices on either side a pass over the volume looks at.
+    pub fn reach(&self, scene: &Scene) -> u32 {
+        let reads = (self.pass.reads)(scene, &self.turn());
+        reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
+    }
+
     pub fn id(&self) -> (&'static str, u32) {
         (self.pass.name, self.iteration)
     }
@@ -206,4 +226,18 @@ fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     }
     // The rest follow from the geometry, and their content is too long to compare.
     (&old.geometry, old.grid, old.apron) != (&new.geometry, new.grid, new.apron)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::affected;
+
+    #[test]
+    fn a_changed_slice_affects_its_neighbours_and_runs_that_touch_are_one() {
+        let changed = |which: &[usize]| (0..10).map(|i| which.contains(&i)).collect::<Vec<_>>();
+        assert_eq!(affected(&changed(&[]), 2), []);
+        assert_eq!(affected(&changed(&[5]), 0), vec![5..6; 1]);
+        assert_eq!(affected(&changed(&[0, 9]), 2), [0..3, 7..10]);
+        assert_eq!(affected(&changed(&[2, 5, 9]), 1), [1..7, 8..10]);
+    }
 }

@@ -13,6 +13,9 @@ layout(scalar) uniform Params {
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID);
     ivec3 size = source_size();
+#ifdef VOLUME
+    at.z += slice; // the first that is made anew
+#endif
     if (any(greaterThanEqual(at, size))) return;
     float sum = 0.0, weight = 0.0;
     for (int i = -RADIUS; i <= RADIUS; ++i) {

@@ -26,9 +26,15 @@ pub struct Render {
     /// The picture to write (PNG)
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
-    /// vr (volume) or sr (surface)
+    /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
     #[arg(long)]
     mode: Option<String>,
+    /// single, or 4up: three orthogonal planes beside the rendering
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<String>,
+    /// Transfer function: grey, sepia, skin, bone, cool, warm, or a .toml file of points
+    #[arg(long, value_name = "NAME|FILE")]
+    transfer: Option<String>,
     /// Settings in TOML
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
@@ -44,7 +50,7 @@ pub struct Render {
     /// What is rendered, mm: lateral=LOW:HIGH,depth=LOW:HIGH,elevation=LOW:HIGH
     #[arg(long, value_name = "SIDE=LOW:HIGH,...", allow_hyphen_values = true)]
     roi: Option<String>,
-    /// Any setting of a scene file, such as surface.threshold=0.1
+    /// Any setting of a scene file, such as surface.threshold=0.1; light.shadow=none switches a filter or light off
     #[arg(long, value_name = "KEY.PATH=VALUE", allow_hyphen_values = true)]
     set: Vec<String>,
     /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the recording
@@ -167,6 +173,11 @@ impl Render {
     fn flags(&self) -> Result<Vec<(String, String)>, Failure> {
         let mut set = Vec::new();
         set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), format!("mode={mode}"))));
+        for (name, key, value) in
+            [("--layout", "layout", &self.layout), ("--transfer", "volume.transfer", &self.transfer)]
+        {
+            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={value}"))));
+        }
         if let Some(size) = &self.size {
             let flag = format!("--size {size}");
             let edges = size.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));

@@ -9,8 +9,8 @@ use ash::vk;
 pub struct Order {
     pub tracker: Tracker,
     pub barriers: u32,
-    /// Names of the passes dispatched, in order, while someone counts them.
-    pub dispatched: Option<Vec<&'static str>>,
+    /// Names and extents of the passes dispatched, in order, while someone counts them.
+    pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
     /// Leaves out the n-th barrier, to show that something notices.
     pub drop_barrier: Option<u32>,
 }

@@ -196,7 +196,7 @@ impl Recorder {
             stamps.end_of(self.commands, pass.name);
         }
         if let Some(dispatched) = &mut order.dispatched {
-            dispatched.push(pass.name);
+            dispatched.push((pass.name, extent));
         }
         Ok(())
     }

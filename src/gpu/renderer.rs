@@ -12,7 +12,7 @@ use super::timeline::Timeline;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Texels, Turn, When};
 use crate::picture::Picture;
-use crate::plan::{Contents, Plan, Rerun};
+use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -51,6 +51,8 @@ pub struct Renderer {
     stale: Vec<bool>,
     /// Which step wrote each slot last.
     contents: Contents,
+    /// By volume image and slice: what the passes over the volume have not seen yet.
+    unseen: Vec<Vec<bool>>,
     /// Why the last change of scene was left half done.
     broken: Option<String>,
     /// One-shot staging buffers, kept until the device is done with them.
@@ -84,6 +86,7 @@ impl Renderer {
             context: context.clone(),
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
+            unseen: Vec::new(),
             broken: None,
             uploads: Vec::new(),
             volume_images: options.volume_images.max(1),
@@ -94,6 +97,7 @@ impl Renderer {
             times: Vec::new(),
         };
         renderer.lanes = lanes(context, &renderer.scene)?;
+        renderer.forget_volumes();
         renderer.fit()?;
         Ok(renderer)
     }
@@ -109,6 +113,11 @@ impl Renderer {
     /// Bytes of a frame as this scene expects it.
     pub fn frame_bytes(&self) -> usize {
         frame_bytes(&self.scene) as usize
+    }
+
+    /// No slice of any volume image has been seen by the passes over the volume.
+    fn forget_volumes(&mut self) {
+        self.unseen = vec![vec![true; self.scene.slices() as usize]; self.volume_images as usize];
     }
 
     /// Makes and fills the slots that are not there yet.
@@ -187,11 +196,13 @@ impl Renderer {
             recorder.stamp("upload");
         }
         for (i, step) in self.plan.steps_of(When::Frame) {
-            let turn = Turn { layer: layer as u32, slice, iteration: step.iteration, image };
+            let turn = Turn { layer: layer as u32, slice, slices: 1, iteration: step.iteration, image };
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             recorder.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
         }
-        recorder.submit(&mut self.timeline)
+        recorder.submit(&mut self.timeline)?;
+        self.unseen[image as usize][slice as usize] = true;
+        Ok(())
     }
 
     /// All frames of volume image `image` have been sent: the next picture shows it.
@@ -216,11 +227,20 @@ impl Renderer {
         self.plan.complete(&self.scene, &mut self.stale, &self.contents);
         self.picture.collect(&self.timeline, &mut self.times)?;
         self.picture.begin(&mut self.order, &self.timeline)?;
+        let unseen = &self.unseen[self.shown as usize];
         let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
         for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
-            let turn = Turn { image: self.shown, ..step.turn() };
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            self.picture.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
+            let runs = match step.pass.when {
+                When::Volume => affected(unseen, step.reach(scene)),
+                _ => std::iter::once(0..0).collect(),
+            };
+            for slices in runs {
+                let (slice, slices) = (slices.start, slices.end - slices.start);
+                let turn = Turn { image: self.shown, slice, slices, ..step.turn() };
+                let work = Work { slots, pipeline, scene, pass: step.pass, turn: &turn };
+                self.picture.dispatch(&mut self.order, &work)?;
+            }
             // Taken as written from here on: if the submission fails, all of it is stale still.
             self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
         }
@@ -230,6 +250,10 @@ impl Renderer {
         }
         self.picture.submit(&mut self.timeline)?;
         self.timeline.wait_all()?;
+        // A frame that has arrived since without its volume being shown is seen the next time.
+        if self.plan.steps_of(When::Volume).all(|(i, _)| self.stale[i]) {
+            self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);
+        }
         self.stale.iter_mut().for_each(|stale| *stale = false);
         Ok(())
     }
@@ -258,10 +282,14 @@ impl Renderer {
         let refilled = match rerun {
             Rerun::Steps { steps, slots } => {
                 steps.iter().for_each(|i| self.stale[*i] = true);
+                if steps.iter().any(|i| self.plan.steps[*i].pass.when == When::Volume) {
+                    self.forget_volumes();
+                }
                 slots.clone()
             }
             Rerun::Frames | Rerun::Everything => {
                 self.stale.iter_mut().for_each(|stale| *stale = true);
+                self.forget_volumes();
                 if *rerun == Rerun::Everything {
                     self.slots.clear();
                     self.lanes = lanes(&self.context, &self.scene)?;
@@ -320,6 +348,14 @@ impl Renderer {
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
     ) -> Result<Vec<&'static str>, GpuError> {
+        Ok(self.recorded(work)?.into_iter().map(|(name, _)| name).collect())
+    }
+
+    /// The same, with how many invocations each had along each axis.
+    pub fn recorded<T>(
+        &mut self,
+        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
+    ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
         self.order.dispatched = Some(Vec::new());
         let done = work(self);
         let dispatched = self.order.dispatched.take().unwrap_or_default();

@@ -102,8 +102,10 @@ pub enum When {
 pub struct Turn {
     /// Layer of the frame array that holds the frame.
     pub layer: u32,
-    /// Slice that the frame becomes.
+    /// Slice that the frame becomes; of a pass over the volume, the first that it makes anew.
     pub slice: u32,
+    /// Slices that a pass over the volume makes anew.
+    pub slices: u32,
     /// 0.. of a pass that repeats.
     pub iteration: u32,
     /// Which of the volume images that take turns.
@@ -118,6 +120,8 @@ pub enum Part {
     Slice,
     /// The turn's layer of the frame array.
     Layer,
+    /// The turn's slices of a 3D texture, and that many more on either side.
+    Around(u32),
 }
 
 /// A slot under the name that the shader gives it.

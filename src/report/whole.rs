@@ -18,7 +18,7 @@ pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
         }
     }
     for (_, step) in plan.steps_of(When::Volume).chain(plan.steps_of(When::Picture)) {
-        run(scene, step, &step.turn(), &mut slots);
+        run(scene, step, &Turn { slices: scene.slices(), ..step.turn() }, &mut slots);
     }
     slots
 }

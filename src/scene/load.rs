@@ -1,6 +1,6 @@
 //! Settings from layers: defaults, a preset, a scene file, and the command line, each overriding the one before.
 
-use super::Settings;
+use super::{Settings, TransferPoint};
 use serde::Deserialize;
 use std::io::Read;
 use std::path::Path;
@@ -36,24 +36,12 @@ impl Layers {
     pub fn preset(&mut self, name: &str) -> Result<(), LoadError> {
         let (_, text) =
             PRESETS.iter().find(|p| p.0 == name).ok_or_else(|| LoadError::UnknownPreset { name: name.to_string() })?;
-        self.add(&format!("preset {name}"), text)
+        self.add(&format!("preset {name}"), text, None)
     }
 
     pub fn file(&mut self, path: &Path) -> Result<(), LoadError> {
-        let shown = path.display().to_string();
-        let fault = |fault: String| LoadError::File { path: shown.clone(), fault };
-        let unreadable = |e: std::io::Error| fault(format!("cannot be read: {e}"));
-        // A pipe would be waited for.
-        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-            return Err(fault("is not a regular file".into()));
-        }
-        let mut text = String::new();
-        let file = std::fs::File::open(path).map_err(unreadable)?;
-        file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
-        if text.len() as u64 > LONGEST {
-            return Err(fault("is longer than 1 MiB, which no scene is".into()));
-        }
-        self.add(&shown, &text)
+        let text = read(path)?;
+        self.add(&path.display().to_string(), &text, path.parent())
     }
 
     /// One `key.path=value` of `--set`; the value is TOML, or a plain word.
@@ -83,19 +71,28 @@ impl Layers {
             let inner = at.entry(key).or_insert_with(|| Value::Table(Table::new()));
             at = inner.as_table_mut().ok_or_else(|| fault("names a key twice"))?;
         }
-        self.merge_checked(flag, layer)
+        self.merge_checked(flag, layer, None)
     }
 
-    fn add(&mut self, layer: &str, text: &str) -> Result<(), LoadError> {
+    fn add(&mut self, layer: &str, text: &str, folder: Option<&Path>) -> Result<(), LoadError> {
         let fault = |e: &toml::de::Error| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
-        // Read by itself first: only then does a message know its line.
-        toml::from_str::<Settings>(text).map_err(|e| fault(&e))?;
         let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
-        self.merge_checked(layer, table)
+        // Read by itself first: only then does a message know its line.
+        if transfer_file(&table).is_none() {
+            toml::from_str::<Settings>(text).map_err(|e| fault(&e))?;
+        }
+        self.merge_checked(layer, table, folder)
     }
 
     /// Checks after every layer, so that the message names the layer at fault.
-    fn merge_checked(&mut self, layer: &str, table: Table) -> Result<(), LoadError> {
+    fn merge_checked(&mut self, layer: &str, mut table: Table, folder: Option<&Path>) -> Result<(), LoadError> {
+        if let Some(name) = transfer_file(&table) {
+            let path = folder.unwrap_or(Path::new("")).join(name);
+            let points = points(&path)?;
+            if let Some(Value::Table(volume)) = table.get_mut("volume") {
+                volume.insert("transfer".into(), points);
+            }
+        }
         merge(&mut self.0, table);
         self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
     }
@@ -109,9 +106,47 @@ impl Layers {
     }
 }
 
+/// A small text file, whole.
+fn read(path: &Path) -> Result<String, LoadError> {
+    let fault = |fault: String| LoadError::File { path: path.display().to_string(), fault };
+    let unreadable = |e: std::io::Error| fault(format!("cannot be read: {e}"));
+    // A pipe would be waited for.
+    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(fault("is not a regular file".into()));
+    }
+    let mut text = String::new();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
+    match text.len() as u64 > LONGEST {
+        true => Err(fault("is longer than 1 MiB, which no scene is".into())),
+        false => Ok(text),
+    }
+}
+
+/// The file that a layer names as its transfer function.
+fn transfer_file(table: &Table) -> Option<String> {
+    let name = table.get("volume")?.get("transfer")?.as_str()?;
+    name.ends_with(".toml").then(|| name.to_string())
+}
+
+/// The points of a transfer function's own file: a list `points` of { at, colour, opacity }.
+fn points(path: &Path) -> Result<Value, LoadError> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Listed {
+        points: Vec<TransferPoint>,
+    }
+    let text = read(path)?;
+    let fault = |e: &dyn std::fmt::Display| LoadError::File { path: path.display().to_string(), fault: e.to_string() };
+    let listed = toml::from_str::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
+    Value::try_from(listed.points).map_err(|e| fault(&e))
+}
+
+/// The word `none` over a table switches off what the table asked for.
 fn merge(under: &mut Table, over: Table) {
     for (key, value) in over {
         match (under.get_mut(&key), value) {
+            (Some(Value::Table(_)), Value::String(word)) if word == "none" => drop(under.remove(&key)),
             (Some(Value::Table(under)), Value::Table(over)) => merge(under, over),
             (_, value) => drop(under.insert(key, value)),
         }
@@ -139,6 +174,38 @@ mod tests {
             assert_eq!(settings.surface.threshold, 0.3, "{name}");
             assert_eq!(settings.mode, super::super::Mode::Volume);
         }
+    }
+
+    #[test]
+    fn none_switches_off_what_a_preset_asked_for() {
+        let mut layers = Layers::default();
+        layers.preset("fetal").unwrap();
+        layers.set("light.shadow=none").unwrap();
+        let settings = layers.finish().unwrap();
+        assert!(settings.light.shadow.is_none() && settings.light.occlusion.is_some());
+    }
+
+    #[test]
+    fn a_transfer_function_may_lie_in_a_file_of_its_own() {
+        let folder = std::env::temp_dir().join(format!("echolume-transfer-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+        write(
+            "fire.toml",
+            "points = [{ at = 0, colour = [0, 0, 0], opacity = 0 }, { at = 1, colour = [1, 0.5, 0], opacity = 0.5 }]",
+        );
+        write("scene.toml", "[volume]\ntransfer = 'fire.toml'");
+        write("broken.toml", "points = [{ at = 0, color = [0, 0, 0] }]");
+        let mut layers = Layers::default();
+        layers.file(&folder.join("scene.toml")).unwrap();
+        let crate::scene::Transfer::Points(points) = layers.finish().unwrap().volume.transfer else { panic!("points") };
+        assert_eq!((points.len(), points[1].colour), (2, [1.0, 0.5, 0.0]));
+        let broken = format!("volume.transfer={}", folder.join("broken.toml").display());
+        let error = Layers::default().set(&broken).unwrap_err().to_string();
+        assert!(error.contains("broken.toml") && error.contains("color") && error.lines().count() == 1, "{error}");
+        let missing = Layers::default().set("volume.transfer=missing.toml").unwrap_err().to_string();
+        assert!(missing.contains("missing.toml: cannot be read"), "{missing}");
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

@@ -255,7 +255,7 @@ fn run_one(
     kind: &str,
     seed: u64,
 ) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
-    let turn = Turn { layer: 2, slice: scene.slices() / 2, iteration: 0, image: 0 };
+    let turn = Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration: 0, image: 0 };
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
     for bind in (pass.reads)(scene, &turn) {
@@ -329,7 +329,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         let pass = echolume::passes::by_name(name).expect("pass");
         let (inputs, right, got, writes) = run_one(&mut single, told, pass, "noise", 5);
         compare(pass, told, &right, &got, &writes).expect("unperturbed");
-        let turn = Turn { layer: 2, slice: told.slices() / 2, iteration: 0, image: 0 };
+        let turn = Turn { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
         for bind in &writes {
             let channels = bind.slot.format(told).channels();

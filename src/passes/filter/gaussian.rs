@@ -1,5 +1,5 @@
 //! 3D Gaussian in texture space (lateral, depth, elevation), one axis a pass. The two in-plane axes are filtered on each
-//! slice as it arrives; the third when its neighbours are there.
+//! slice as it arrives; the third when its neighbours are there, for the slices that a new frame is near.
 
 use crate::passes::chain::{slice_link, writes_volume};
 use crate::passes::*;
@@ -46,9 +46,12 @@ pub const ELEVATION: Pass = Pass {
     when: When::Volume,
     shader: |_, _| "filter/gaussian.volume",
     needed: |s| asked(s, 2),
-    reads: |_, _| vec![whole("source", Slot::SharpVolume)],
-    writes: |_, _| vec![whole("target", Slot::Volume)],
-    extent: |s, _| s.volume_size(),
+    reads: |s, _| {
+        let part = Part::Around(gaussian_radius(s.smoothing()[2]));
+        vec![Bind { name: "source", slot: Slot::SharpVolume, part }]
+    },
+    writes: |_, _| vec![Bind { name: "target", slot: Slot::Volume, part: Part::Around(0) }],
+    extent: |s, t| [s.grid.size[0], s.grid.size[1], t.slices],
     repeat: once,
     params: |s, t| params(s, 2, t),
     constants: |s, _| constants(s, 2),
@@ -74,7 +77,8 @@ fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &m
     let target = writes.get_mut("target");
     let deviation = scene.smoothing()[axis];
     let radius = i64::from(gaussian_radius(deviation));
-    for z in 0..source.size[2] {
+    let slices = if axis < 2 { 0..1 } else { turn.slice as usize..(turn.slice + turn.slices) as usize };
+    for z in slices {
         for y in 0..source.size[1] {
             for x in 0..source.size[0] {
                 let centre = [x, y, z];

@@ -1,0 +1,144 @@
+//! For every mode which passes and slots it has, what a change makes run again (counted from recorded dispatches), and the
+//! volume kept up to date slice by slice.
+
+use crate::common::*;
+use echolume::passes::Slot;
+use echolume::plan::{Plan, affected};
+use echolume::probe::Geometry;
+use echolume::scene::Scene;
+
+fn of(toml: &str) -> Scene {
+    let slices = if toml.contains("slices") { "" } else { "slices = { pixels = 40 }" };
+    scene(Geometry::Sweep(wobbler()), BYTES, &format!("{toml}\npicture = {{ size = [24, 24] }}\n{slices}"))
+}
+
+/// Mode (and what belongs to it), its passes, its slots.
+const MODES: &[(&str, &str, &str)] = &[
+    ("mode = 'vr'", "scan_convert raycast_volume tone", "frames scan_lut volume sweep_lut transfer picture screen"),
+    (
+        "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
+        "scan_convert raycast_volume tone",
+        "frames scan_lut volume sweep_lut pre_integrated picture screen",
+    ),
+    (
+        "mode = 'vr'\nvolume = { shading = 'first-hit' }",
+        "scan_convert raycast_volume light tone",
+        "frames scan_lut volume sweep_lut transfer distance_map veil picture screen",
+    ),
+    (
+        "mode = 'sr'",
+        "scan_convert raycast_surface light tone",
+        "frames scan_lut volume sweep_lut distance_map surface picture screen",
+    ),
+    (
+        "mode = 'mixed'",
+        "scan_convert raycast_surface raycast_volume light tone",
+        "frames scan_lut volume sweep_lut transfer distance_map surface veil picture screen",
+    ),
+    ("mode = 'mip'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
+    ("mode = 'minip'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
+    ("mode = 'mean'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
+    (
+        "mode = 'mip'\nray = { rays = 2 }",
+        "scan_convert raycast_projection assemble tone",
+        "frames scan_lut volume sweep_lut rendered picture screen",
+    ),
+];
+
+#[test]
+fn every_mode_has_its_passes_and_slots_and_no_others() {
+    for (mode, passes, slots) in MODES {
+        let plan = Plan::new(&of(mode));
+        let names: Vec<_> = plan.steps.iter().map(|s| s.pass.name).collect();
+        assert_eq!(names.join(" "), *passes, "{mode}");
+        let names: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
+        assert_eq!(names.join(" "), *slots, "{mode}");
+    }
+}
+
+type Change = fn(&mut Scene);
+
+/// What a change may touch: the names of the passes from which on everything that reads runs again.
+#[test]
+fn in_every_mode_a_change_runs_again_what_it_touches() {
+    let device = Device::new();
+    for (mode, passes, _) in MODES {
+        let base = of(mode);
+        let frames = body_frames(&base, |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+        let mut renderer = rendered(&device, base.clone(), &frames);
+        renderer.picture().expect("picture");
+        let all: Vec<&str> = passes.split(' ').collect();
+        let from = |first: &[&str]| -> Vec<&str> {
+            all.iter().position(|p| first.contains(p)).map_or(Vec::new(), |i| all[i..].to_vec())
+        };
+        let changes: [(&str, Change, Vec<&str>); 5] = [
+            ("camera", |s| s.settings.camera.azimuth = 20.0, all[1..].to_vec()),
+            (
+                "transfer function",
+                |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
+                from(&["raycast_volume"]),
+            ),
+            ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
+            ("contrast", |s| s.settings.post.contrast = 1.5, vec!["tone"]),
+            ("what the mode does not use", |s| s.settings.light.occlusion = None, vec![]),
+        ];
+        for (what, change, expected) in changes {
+            let back = renderer.scene().clone();
+            let mut settings = back.clone();
+            change(&mut settings);
+            let scene = Scene::new(settings.geometry, settings.input, settings.settings).expect("scene");
+            let names = renderer.dispatched(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
+            assert_eq!(names, expected, "{mode}: {what}");
+            renderer.change(base.clone()).expect("change");
+            renderer.picture().expect("picture");
+        }
+        let frame = vec![0u8; renderer.frame_bytes()];
+        let names = renderer.dispatched(|r| r.frame(3, &frame, 0)).expect("frame");
+        assert_eq!(names, ["scan_convert"], "{mode}: one frame");
+        let names = renderer.dispatched(|r| r.show(0).and_then(|_| r.picture())).expect("picture");
+        assert_eq!(names, all[1..], "{mode}: its volume");
+    }
+}
+
+fn smoothed() -> Scene {
+    of("mode = 'mip'\nslices = { pixels = 40, smooth = { lateral = 1.0, elevation = 0.3 } }")
+}
+
+/// The 3D filter is kept up to date slice by slice: a new frame makes only the slices near it anew, and what comes out is what
+/// filtering the whole volume gives.
+#[test]
+fn a_new_frame_refilters_only_the_slices_near_it() {
+    let device = Device::new();
+    let size = smoothed().grid.size;
+    let first = body_frames(&smoothed(), |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+    let second = body_frames(&smoothed(), |p| if p.y > 45.0 { 0.8 } else { 0.2 });
+    for slices in [vec![0], vec![4], vec![2, 3], vec![0, 8], vec![1, 7, 4]] {
+        let mut frames = first.clone();
+        let mut renderer = rendered(&device, smoothed(), &frames);
+        renderer.picture().expect("picture");
+        let format = Slot::Frames.format(&smoothed());
+        for slice in &slices {
+            frames[*slice] = second[*slice].clone();
+            renderer.frame(*slice as u32, &frames[*slice].encode(format), 0).expect("frame");
+        }
+        renderer.show(0).expect("show");
+        let recorded = renderer.recorded(|r| r.picture()).expect("picture");
+        let reach = Plan::new(&smoothed()).steps.iter().map(|s| s.reach(&smoothed())).max().expect("steps");
+        let mut changed = vec![false; frames.len()];
+        slices.iter().for_each(|s| changed[*s] = true);
+        let expected: Vec<_> = affected(&changed, reach)
+            .iter()
+            .map(|run| ("gaussian_elevation", [size[0], size[1], run.end - run.start]))
+            .collect();
+        let got: Vec<_> = recorded.into_iter().filter(|(name, _)| *name == "gaussian_elevation").collect();
+        assert_eq!(got, expected, "{slices:?}");
+        let volume = renderer.read(Slot::Volume).expect("read").expect("there");
+        let mut fresh = rendered(&device, smoothed(), &frames);
+        fresh.picture().expect("picture");
+        assert!(fresh.read(Slot::Volume).expect("read").expect("there") == volume, "{slices:?}");
+        // Nothing new: nothing to filter.
+        renderer.show(0).expect("show");
+        let names = renderer.dispatched(|r| r.picture()).expect("picture");
+        assert!(!names.contains(&"gaussian_elevation"), "{names:?}");
+    }
+}
