@@ -1,0 +1,215 @@
+//! What is done along rays, against formulas: clip planes, growing steps, the sliding filter, pre-integration, hits, veils, and
+//! several rays a pixel.
+
+use crate::common::*;
+use echolume::passes::{Slot, Texels, is_hit};
+use echolume::probe::{Axis, Geometry, Grid};
+use echolume::scene::Scene;
+use glam::DVec3;
+
+/// A block of n^3 voxels of 0.5 mm; half a voxel beyond the outer centres is part of it.
+fn block(n: usize) -> Geometry {
+    Geometry::Cartesian(Grid { size: [n; 3], spacing: [0.5; 3], origin: [0.0; 3] })
+}
+
+fn slot(device: &Device, scene: &Scene, body: impl Fn(DVec3) -> f64, slot: Slot) -> Texels {
+    let mut renderer = rendered(device, scene.clone(), &body_frames(scene, body));
+    renderer.picture().expect("picture");
+    renderer.read(slot).expect("read").expect("there")
+}
+
+fn even(opacity: f64) -> String {
+    format!("transfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = {opacity} }}]")
+}
+
+/// Beer-Lambert over what a slanted plane leaves of each ray.
+#[test]
+fn a_clip_plane_cuts_each_ray_where_it_meets_it() {
+    let device = Device::new();
+    let (at, normal) = (DVec3::new(5.0, 6.0, 5.0), DVec3::new(0.9, -1.0, 0.3));
+    let toml = format!(
+        "mode = 'vr'\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.7, early_end = 0.0 }}\nvolume = {{ {} }}\n\
+         clip = [{{ at = {:?}, normal = {:?} }}]",
+        even(0.05),
+        at.to_array(),
+        normal.to_array()
+    );
+    let scene = scene(block(20), BYTES, &toml);
+    let picture = slot(&device, &scene, |_| 0.5, Slot::Picture);
+    let (mut cut, mut gone) = (0, 0);
+    for (x, y) in (0..256).map(|i| (i % 16, i / 16)) {
+        let (origin, _) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        // Kept is normal . (p - at) <= 0 along y: everything below one depth.
+        let depth = (normal.dot(at) - normal.x * origin.x - normal.z * origin.z) / normal.y;
+        let path = (9.75 - depth.max(-0.25)).max(0.0);
+        let expected = -(path / 0.5 * (-0.05f64).ln_1p()).exp_m1();
+        assert!((picture.get([x, y, 0])[3] - expected).abs() < 1e-3, "at {x}, {y}");
+        cut += u32::from(depth > -0.25 && path > 0.0);
+        gone += u32::from(path == 0.0);
+    }
+    assert!(cut > 100 && gone > 5, "{cut} rays are cut, {gone} are gone");
+}
+
+fn sphere_scene(ray: &str) -> Scene {
+    let mut probe = wobbler();
+    probe.lines = Axis::centred(1.1 / 127.0, 128);
+    probe.slices = Axis::centred(0.8 / 60.0, 61);
+    (probe.sample_pitch, probe.samples) = (0.2, 256);
+    let toml = format!(
+        "mode = 'sr'\npicture = {{ size = [48, 48] }}\nray = {{ step = 0.2, {ray} }}\nsurface = {{ threshold = 0.2 }}
+         camera = {{ zoom = 3.0, target = [1.5, 30.0, -2.0], elevation = 10, field_of_view = 20 }}"
+    );
+    scene(Geometry::Sweep(probe), FLOATS, &toml)
+}
+
+/// The filter's deviation is one step, 0.2 mm grown to 0.4: towards the limb it rounds the edge off.
+/// A surface stays where it is whether its samples lie evenly, spread apart with the range, or are filtered on the way.
+#[test]
+fn a_sphere_stays_with_growing_steps_and_with_the_sliding_filter() {
+    let device = Device::new();
+    let (centre, radius) = (DVec3::new(1.5, 50.0, -2.0), 9.0);
+    for (ray, limit) in [("spread = 1.0", 0.15), ("sliding = 3", 0.12), ("sliding = 5, spread = 1.0", 0.35)] {
+        let scene = sphere_scene(ray);
+        let body = |p: DVec3| ((radius - p.distance(centre)) / 0.6 + 0.5).clamp(0.0, 1.0);
+        let (hits, worst) = sphere_error(&scene, &slot(&device, &scene, body, Slot::Distance), centre, radius);
+        println!("{ray}: {hits} hits, at most {worst:.3} mm off");
+        assert!(hits > 250 && worst < limit, "{ray}: {hits} hits, {worst} mm");
+    }
+}
+
+/// One sample a ray, on the lattice of voxels: the filter leaves a linear field alone and takes from noise what the sum of its
+/// squared weights says.
+#[test]
+fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say() {
+    let device = Device::new();
+    // The ray's third sample of five, everything about it within the volume.
+    let at = |sliding: u32| {
+        let toml = format!(
+            "mode = 'mean'\npicture = {{ size = [24, 24] }}\nregion = {{ depth = [5.75, 6.25] }}
+             ray = {{ step = 0.5, sliding = {sliding}, sampling = 'exact' }}\nslices = {{ format = 'r32f' }}"
+        );
+        scene(block(24), FLOATS, &toml)
+    };
+    let noise = |p: DVec3| {
+        // Splitmix64 of the voxel's number.
+        let n = (p * 2.0).round();
+        let mut z = (n.x as u64 * 1_000_003 + n.y as u64 * 10_007 + n.z as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let inner = |picture: &Texels| -> Vec<f64> { (0..400).map(|i| picture.one(2 + i % 20, 2 + i / 20, 0)).collect() };
+    let variance = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
+    };
+    let raw = variance(&inner(&slot(&device, &at(0), noise, Slot::Picture)));
+    for sliding in [3, 5] {
+        let scene = at(sliding);
+        let field = |p: DVec3| 0.1 + 0.03 * p.x + 0.02 * p.y + 0.01 * p.z;
+        let picture = slot(&device, &scene, field, Slot::Picture);
+        for (x, y) in (0..400).map(|i| (2 + i % 20, 2 + i / 20)) {
+            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+            let place = origin + direction * ((6.0 - origin.y) / direction.y);
+            assert!((picture.one(x, y, 0) - field(place)).abs() < 5e-4, "sliding {sliding} at {x}, {y}");
+        }
+        let reach = (sliding / 2) as i32;
+        let weight = |k: i32| (-f64::from(k * k) / f64::from(reach)).exp();
+        let sum: f64 = (-reach..=reach).map(weight).sum();
+        let squares: f64 = (-reach..=reach).map(|k| (weight(k) / sum).powi(2)).sum();
+        let quiet = variance(&inner(&slot(&device, &scene, noise, Slot::Picture)));
+        println!("sliding {sliding}: variance {:.4} of the noise's, weights say {:.4}", quiet / raw, squares.powi(3));
+        assert!((quiet / raw / squares.powi(3) - 1.0).abs() < 0.25, "sliding {sliding}: {}", quiet / raw);
+    }
+}
+
+/// A thin opaque layer of the transfer function, which long steps jump over.
+#[test]
+fn pre_integration_sees_a_layer_that_long_steps_jump_over() {
+    let device = Device::new();
+    let opacity = |step: f64, compositing: &str| {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [4, 4] }}\nray = {{ step = {step}, early_end = 0.0, sampling = 'exact' }}
+             slices = {{ format = 'r32f' }}\n[volume]\ncompositing = '{compositing}'
+             transfer = [{{ at = 0.48, colour = [1.0, 0.2, 0.1], opacity = 0.0 }}, {{ at = 0.5, colour = [1.0, 0.2, 0.1], opacity = 0.4 }},
+                         {{ at = 0.52, colour = [1.0, 0.2, 0.1], opacity = 0.0 }}]"
+        );
+        let scene = scene(block(20), FLOATS, &toml);
+        slot(&device, &scene, |p| 0.03 + p.y / 10.0, Slot::Picture).get([2, 2, 0])[3]
+    };
+    let fine = opacity(0.004, "corrected");
+    for step in [0.3, 1.1, 2.7] {
+        let (corrected, integrated) = (opacity(step, "corrected"), opacity(step, "pre-integrated"));
+        println!("step {step}: corrected {corrected:.4}, pre-integrated {integrated:.4}, truth {fine:.4}");
+        assert!((integrated / fine - 1.0).abs() < 0.03, "step {step}: {integrated} for {fine}");
+        assert!((corrected / fine - 1.0).abs() > 0.1, "step {step} should miss or exaggerate it: {corrected}");
+    }
+    // Riemann's a = y is over one where the medium is thick: clamped, not more than opaque.
+    assert_eq!(opacity_of_thick(&device), 1.0);
+}
+
+fn opacity_of_thick(device: &Device) -> f64 {
+    let toml = format!(
+        "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = 5.0, early_end = 0.0 }}\nvolume = {{ compositing = 'riemann', {} }}",
+        even(0.5)
+    );
+    let scene = scene(block(20), BYTES, &toml);
+    slot(device, &scene, |_| 0.5, Slot::Picture).get([1, 1, 0])[3]
+}
+
+/// Through an even medium, opacity h is reached after -ln(1 - h) / kappa, and a veil is what lies before the surface.
+#[test]
+fn a_hit_lies_where_the_ray_is_opaque_enough_and_a_veil_ends_at_the_surface() {
+    let device = Device::new();
+    for step in [0.07, 0.5, 1.5] {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [4, 4] }}\nray = {{ step = {step}, early_end = 0.0 }}
+             volume = {{ shading = 'first-hit', hit = 0.4, {} }}",
+            even(0.05)
+        );
+        let scene = scene(block(20), BYTES, &toml);
+        let distance = slot(&device, &scene, |_| 0.5, Slot::Distance).one(2, 2, 0);
+        let (origin, _) = scene.rays.at(2.5, 2.5);
+        let expected = -0.25 - origin.y + 0.5 * (1.0f64 - 0.4).ln() / (1.0f64 - 0.05).ln();
+        // Within a step it is put in proportion to the opacity, which bends by kappa h / 8.
+        assert!((distance - expected).abs() < 0.02 * step + 1e-4, "step {step}: {distance} for {expected}");
+    }
+    let toml = format!(
+        "mode = 'mixed'\npicture = {{ size = [4, 4] }}\nray = {{ step = 0.2, early_end = 0.0 }}
+         volume = {{ {} }}\nsurface = {{ threshold = 0.2 }}",
+        even(0.03)
+    );
+    let scene = scene(block(20), FLOATS, &toml);
+    let body = |p: DVec3| ((p.y - 5.7) / 0.8 + 0.5).clamp(0.1, 0.9);
+    let distance = slot(&device, &scene, body, Slot::Distance).one(2, 2, 0);
+    assert!(is_hit(distance));
+    let (origin, _) = scene.rays.at(2.5, 2.5);
+    assert!((origin.y + distance - 5.7).abs() < 0.05, "the surface lies at {}", origin.y + distance);
+    let veil = slot(&device, &scene, body, Slot::Veil).get([2, 2, 0])[3];
+    let expected = -((origin.y + distance + 0.25) / 0.5 * (-0.03f64).ln_1p()).exp_m1();
+    assert!((veil - expected).abs() < 5e-4, "{veil} for {expected}");
+}
+
+/// The edge of an opaque block covers part of its pixels: with 4 x 4 rays to an eighth.
+#[test]
+fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
+    let device = Device::new();
+    let toml = format!(
+        "mode = 'vr'\npicture = {{ size = [21, 21] }}\nray = {{ rays = 4 }}\ncamera = {{ zoom = 0.7 }}\nvolume = {{ {} }}",
+        even(1.0)
+    );
+    let scene = scene(block(20), BYTES, &toml);
+    assert_eq!(scene.ray_size(), [84, 84]);
+    let picture = slot(&device, &scene, |_| 0.5, Slot::Picture);
+    // mm of a pixel, and of its left edge: rays are those of the finer lattice.
+    let pixel = 4.0 * scene.rays.origin_dx.x;
+    let mut partly = 0;
+    for x in 0..21 {
+        let left = scene.rays.origin.x + pixel * x as f64;
+        let covered = (((left + pixel).min(9.75) - left.max(-0.25)) / pixel).clamp(0.0, 1.0);
+        let got = picture.get([x, 10, 0])[3];
+        assert!((got - covered).abs() <= 0.126, "column {x}: {got} for {covered}");
+        partly += u32::from(covered > 0.0 && covered < 1.0);
+    }
+    assert!(partly >= 2);
+}
