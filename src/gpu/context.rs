@@ -10,6 +10,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::HashMap;
 use std::ffi::{CStr, CString, c_void};
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -30,6 +31,8 @@ pub struct Context {
     pub limits: vk::PhysicalDeviceLimits,
     pub device: ash::Device,
     pub push_descriptor: ash::khr::push_descriptor::Device,
+    /// Reads the device's clock, where it can be read.
+    clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
     queue: Mutex<vk::Queue>,
     /// Families that slots which cross queues are shared between; one here until a device offers more.
@@ -146,6 +149,7 @@ impl Context {
         };
         let context = Arc::new(Context {
             push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
+            clock: (candidate.calibrated).then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
             // SAFETY: the device was created with one queue of this family.
             queue: Mutex::new(unsafe { device.get_device_queue(candidate.queue_family, 0) }),
@@ -171,6 +175,16 @@ impl Context {
     /// What validation has said so far; silence is the pass mark.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// A time stamp of the device, and when the host read it; none where the device's clock cannot be read.
+    pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
+        let clock = self.clock.as_ref()?;
+        let info = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let before = Instant::now();
+        // SAFETY: the extension is enabled; the device's own domain is always among its domains.
+        let (ticks, _) = unsafe { clock.get_calibrated_timestamps(&info) }.ok()?;
+        Some((*ticks.first()?, before + before.elapsed() / 2))
     }
 
     /// Features of a format in optimal tiling.
@@ -241,8 +255,10 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate) -> Result<ash:
     let priorities = [1.0];
     let queues =
         [vk::DeviceQueueCreateInfo::default().queue_family_index(candidate.queue_family).queue_priorities(&priorities)];
-    let extensions = [ash::khr::push_descriptor::NAME.as_ptr()];
+    let mut extensions = vec![ash::khr::push_descriptor::NAME.as_ptr()];
+    extensions.extend(candidate.calibrated.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     let core = vk::PhysicalDeviceFeatures::default()
+        .pipeline_statistics_query(candidate.statistics)
         .shader_storage_image_extended_formats(true)
         .shader_storage_image_write_without_format(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default()

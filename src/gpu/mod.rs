@@ -1,7 +1,7 @@
 //! The only folder that knows Vulkan, and the only one with unsafe code.
 //!
 //! [`context`] owns instance, device, queue and allocator; [`resources`] images and buffers; [`pipelines`] what a shader
-//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`timeline`] what is done;
+//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`measured`] what those said; [`timeline`] what is done;
 //! [`renderer`] the four stages; [`single`] one pass alone, for tests.
 
 pub mod context;
@@ -10,6 +10,7 @@ pub mod faults;
 pub mod formats;
 #[cfg(feature = "hot-reload")]
 pub mod hot_reload;
+pub mod measured;
 pub mod order;
 pub mod pipelines;
 pub mod recorder;

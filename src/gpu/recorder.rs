@@ -3,14 +3,15 @@
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
+use super::measured::Measured;
 use super::order::Order;
 use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Buffer, Image, Purpose, WHOLE};
 use super::slots::{Resource, Slots};
 use super::timeline::Timeline;
-use super::timing::{self, Stamps};
+use super::timing::Stamps;
 use crate::barriers::{self, Access, Worker};
-use crate::passes::{Part, Pass, PassTime, Slot, Turn, contract};
+use crate::passes::{Part, Pass, Slot, Turn, contract};
 use crate::scene::Scene;
 use crate::spirv::Kind;
 use ash::vk;
@@ -56,10 +57,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    pub fn new(context: &Arc<Context>, label: &'static str) -> Result<Recorder, GpuError> {
+    /// With `statistics` the invocations of every dispatch are counted, where the device can.
+    pub fn new(context: &Arc<Context>, label: &'static str, statistics: bool) -> Result<Recorder, GpuError> {
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.candidate.queue_family);
         let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
-        let stamps = Stamps::new(context, STAMPS)?;
+        let stamps = Stamps::new(context, STAMPS, statistics)?;
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_command_pool(&create, None) }.doing(|| "create commands".into())?;
         context.name(pool, label);
@@ -106,14 +108,15 @@ impl Recorder {
     }
 
     /// Adds the times of the last submission, once, when it is done.
-    pub fn collect(&mut self, timeline: &Timeline, times: &mut Vec<PassTime>) -> Result<(), GpuError> {
+    pub fn collect(&mut self, timeline: &Timeline, measured: &mut Measured) -> Result<(), GpuError> {
         if self.collected_to == self.done_at {
             return Ok(());
         }
         timeline.wait(self.done_at)?;
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
-            timing::add(times, &stamps.read()?);
+            let (bits, period) = (self.context.candidate.valid_bits, self.context.limits.timestamp_period);
+            measured.add(&stamps.read()?, bits, period);
         }
         Ok(())
     }
@@ -186,15 +189,17 @@ impl Recorder {
         self.bind(work, offset, block.len() as u64);
         let extent = (pass.extent)(scene, turn);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
+        let (device, commands) = (&self.context.device, self.commands);
+        // Before any query begins: lavapipe looks at the pipeline then.
+        // SAFETY: the pipeline is alive until the device is done.
+        unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
         // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
-        unsafe {
-            self.context.device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle);
-            self.context.device.cmd_dispatch(self.commands, groups[0], groups[1], groups[2]);
+        let dispatch = || unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
+        match &mut self.stamps {
+            Some(stamps) => stamps.dispatch(commands, pass.name, dispatch),
+            None => dispatch(),
         }
         self.context.end_label(self.commands);
-        if let Some(stamps) = &mut self.stamps {
-            stamps.end_of(self.commands, pass.name);
-        }
         if let Some(dispatched) = &mut order.dispatched {
             dispatched.push((pass.name, extent));
         }

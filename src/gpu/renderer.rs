@@ -3,6 +3,7 @@
 
 use super::GpuError;
 use super::context::Context;
+use super::measured::Measured;
 use super::order::Order;
 use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
 use super::recorder::{Place, Recorder, Work};
@@ -10,7 +11,7 @@ use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timeline;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
-use crate::passes::{PassTime, Slot, Texels, Turn, When};
+use crate::passes::{PassTime, Slot, Span, Texels, Turn, When};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::scene::Scene;
@@ -21,11 +22,13 @@ pub struct Options {
     /// Volume images that take turns: 1 for a still picture, 2 or 3 while frames arrive during rendering.
     pub volume_images: u32,
     pub shaders: Arc<Shaders>,
+    /// Keep every span of time, host and device, and count invocations.
+    pub spans: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { volume_images: 1, shaders: embedded() }
+        Options { volume_images: 1, shaders: embedded(), spans: false }
     }
 }
 
@@ -61,7 +64,8 @@ pub struct Renderer {
     next_lane: usize,
     /// The volume image that is shown.
     shown: u32,
-    times: Vec<PassTime>,
+    measured: Measured,
+    spans: bool,
 }
 
 impl Renderer {
@@ -76,7 +80,7 @@ impl Renderer {
         let steps = pipelines_of(&mut pipelines, &plan, &scene)?;
         let mut renderer = Renderer {
             lanes: Vec::new(),
-            picture: Recorder::new(context, "picture")?,
+            picture: Recorder::new(context, "picture", options.spans)?,
             readback: readback(context, &scene)?,
             slots: Slots::new(context, options.volume_images.max(1)),
             steps,
@@ -94,9 +98,10 @@ impl Renderer {
             scene,
             next_lane: 0,
             shown: 0,
-            times: Vec::new(),
+            measured: Measured::new(context, options.spans),
+            spans: options.spans,
         };
-        renderer.lanes = lanes(context, &renderer.scene)?;
+        renderer.lanes = lanes(context, &renderer.scene, options.spans)?;
         renderer.forget_volumes();
         renderer.fit()?;
         Ok(renderer)
@@ -187,9 +192,9 @@ impl Renderer {
         let layer = self.next_lane;
         self.next_lane = (layer + 1) % self.lanes.len();
         let Lane { recorder, staging } = &mut self.lanes[layer];
-        recorder.collect(&self.timeline, &mut self.times)?;
+        recorder.collect(&self.timeline, &mut self.measured)?;
         recorder.begin(&mut self.order, &self.timeline)?;
-        staging.bytes_mut().copy_from_slice(bytes);
+        self.measured.host("stage", || staging.bytes_mut().copy_from_slice(bytes));
         if let Some(frames) = self.slots.image(Slot::Frames, 0) {
             let place = Place { slot: Slot::Frames, copy: 0, parts: layer as u32..layer as u32 + 1 };
             recorder.copy_in(&mut self.order, staging, frames, place);
@@ -200,7 +205,7 @@ impl Renderer {
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             recorder.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
         }
-        recorder.submit(&mut self.timeline)?;
+        self.measured.host("submit", || recorder.submit(&mut self.timeline))?;
         self.unseen[image as usize][slice as usize] = true;
         Ok(())
     }
@@ -225,7 +230,7 @@ impl Renderer {
 
     fn draw(&mut self) -> Result<(), GpuError> {
         self.plan.complete(&self.scene, &mut self.stale, &self.contents);
-        self.picture.collect(&self.timeline, &mut self.times)?;
+        self.picture.collect(&self.timeline, &mut self.measured)?;
         self.picture.begin(&mut self.order, &self.timeline)?;
         let unseen = &self.unseen[self.shown as usize];
         let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
@@ -248,8 +253,9 @@ impl Renderer {
             self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, &self.readback);
             self.picture.stamp("readback");
         }
-        self.picture.submit(&mut self.timeline)?;
-        self.timeline.wait_all()?;
+        let (picture, timeline) = (&mut self.picture, &mut self.timeline);
+        self.measured.host("submit", || picture.submit(timeline))?;
+        self.measured.host("wait", || self.timeline.wait_all())?;
         // A frame that has arrived since without its volume being shown is seen the next time.
         if self.plan.steps_of(When::Volume).all(|(i, _)| self.stale[i]) {
             self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);
@@ -292,7 +298,7 @@ impl Renderer {
                 self.forget_volumes();
                 if *rerun == Rerun::Everything {
                     self.slots.clear();
-                    self.lanes = lanes(&self.context, &self.scene)?;
+                    self.lanes = lanes(&self.context, &self.scene, self.spans)?;
                     self.next_lane = 0;
                 }
                 self.plan.slots.clone()
@@ -315,7 +321,7 @@ impl Renderer {
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
         let (format, size) = (image.format, size_of(image.shape));
         let copy = if slot.takes_turns() { self.shown } else { 0 };
-        self.picture.collect(&self.timeline, &mut self.times)?;
+        self.picture.collect(&self.timeline, &mut self.measured)?;
         self.picture.begin(&mut self.order, &self.timeline)?;
         self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);
         self.picture.submit(&mut self.timeline)?;
@@ -331,16 +337,22 @@ impl Renderer {
     /// Times of every pass since the last call, and of what was copied. Empty where the device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
-        Ok(std::mem::take(&mut self.times))
+        Ok(self.measured.take_times())
+    }
+
+    /// Every span since the last call, if they are kept, on the host's clock.
+    pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
+        self.collect()?;
+        Ok(self.measured.take_spans())
     }
 
     /// Waits until the device has done everything, and adds up what was measured.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.timeline.wait_all()?;
         for lane in &mut self.lanes {
-            lane.recorder.collect(&self.timeline, &mut self.times)?;
+            lane.recorder.collect(&self.timeline, &mut self.measured)?;
         }
-        self.picture.collect(&self.timeline, &mut self.times)
+        self.picture.collect(&self.timeline, &mut self.measured)
     }
 
     /// Names of the passes that `work` dispatched, in order.
@@ -381,10 +393,10 @@ fn frame_bytes(scene: &Scene) -> u64 {
     Slot::Frames.bytes(scene) / u64::from(FRAMES_IN_FLIGHT)
 }
 
-fn lanes(context: &Arc<Context>, scene: &Scene) -> Result<Vec<Lane>, GpuError> {
+fn lanes(context: &Arc<Context>, scene: &Scene, spans: bool) -> Result<Vec<Lane>, GpuError> {
     let lane = |_| {
         Ok(Lane {
-            recorder: Recorder::new(context, "frame")?,
+            recorder: Recorder::new(context, "frame", spans)?,
             staging: Buffer::new(context, "staging", frame_bytes(scene), Purpose::Staging)?,
         })
     };

@@ -36,7 +36,12 @@ pub struct Candidate {
     /// What is optional and not there.
     pub without: Vec<&'static str>,
     pub queue_family: u32,
+    /// Of time stamps; 0 for none.
     pub valid_bits: u32,
+    /// Time stamps can be put on the host's clock.
+    pub calibrated: bool,
+    /// Shader invocations can be counted.
+    pub statistics: bool,
     pub limits: vk::PhysicalDeviceLimits,
     /// Largest allocation and largest buffer, whichever is less.
     pub max_bytes: u64,
@@ -124,6 +129,15 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     if valid_bits == 0 {
         without.push("time stamps: no times are printed");
     }
+    let calibrated = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
+    if !calibrated {
+        without.push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
+    }
+    // SAFETY: as above.
+    let statistics = unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
+    if !statistics {
+        without.push("pipelineStatisticsQuery: invocations are not counted");
+    }
     if !has(ash::ext::memory_budget::NAME) {
         without.push("VK_EXT_memory_budget");
     }
@@ -137,6 +151,8 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         without,
         queue_family: family.unwrap_or(0) as u32,
         valid_bits,
+        calibrated,
+        statistics,
         limits: properties.limits,
         // A driver older than 1.3 leaves this 0; it is refused anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
@@ -188,6 +204,8 @@ mod tests {
             without: vec![],
             queue_family: 0,
             valid_bits: 64,
+            calibrated: true,
+            statistics: true,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }

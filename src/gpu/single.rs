@@ -40,7 +40,7 @@ impl Single {
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, turn.image + 1);
         let mut timeline = Timeline::new(&self.context)?;
-        let mut recorder = Recorder::new(&self.context, pass.name)?;
+        let mut recorder = Recorder::new(&self.context, pass.name, false)?;
         let mut order = Order::default();
         let pipeline = self.pipelines.get(pass, scene, turn)?;
         let new = slots.fit(&plan, scene)?;

@@ -3,7 +3,6 @@
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
-use crate::passes::PassTime;
 use ash::vk;
 use std::sync::Arc;
 
@@ -12,8 +11,20 @@ pub struct Stamps {
     context: Arc<Context>,
     pool: vk::QueryPool,
     capacity: u32,
-    /// What lies between stamp i and i + 1.
-    between: Vec<&'static str>,
+    /// What lies between stamp i and i + 1, and the query that counted its invocations.
+    between: Vec<(&'static str, Option<u32>)>,
+    statistics: Option<vk::QueryPool>,
+    /// Statistics queries used.
+    counted: u32,
+}
+
+/// What one pair of stamps enclosed, in ticks of the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stamp {
+    pub name: &'static str,
+    pub from: u64,
+    pub to: u64,
+    pub invocations: Option<u64>,
 }
 
 /// Time from one stamp to the next in ns; the counter has `valid_bits` bits and wraps.
@@ -22,9 +33,18 @@ pub fn elapsed(from: u64, to: u64, valid_bits: u32, period: f32) -> f64 {
     (to.wrapping_sub(from) & mask) as f64 * f64::from(period)
 }
 
+/// Ticks from one stamp to another that may lie before it: the shorter way round.
+pub fn signed_ticks(from: u64, to: u64, valid_bits: u32) -> i64 {
+    let unused = 64 - valid_bits.clamp(1, 64);
+    // The sign bit of the counter becomes that of the result.
+    (to.wrapping_sub(from) << unused) as i64 >> unused
+}
+
 impl Stamps {
     /// None where the device's queue has no time stamps.
-    pub fn new(context: &Arc<Context>, capacity: u32) -> Result<Option<Stamps>, GpuError> {
+    ///
+    /// With `statistics` invocations are counted too, where the device can.
+    pub fn new(context: &Arc<Context>, capacity: u32, statistics: bool) -> Result<Option<Stamps>, GpuError> {
         if context.candidate.valid_bits == 0 {
             return Ok(None);
         }
@@ -32,14 +52,28 @@ impl Stamps {
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_query_pool(&create, None) }.doing(|| "create time stamps".into())?;
         context.name(pool, "time stamps");
-        Ok(Some(Stamps { context: context.clone(), pool, capacity, between: Vec::new() }))
+        let mut stamps =
+            Stamps { context: context.clone(), pool, capacity, between: Vec::new(), statistics: None, counted: 0 };
+        if statistics && context.candidate.statistics {
+            let create = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::PIPELINE_STATISTICS)
+                .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS)
+                .query_count(capacity);
+            // SAFETY: the create structure is complete and the feature enabled; a failure drops `stamps`, which frees its pool.
+            let pool = unsafe { context.device.create_query_pool(&create, None) };
+            stamps.statistics = Some(pool.doing(|| "create statistics".into())?);
+        }
+        Ok(Some(stamps))
     }
 
     /// Starts anew: the first stamp.
     pub(super) fn begin(&mut self, commands: vk::CommandBuffer) {
         self.between.clear();
-        // SAFETY: the device is done with this pool's last use, or the command buffer could not be recorded anew.
-        unsafe { self.context.device.reset_query_pool(self.pool, 0, self.capacity) };
+        self.counted = 0;
+        for pool in [Some(self.pool), self.statistics].into_iter().flatten() {
+            // SAFETY: the device is done with this pool's last use, or the command buffer could not be recorded anew.
+            unsafe { self.context.device.reset_query_pool(pool, 0, self.capacity) };
+        }
         self.stamp(commands, 0);
     }
 
@@ -47,8 +81,25 @@ impl Stamps {
     pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str) {
         let at = self.between.len() as u32 + 1;
         if at < self.capacity {
-            self.between.push(name);
+            self.between.push((name, None));
             self.stamp(commands, at);
+        }
+    }
+
+    /// A dispatch, recorded by `work`: stamped, and its invocations counted where asked for.
+    pub(super) fn dispatch(&mut self, commands: vk::CommandBuffer, name: &'static str, work: impl FnOnce()) {
+        let pool = self.statistics.filter(|_| self.counted < self.capacity);
+        let (device, query) = (&self.context.device, self.counted);
+        // SAFETY: the command buffer is being recorded; the query is below the capacity, was reset, and ends below.
+        pool.iter()
+            .for_each(|p| unsafe { device.cmd_begin_query(commands, *p, query, vk::QueryControlFlags::empty()) });
+        work();
+        // SAFETY: as above.
+        pool.iter().for_each(|p| unsafe { device.cmd_end_query(commands, *p, query) });
+        self.counted += u32::from(pool.is_some());
+        self.end_of(commands, name);
+        if let (Some(_), Some(last)) = (pool, self.between.last_mut()) {
+            last.1 = Some(query);
         }
     }
 
@@ -58,37 +109,39 @@ impl Stamps {
         unsafe { device.cmd_write_timestamp2(commands, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, at) };
     }
 
-    /// Names and times in ns, once the device is done.
-    pub fn read(&self) -> Result<Vec<(&'static str, f64)>, GpuError> {
-        let mut stamps = vec![0u64; self.between.len() + 1];
-        if self.between.is_empty() {
+    /// What was stamped, once the device is done.
+    pub fn read(&self) -> Result<Vec<Stamp>, GpuError> {
+        let ticks = self.results(self.pool, self.between.len() as u32 + 1)?;
+        let counts = match self.statistics {
+            Some(pool) => self.results(pool, self.counted)?,
+            None => Vec::new(),
+        };
+        let pairs = self.between.iter().zip(ticks.windows(2));
+        Ok(pairs
+            .map(|((name, query), w)| {
+                let invocations = query.and_then(|q| counts.get(q as usize).copied());
+                Stamp { name, from: w[0], to: w[1], invocations }
+            })
+            .collect())
+    }
+
+    fn results(&self, pool: vk::QueryPool, count: u32) -> Result<Vec<u64>, GpuError> {
+        let mut results = vec![0u64; count as usize];
+        if self.between.is_empty() || count == 0 {
             return Ok(Vec::new());
         }
         // SAFETY: the pool is alive; every query read was written by the command buffer that has finished.
-        unsafe { self.context.device.get_query_pool_results(self.pool, 0, &mut stamps, vk::QueryResultFlags::TYPE_64) }
+        unsafe { self.context.device.get_query_pool_results(pool, 0, &mut results, vk::QueryResultFlags::TYPE_64) }
             .doing(|| "read time stamps".into())?;
-        let (bits, period) = (self.context.candidate.valid_bits, self.context.limits.timestamp_period);
-        let times = stamps.windows(2).map(|w| elapsed(w[0], w[1], bits, period));
-        Ok(self.between.iter().copied().zip(times).collect())
+        Ok(results)
     }
 }
 
 impl Drop for Stamps {
     fn drop(&mut self) {
-        // SAFETY: whoever drops the stamps has waited for the device.
-        unsafe { self.context.device.destroy_query_pool(self.pool, None) };
-    }
-}
-
-/// Adds what one command buffer measured.
-pub fn add(times: &mut Vec<PassTime>, measured: &[(&'static str, f64)]) {
-    for &(name, ns) in measured {
-        match times.iter_mut().find(|t| t.name == name) {
-            Some(time) => {
-                time.runs += 1;
-                time.total += ns;
-            }
-            None => times.push(PassTime { name, runs: 1, total: ns }),
+        for pool in [Some(self.pool), self.statistics].into_iter().flatten() {
+            // SAFETY: whoever drops the stamps has waited for the device.
+            unsafe { self.context.device.destroy_query_pool(pool, None) };
         }
     }
 }
@@ -112,10 +165,9 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_one_pass_are_added_up() {
-        let mut times = Vec::new();
-        add(&mut times, &[("a", 1.0), ("b", 2.0)]);
-        add(&mut times, &[("a", 3.0)]);
-        assert_eq!(times[0], PassTime { name: "a", runs: 2, total: 4.0 });
+    fn a_stamp_that_lies_before_another_is_so_many_ticks_before_it() {
+        assert_eq!(signed_ticks(100, 90, 64), -10);
+        assert_eq!(signed_ticks(5, (1 << 36) - 5, 36), -10);
+        assert_eq!(signed_ticks((1 << 36) - 5, (9 << 36) | 5, 36), 10);
     }
 }

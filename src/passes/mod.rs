@@ -257,6 +257,17 @@ pub struct PassTime {
     pub total: f64,
 }
 
+/// Something that took time, on the clock of the run: ns since it began.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Span {
+    pub name: &'static str,
+    pub on_device: bool,
+    pub begin: f64,
+    pub end: f64,
+    /// Shader invocations that the device counted, where it does.
+    pub invocations: Option<u64>,
+}
+
 /// The pass of that name.
 pub fn by_name(name: &str) -> Option<&'static Pass> {
     PASSES.iter().find(|p| p.name == name)

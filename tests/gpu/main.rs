@@ -14,4 +14,5 @@ mod rays;
 mod recordings;
 mod reruns;
 mod shading;
+mod timing;
 mod truth;
