@@ -12,6 +12,8 @@
     ("filter/sigma.slice", include_bytes!("filter/sigma.slice.spv")),
     ("filter/sigma.distance", include_bytes!("filter/sigma.distance.spv")),
     ("filter/sigma.picture", include_bytes!("filter/sigma.picture.spv")),
+    ("measure/copy", include_bytes!("measure/copy.spv")),
+    ("measure/sampling.plain", include_bytes!("measure/sampling.plain.spv")),
     ("postprocess/assemble.alone", include_bytes!("postprocess/assemble.alone.spv")),
     ("postprocess/assemble.four", include_bytes!("postprocess/assemble.four.spv")),
     ("postprocess/tone", include_bytes!("postprocess/tone.spv")),

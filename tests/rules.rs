@@ -1,7 +1,7 @@
 //! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
 //! Needs no GPU.
 
-use echolume::passes::{PASSES, Pass, Turn, contract};
+use echolume::passes::{PASSES, Pass, Turn, contract, measure};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene};
 use echolume::shader_source;
@@ -171,6 +171,13 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                 used.push(shader);
             }
         }
+    }
+    let scene = measure::scene(8, 8).expect("scene");
+    for pass in measure::MEASURES {
+        let shader = (pass.shader)(&scene, &Turn::default());
+        let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
+        contract::check(pass, &scene, &Turn::default(), &module).expect("agreement");
+        used.push(shader);
     }
     for (name, _) in spirv::EMBEDDED {
         assert!(used.contains(name), "no scene uses {name}");

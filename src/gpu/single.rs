@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use super::context::Context;
+use super::measured::Measured;
 use super::order::Order;
 use super::pipelines::{Pipelines, embedded};
 use super::recorder::{Place, Recorder, Work};
@@ -97,6 +98,37 @@ impl Single {
         }
         Ok(outputs)
     }
+}
+
+/// Times of `count` dispatches of one pass in a row, ns, over slots that hold zeros; empty where the device has no time stamps.
+/// The first, which compiles, is left out.
+pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
+    let turn = Turn::default();
+    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+    let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
+    let mut slots = Slots::new(context, 1);
+    let mut timeline = Timeline::new(context)?;
+    let mut recorder = Recorder::new(context, pass.name, false)?;
+    let mut order = Order::default();
+    let mut pipelines = Pipelines::new(context, embedded())?;
+    let pipeline = pipelines.get(pass, scene, &turn)?;
+    let new = slots.fit(&plan, scene)?;
+    let mut times = Vec::new();
+    for n in 0..=count {
+        recorder.begin(&mut order, &timeline)?;
+        if n == 0 {
+            recorder.clear_new(&mut order, &slots, &new);
+        }
+        let work = Work { slots: &slots, pipeline: &pipeline, scene, pass, turn: &turn };
+        let done = recorder.dispatch(&mut order, &work).and_then(|()| recorder.submit(&mut timeline));
+        timeline.drain();
+        done?;
+        let mut measured = Measured::new(context, false);
+        recorder.collect(&timeline, &mut measured)?;
+        let taken = measured.take_times();
+        times.extend(taken.iter().filter(|t| n > 0 && t.name == pass.name).map(|t| t.total));
+    }
+    Ok(times)
 }
 
 /// The bytes that a slot read by a pass holds: the caller's, or the scene's own.

@@ -3,6 +3,7 @@
 
 pub mod chain;
 pub mod contract;
+pub mod measure;
 pub mod slots;
 pub mod tables;
 pub mod texels;

@@ -5,7 +5,7 @@ use crate::common::*;
 use echolume::gpu::renderer::size_of;
 use echolume::gpu::single::Single;
 use echolume::passes::slots::{Filled, Shape};
-use echolume::passes::{Arrays, Bind, MISS, PASSES, Part, Pass, Slot, Texels, Turn};
+use echolume::passes::{Arrays, Bind, MISS, PASSES, Part, Pass, Slot, Texels, Turn, measure};
 use echolume::probe::{Advance, Geometry, Probe};
 use echolume::scene::{Input, Scene};
 use echolume::source::StoredType;
@@ -296,6 +296,17 @@ fn every_pass_matches_its_reference() {
         assert!(*runs > 0, "no scene needs {name}");
     }
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn what_measures_the_device_computes_what_it_says() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let scene = measure::scene(11, 19).expect("scene");
+    for pass in measure::MEASURES {
+        let (_, expected, got, writes) = run_one(&mut single, &scene, pass, "noise", 7);
+        compare(pass, &scene, &expected, &got, &writes).unwrap_or_else(|e| panic!("{}: {e}", pass.name));
+    }
 }
 
 #[test]

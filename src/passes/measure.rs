@@ -1,0 +1,95 @@
+//! What bounds every pass on a device: how fast it samples, fetches and copies when nothing else is to be done. In no plan;
+//! `profile` runs them by themselves and puts the passes beside them.
+
+use super::*;
+use crate::probe::{Geometry, Grid};
+use crate::scene::{Input, SceneError, Settings};
+use crate::source::StoredType;
+
+/// Samples of each invocation.
+pub const SAMPLES: u32 = 256;
+
+/// Measured in this order.
+pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
+
+/// The device's own trilinear filter.
+pub const FILTERED: Pass = Pass {
+    name: "measure_filtered",
+    stage: Stage::Raycast,
+    when: When::Picture,
+    shader: |_, _| "measure/sampling.plain",
+    needed: |_| Err("measures the device, not a scene"),
+    reads: |_, _| vec![whole("volume", Slot::Volume)],
+    writes: |_, _| vec![whole("picture", Slot::Picture)],
+    extent: picture_extent,
+    repeat: once,
+    params: |_, _| Params::default(),
+    constants: |_, _| vec![("SAMPLING", 0), ("SAMPLES", SAMPLES as i32)],
+    tolerance: Tolerance {
+        absolute: 2e-3,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "a device's filter may have weights of 8 bits; R16F stores 1 to 4.9e-4",
+    },
+    reference: |_, _, reads, writes| {
+        mean(reads, writes, |volume, at| volume.trilinear(at));
+    },
+};
+
+/// Trilinear interpolation of our own.
+pub const EIGHT_FETCHES: Pass = Pass {
+    name: "measure_eight_fetches",
+    constants: |_, _| vec![("SAMPLING", 1), ("SAMPLES", SAMPLES as i32)],
+    ..FILTERED
+};
+
+pub const ONE_FETCH: Pass = Pass {
+    name: "measure_one_fetch",
+    constants: |_, _| vec![("SAMPLING", 2), ("SAMPLES", SAMPLES as i32)],
+    reference: |_, _, reads, writes| {
+        mean(reads, writes, |volume, at| {
+            let low = at.map(|v| v.max(0.0) as i64);
+            volume.clamped(low[0], low[1], low[2])
+        });
+    },
+    ..FILTERED
+};
+
+/// 8 bytes a pixel read and written.
+pub const COPY: Pass = Pass {
+    name: "measure_copy",
+    shader: |_, _| "measure/copy",
+    reads: |_, _| vec![whole("source", Slot::Picture)],
+    writes: |_, _| vec![whole("target", Slot::SmoothPicture)],
+    constants: no_constants,
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "nothing is computed" },
+    reference: |_, _, reads, writes| {
+        let source = reads.get("source");
+        writes.get_mut("target").values.copy_from_slice(&source.values);
+    },
+    ..FILTERED
+};
+
+fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) -> f64) {
+    let volume = reads.get("volume");
+    let picture = writes.get_mut("picture");
+    let size = volume.size.map(|n| n as f64);
+    for y in 0..picture.size[1] {
+        for x in 0..picture.size[0] {
+            let share = [(x as f64 + 0.5) / picture.size[0] as f64, (y as f64 + 0.5) / picture.size[1] as f64];
+            let at = |i: u32| [share[0], share[1], (f64::from(i) + 0.5) / f64::from(SAMPLES)];
+            let texel = |i: u32| std::array::from_fn(|axis| at(i)[axis] * size[axis] - 0.5);
+            let sum: f64 = (0..SAMPLES).map(|i| sample(volume, texel(i))).sum();
+            let mean = sum / f64::from(SAMPLES);
+            picture.set([x, y, 0], &[mean, mean, mean, 1.0]);
+        }
+    }
+}
+
+/// A volume of `edge`^3 in the format that volumes have, and a picture of `pixels`^2.
+pub fn scene(edge: usize, pixels: u32) -> Result<Scene, SceneError> {
+    let mut settings = Settings::default();
+    settings.picture.size = [pixels, pixels];
+    let grid = Grid { size: [edge; 3], spacing: [1.0; 3], origin: [0.0; 3] };
+    Scene::new(Geometry::Cartesian(grid), Input { stored: StoredType::U8, range: [0.0, 255.0] }, settings)
+}
