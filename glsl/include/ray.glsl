@@ -7,6 +7,7 @@
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved
 layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches
+layout(constant_id = 20) const int CLIPS = 0;   // planes that cut
 
 uniform sampler3D volume;
 #ifdef SWEPT
@@ -26,8 +27,9 @@ struct Ray {
     float leave;
 };
 
-// The ray of a pixel and where it lies in the box; leave < enter is a miss. A ray parallel to a face divides by zero: the
-// infinities are ordered rightly by min and max, and the 0/0 of a ray within the face's plane is avoided by the nudge.
+// The ray of a pixel and where it lies in the box, on the near side of every clip plane; leave < enter is a miss. A ray
+// parallel to a face divides by zero: the infinities are ordered rightly by min and max, and the 0/0 of a ray within the
+// face's plane is avoided by the nudge.
 Ray ray_of(ivec2 pixel) {
     vec2 at = vec2(pixel) + 0.5;
     Ray ray;
@@ -39,6 +41,15 @@ Ray ray_of(ivec2 pixel) {
     vec3 near = min(a, b), far = max(a, b);
     ray.enter = max(max(near.x, near.y), max(near.z, 0.0));
     ray.leave = min(far.x, min(far.y, far.z));
+    for (int i = 0; i < CLIPS; ++i) {
+        vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
+        float towards = dot(plane.xyz, ray.direction);
+        float room = plane.w - dot(plane.xyz, ray.origin);
+        // Parallel to the plane: all of the ray is kept, or none.
+        if (abs(towards) < 1e-12) ray.leave = room < 0.0 ? -1.0 : ray.leave;
+        else if (towards > 0.0) ray.leave = min(ray.leave, room / towards);
+        else ray.enter = max(ray.enter, room / towards);
+    }
     return ray;
 }
 

@@ -3,6 +3,10 @@
     vec3 box_low;
     vec3 box_high;
     float step_length; // mm
+    vec4 clip_0; // what lies beyond is cut away: dot(xyz, p) > w
+    vec4 clip_1;
+    vec4 clip_2;
+    vec4 clip_3;
     float window_low;
     float window_scale;
     // Space to texture.

@@ -85,6 +85,7 @@ fn fits(member: &Member, value: &Value) -> bool {
         Value::I32(_) => !member.is_float && member.is_signed && member.components == 1,
         Value::Vec2(_) => member.is_float && member.components == 2,
         Value::Vec3(_) => member.is_float && member.components == 3,
+        Value::Vec4(_) => member.is_float && member.components == 4,
     }
 }
 
@@ -109,6 +110,7 @@ pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
             Value::I32(v) => bytemuck::bytes_of(v),
             Value::Vec2(v) => bytemuck::bytes_of(v),
             Value::Vec3(v) => bytemuck::bytes_of(v),
+            Value::Vec4(v) => bytemuck::bytes_of(v),
         };
         let at = member.offset as usize;
         block[at..at + words.len()].copy_from_slice(words);

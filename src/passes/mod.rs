@@ -19,6 +19,8 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    pub mod cube;
+    pub mod planes;
     pub mod ray;
     pub mod surface;
     pub mod volume;
@@ -52,6 +54,8 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::ELEVATION,
     raycast::volume::PASS,
     raycast::surface::PASS,
+    raycast::planes::PASS,
+    raycast::cube::PASS,
     filter::median::DISTANCE,
     filter::bilateral::DISTANCE,
     filter::sigma::DISTANCE,
@@ -159,6 +163,7 @@ pub enum Value {
     I32(i32),
     Vec2([f32; 2]),
     Vec3([f32; 3]),
+    Vec4([f32; 4]),
 }
 
 /// Numbers of one dispatch, by the names that the shader gives them.
@@ -183,6 +188,11 @@ impl Params {
 
     pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
         self.0.push((name, Value::Vec2(value.map(finite))));
+        self
+    }
+
+    pub fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
+        self.0.push((name, Value::Vec4(value.map(finite))));
         self
     }
 

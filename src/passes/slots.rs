@@ -2,6 +2,7 @@
 //! of a plan names does not exist.
 
 use super::tables::{self, LUT_ENTRIES};
+use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
 
@@ -25,6 +26,10 @@ pub enum Slot {
     LineLut,
     SliceTable,
     Transfer,
+    /// The tiles of a picture of planes: what each shows, and its lines.
+    Tiles,
+    /// The half-spaces that bound the block of mode cube.
+    Block,
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance,
     DistanceA,
@@ -120,7 +125,7 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 22] = [
+    pub const ALL: [Slot; 24] = [
         Slot::Frames,
         Slot::ScanLut,
         Slot::SliceA,
@@ -131,6 +136,8 @@ impl Slot {
         Slot::LineLut,
         Slot::SliceTable,
         Slot::Transfer,
+        Slot::Tiles,
+        Slot::Block,
         Slot::Distance,
         Slot::DistanceA,
         Slot::DistanceB,
@@ -158,6 +165,8 @@ impl Slot {
             Slot::LineLut => "line_lut",
             Slot::SliceTable => "slice_table",
             Slot::Transfer => "transfer",
+            Slot::Tiles => "tiles",
+            Slot::Block => "block",
             Slot::Distance => "distance_map",
             Slot::DistanceA => "distance_a",
             Slot::DistanceB => "distance_b",
@@ -182,6 +191,8 @@ impl Slot {
             Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * LUT_ENTRIES as u32),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
+            Slot::Tiles => Shape::Buffer(16 * TILE_VECTORS * scene.tile_count()),
+            Slot::Block => Shape::Buffer(16 * scene.block().len() as u32),
             Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
             Slot::Shadow | Slot::Occlusion | Slot::Rendered => Shape::Two(scene.ray_size()),
             Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
@@ -206,6 +217,7 @@ impl Slot {
                 VolumeFormat::R32f => Format::R32f,
             },
             Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer => Format::Floats,
+            Slot::Tiles | Slot::Block => Format::Floats,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
@@ -224,6 +236,8 @@ impl Slot {
             Slot::LineLut => Filled::ByScene(tables::line_lut),
             Slot::SliceTable => Filled::ByScene(tables::slice_table),
             Slot::Transfer => Filled::ByScene(tables::transfer_table),
+            Slot::Tiles => Filled::ByScene(tables::tile_table),
+            Slot::Block => Filled::ByScene(tables::block_table),
             _ => Filled::ByPasses,
         }
     }

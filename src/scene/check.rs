@@ -1,6 +1,7 @@
 //! What no scene may ask for, told by name and limit.
 
-use super::{Layout, Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use super::{Clip, Layout, Light, MAX_CLIPS, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use glam::DVec3;
 
 /// Everything that can be told without a geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
@@ -8,6 +9,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
         return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
     }
+    check_clip(&settings.clip)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
@@ -86,6 +88,22 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("post.gamma", settings.post.gamma, 0.1, 10.0)
 }
 
+fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
+    if planes.len() > MAX_CLIPS {
+        return refuse("clip", format!("has {} planes, at most {MAX_CLIPS}", planes.len()));
+    }
+    for plane in planes {
+        for value in plane.at {
+            within("clip.at", value, -1e6, 1e6)?;
+        }
+        let normal = DVec3::from(plane.normal);
+        if !normal.is_finite() || normal.length() < 1e-9 {
+            return refuse("clip.normal", "must be finite and not zero");
+        }
+    }
+    Ok(())
+}
+
 fn check_light(l: &Light) -> Result<(), SceneError> {
     if !l.direction.is_finite() || l.direction.length() < 1e-6 {
         return refuse("light.direction", "must be finite and not zero");
@@ -121,7 +139,7 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
 }
 
-fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
+pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
     match value >= low && value <= high {
         true => Ok(()),
         false => refuse(field, format!("is {value}, must lie in {low}..={high}")),

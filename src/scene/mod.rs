@@ -3,7 +3,10 @@
 
 pub mod camera;
 mod check;
+mod check_planes;
+pub mod cube;
 pub mod load;
+pub mod planes;
 pub mod settings;
 pub mod transfer;
 
@@ -22,6 +25,9 @@ pub const RING: u32 = 8;
 pub const MAX_DEVIATION: f64 = 32.0;
 /// Widest window of a filter, pixels.
 pub const MAX_WINDOW: u32 = 63;
+
+/// Most planes that cut a scene.
+pub const MAX_CLIPS: usize = 4;
 
 /// How the arriving samples are stored and what they mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +94,7 @@ impl Scene {
             }
         }
         check::check(&settings)?;
+        check_planes::check(&settings)?;
         let [low, high] = input.range;
         if !(low.is_finite() && high.is_finite() && low < high) {
             return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
@@ -114,6 +121,7 @@ impl Scene {
             }
         }
         scene.apron = 2.0 + scene.filter_reach();
+        check_planes::check_resolved(&scene)?;
         Ok(scene)
     }
 
@@ -156,6 +164,15 @@ impl Scene {
     /// Whether stage 3 has a distance map to light.
     pub fn has_distance(&self) -> bool {
         self.detects_surface()
+    }
+
+    /// Clip planes in space: what lies beyond is cut away, dot(n, p) > w for (n, w).
+    pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let offset = depth_offset(&self.geometry);
+        self.settings.clip.iter().map(move |c| {
+            let normal = DVec3::from(c.normal).normalize();
+            (normal, normal.dot(DVec3::from(c.at) + DVec3::Y * offset))
+        })
     }
 
     /// Whether samples are composited through the transfer function.

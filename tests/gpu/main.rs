@@ -9,6 +9,7 @@ mod known_answers;
 mod motion;
 mod passes;
 mod pictures;
+mod planes;
 mod recordings;
 mod reruns;
 mod shading;

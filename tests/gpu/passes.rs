@@ -116,6 +116,7 @@ fn scenes() -> Vec<(String, Scene)> {
         );
         add(name, &sweep, BYTES, &toml);
     }
+    scenes.extend(crate::planes::scenes());
     scenes
 }
 

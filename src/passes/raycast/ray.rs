@@ -3,7 +3,7 @@
 use crate::passes::tables::{LUT_ENTRIES, is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
-use crate::scene::{Sampling, Scene};
+use crate::scene::{MAX_CLIPS, Sampling, Scene};
 
 /// Picks the variant that has the tables this geometry needs, and no other.
 macro_rules! variant {
@@ -63,13 +63,21 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
         Sampling::Hardware => 0,
         Sampling::Exact => 1,
     };
-    vec![("SWEEP", sweep), ("ARRAY", array), ("SAMPLING", sampling)]
+    vec![("SWEEP", sweep), ("ARRAY", array), ("SAMPLING", sampling), ("CLIPS", scene.settings.clip.len() as i32)]
 }
 
-pub(super) fn params(scene: &Scene) -> Params {
+pub(super) fn params(scene: &Scene, [window_low, window_high]: [f64; 2]) -> Params {
     let grid = &scene.grid;
-    let [window_low, window_high] = scene.window();
+    let mut clips = [[0.0; 4]; MAX_CLIPS];
+    for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
+        *clip = [normal.x, normal.y, normal.z, limit];
+    }
+    let [clip_0, clip_1, clip_2, clip_3] = clips;
     let params = ray_params(scene)
+        .vec4("clip_0", clip_0)
+        .vec4("clip_1", clip_1)
+        .vec4("clip_2", clip_2)
+        .vec4("clip_3", clip_3)
         .vec3("box_low", scene.low)
         .vec3("box_high", scene.high)
         .f32("step_length", scene.step)
@@ -130,6 +138,15 @@ pub(super) fn span(scene: &Scene, origin: DVec3, direction: DVec3) -> (f64, f64)
         let (a, b) = (low / direction[axis], high / direction[axis]);
         enter = enter.max(a.min(b));
         leave = leave.min(a.max(b));
+    }
+    for (normal, limit) in scene.clips() {
+        let (towards, room) = (normal.dot(direction), limit - normal.dot(origin));
+        match towards.abs() < 1e-12 {
+            true if room < 0.0 => return (0.0, -1.0),
+            true => {}
+            false if towards > 0.0 => leave = leave.min(room / towards),
+            false => enter = enter.max(room / towards),
+        }
     }
     (enter, leave)
 }

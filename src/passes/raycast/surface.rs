@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let surface = &s.settings.surface;
-        ray::params(s)
+        ray::params(s, s.window())
             .f32("threshold", surface.threshold)
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))

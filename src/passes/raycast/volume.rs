@@ -19,7 +19,7 @@ pub const PASS: Pass = Pass {
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
-        ray::params(s)
+        ray::params(s, s.window())
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
     },
