@@ -219,7 +219,7 @@ impl Step {
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Filled::ByScene(make) = slot.filled() else { return false };
     match slot {
-        Slot::Transfer => return make(old) != make(new),
+        Slot::Transfer | Slot::Tiles | Slot::Block => return make(old) != make(new),
         // Follows from the other, which is shorter.
         Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
         _ => {}

@@ -151,6 +151,15 @@ fn scenes() -> Vec<Scene> {
                 scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
             }
         }
+        for sections in [
+            "mode = 'plane'",
+            "mode = 'orthogonal'",
+            "mode = 'tomography'\nplanes = { lines = false, thickness = 3, slab = 'max' }",
+            "mode = 'cube'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
+        ] {
+            let settings = toml::from_str(sections).expect("settings");
+            scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
+        }
     }
     scenes
 }
@@ -187,7 +196,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
 #[test]
 fn a_disagreement_names_both_sides() {
     let scene = scenes().swap_remove(1);
-    let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone").unwrap())).unwrap();
+    let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone.plain").unwrap())).unwrap();
     let tone = echolume::passes::by_name("tone").unwrap();
     let changed = |change: fn(&mut Pass)| {
         let mut pass = Pass { ..*tone };

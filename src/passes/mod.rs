@@ -20,6 +20,8 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    pub mod cube;
+    pub mod planes;
     pub mod projection;
     pub mod ray;
     pub mod surface;
@@ -56,6 +58,8 @@ pub const PASSES: &[Pass] = &[
     raycast::surface::PASS,
     raycast::volume::PASS,
     raycast::projection::PASS,
+    raycast::planes::PASS,
+    raycast::cube::PASS,
     filter::median::DISTANCE,
     filter::bilateral::DISTANCE,
     filter::sigma::DISTANCE,

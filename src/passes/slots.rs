@@ -2,6 +2,7 @@
 //! of a plan names does not exist.
 
 use super::tables::{self, LUT_ENTRIES};
+use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
 
@@ -27,6 +28,10 @@ pub enum Slot {
     Transfer,
     /// The transfer function between every two sample values.
     PreIntegrated,
+    /// The tiles of a picture of planes: what each shows, and its lines.
+    Tiles,
+    /// The half-spaces that bound the block of mode cube.
+    Block,
     /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
     Distance,
     DistanceA,
@@ -124,7 +129,7 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 24] = [
+    pub const ALL: &'static [Slot] = &[
         Slot::Frames,
         Slot::ScanLut,
         Slot::SliceA,
@@ -136,6 +141,8 @@ impl Slot {
         Slot::SliceTable,
         Slot::Transfer,
         Slot::PreIntegrated,
+        Slot::Tiles,
+        Slot::Block,
         Slot::Distance,
         Slot::DistanceA,
         Slot::DistanceB,
@@ -165,6 +172,8 @@ impl Slot {
             Slot::SliceTable => "slice_table",
             Slot::Transfer => "transfer",
             Slot::PreIntegrated => "pre_integrated",
+            Slot::Tiles => "tiles",
+            Slot::Block => "block",
             Slot::Distance => "distance_map",
             Slot::DistanceA => "distance_a",
             Slot::DistanceB => "distance_b",
@@ -191,6 +200,8 @@ impl Slot {
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
             Slot::PreIntegrated => Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),
+            Slot::Tiles => Shape::Buffer(16 * TILE_VECTORS * scene.tile_count()),
+            Slot::Block => Shape::Buffer(16 * scene.block().len() as u32),
             Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
             Slot::Shadow | Slot::Occlusion | Slot::Veil | Slot::Rendered => Shape::Two(scene.ray_size()),
             Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
@@ -215,6 +226,7 @@ impl Slot {
                 VolumeFormat::R32f => Format::R32f,
             },
             Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => Format::Floats,
+            Slot::Tiles | Slot::Block => Format::Floats,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
@@ -234,6 +246,8 @@ impl Slot {
             Slot::SliceTable => Filled::ByScene(tables::slice_table),
             Slot::Transfer => Filled::ByScene(tables::transfer_table),
             Slot::PreIntegrated => Filled::ByScene(tables::pre_integrated_table),
+            Slot::Tiles => Filled::ByScene(tables::tile_table),
+            Slot::Block => Filled::ByScene(tables::block_table),
             _ => Filled::ByPasses,
         }
     }

@@ -131,3 +131,13 @@ pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
 fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
     transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold)
 }
+
+/// The tiles of a picture of planes, as `Sheet::table` lays them out.
+pub fn tile_table(scene: &Scene) -> Vec<f32> {
+    floats(scene.sheet().table(scene.settings.planes.thickness))
+}
+
+/// Outward normal and limit of each half-space of the block.
+pub fn block_table(scene: &Scene) -> Vec<f32> {
+    floats(scene.block().iter().flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, f.limit]))
+}

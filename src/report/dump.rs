@@ -19,7 +19,7 @@ pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
         (Some(texels), _) => sheet(texels, &stretched(texels)),
         (None, Filled::ByScene(make)) => {
             let channels = match slot {
-                Slot::Transfer => 4,
+                Slot::Transfer | Slot::Tiles | Slot::Block => 4,
                 Slot::SliceTable => 2,
                 _ => 1,
             };

@@ -150,7 +150,7 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
     colours.iter().try_for_each(|(field, colour)| colour.iter().try_for_each(|v| within(field, *v, 0.0, 10.0)))
 }
 
-fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
+pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), SceneError> {
     match value >= low && value <= high {
         true => Ok(()),
         false => refuse(field, format!("is {value}, must lie in {low}..={high}")),

@@ -3,7 +3,10 @@
 
 pub mod camera;
 mod check;
+mod check_planes;
+pub mod cube;
 pub mod load;
+pub mod planes;
 pub mod settings;
 pub mod transfer;
 
@@ -91,6 +94,7 @@ impl Scene {
             }
         }
         check::check(&settings)?;
+        check_planes::check(&settings)?;
         let [low, high] = input.range;
         if !(low.is_finite() && high.is_finite() && low < high) {
             return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
@@ -117,6 +121,7 @@ impl Scene {
             }
         }
         scene.apron = 2.0 + scene.filter_reach();
+        check_planes::check_resolved(&scene)?;
         Ok(scene)
     }
 

@@ -10,6 +10,7 @@ mod modes;
 mod motion;
 mod passes;
 mod pictures;
+mod planes;
 mod rays;
 mod recordings;
 mod reruns;

@@ -148,6 +148,7 @@ fn scenes() -> Vec<(String, Scene)> {
             scenes.push((format!("{ray}, {mode}"), scene(sweep.clone(), BYTES, &toml)));
         }
     }
+    scenes.extend(crate::planes::scenes());
     scenes
 }
 

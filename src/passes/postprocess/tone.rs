@@ -1,23 +1,32 @@
-//! Contrast, brightness, gamma and colour map; the picture in 8 bits.
+//! Contrast, brightness, gamma and colour map; cross-lines and frames over planes; the picture in 8 bits.
 
 use crate::passes::chain::picture_end;
+use crate::passes::raycast::planes::{place, tile_at};
 use crate::passes::*;
+use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Scene, transfer};
+
+/// How much of what lies under a cross-line it covers: anatomy stays visible.
+const LINE_STRENGTH: f64 = 0.7;
 
 pub const PASS: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
     when: When::Picture,
-    shader: |_, _| "postprocess/tone",
+    shader: |s, _| if s.draws_lines() { "postprocess/tone.lines" } else { "postprocess/tone.plain" },
     needed: |_| Ok("every picture ends in 8 bits"),
-    reads: |s, _| vec![whole("picture", picture_end(s))],
+    reads: |s, _| {
+        let mut reads = vec![whole("picture", picture_end(s))];
+        reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
+        reads
+    },
     writes: |_, _| vec![whole("screen", Slot::Screen)],
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
         let post = &s.settings.post;
         let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
-        Params::default()
+        let params = Params::default()
             .f32("brightness", post.brightness)
             .f32("contrast", post.contrast)
             .f32("exponent", 1.0 / post.gamma)
@@ -25,7 +34,12 @@ pub const PASS: Pass = Pass {
             .vec3("map_1", b)
             .vec3("map_2", c)
             .vec3("map_3", d)
-            .vec3("map_4", e)
+            .vec3("map_4", e);
+        if !s.draws_lines() {
+            return params;
+        }
+        let [columns, rows] = s.tile_grid();
+        params.i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
     },
     constants: |s, _| vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)],
     tolerance: Tolerance {
@@ -37,10 +51,14 @@ pub const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let picture = reads.get("picture");
         let screen = writes.get_mut("screen");
+        let sheet = scene.draws_lines().then(|| scene.sheet());
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
                 let rgba = picture.get([x, y, 0]);
-                let colour = if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] };
+                let mut colour = if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] };
+                if let Some((sheet, tile)) = sheet.as_ref().and_then(|s| tile_at(s, x, y).map(|tile| (s, tile))) {
+                    colour = with_lines(sheet, tile, colour, x, y);
+                }
                 screen.set([x, y, 0], &[colour[0], colour[1], colour[2], 1.0]);
             }
         }
@@ -60,4 +78,30 @@ fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     let grey = (0.2126 * toned[0] + 0.7152 * toned[1] + 0.0722 * toned[2]) * 4.0;
     let n = (grey.floor() as usize).min(3);
     std::array::from_fn(|c| map[n][c] + (map[n + 1][c] - map[n][c]) * (grey - n as f64))
+}
+
+/// A pixel's colour under the cross-lines and the frame of its tile.
+fn with_lines(sheet: &Sheet, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
+    let place = place(sheet, tile, x, y);
+    for (other, line) in &tile.crossed_by {
+        let cover = LINE_STRENGTH * (1.0 - distance(&tile.plane, other, place) / sheet.pixel).max(0.0);
+        colour = std::array::from_fn(|c| colour[c] + (line[c] - colour[c]) * cover);
+    }
+    let before = |at: usize, axis: usize| at == tile.corner[axis] as usize;
+    let after = |at: usize, axis: usize| at + 1 == (tile.corner[axis] + tile.size[axis]) as usize;
+    match tile.frame {
+        Frame::Around(c) if before(x, 0) || before(y, 1) || after(x, 0) || after(y, 1) => c,
+        Frame::Between(c) if (before(x, 0) && x > 0) || (before(y, 1) && y > 0) => c,
+        _ => colour,
+    }
+}
+
+/// Distance in mm of a place in a plane from the line where another plane cuts that plane: to a point of the line, across
+/// the line's direction.
+pub fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
+    let along = plane.normal.cross(other.normal);
+    // The point of the line that is nearest to the plane's own point: down the other plane's slope within this one.
+    let slope = along.cross(plane.normal);
+    let on_line = plane.at + slope * (other.normal.dot(other.at - plane.at) / other.normal.dot(slope));
+    (place - on_line).cross(along.normalize()).length()
 }

@@ -1,0 +1,104 @@
+// The volume as a solid block: each ray shows the sample where it enters. Where that is outside the insonified region it
+// goes on until it is inside: the sector's own border is a face then.
+// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+#version 460
+#include "common.glsl"
+layout(constant_id = 3) const int EDGES = 1; // lines where two faces meet
+layout(scalar) uniform Params {
+#include "ray_params.glsl"
+    float stride; // longest step of the search for the sector's border, mm
+    float shading;
+    float edge_strength;
+    vec3 edge_colour;
+};
+#include "ray.glsl"
+readonly buffer Block { vec4 entry[]; } block; // outward normals and limits
+uniform writeonly image2D picture;
+
+const int HALVINGS = 6; // 1/64 of a step
+
+// Normal of the sector's border nearest to a place just outside it. The motor's way over the lines of a frame turns it by
+// less than a degree and is left out.
+vec3 border_normal(vec3 p) {
+    float beyond = p.y - axis_depth, rho = SWEEP == 1 ? max(sqrt(beyond * beyond + p.z * p.z), 1e-20) : 1.0;
+    // The frame's own depth axis and the way of the sweep, in space.
+    vec3 depth = SWEEP == 1 ? vec3(0.0, beyond / rho, p.z / rho) : vec3(0.0, 1.0, 0.0);
+    vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
+    float x = p.x, y = SWEEP == 1 ? rho + axis_depth : p.y;
+    float range = ARRAY == 1 ? max(sqrt(x * x + y * y), 1e-20) : y;
+    float line = ARRAY == 1 ? x / max(range + y, 1e-20) : x;
+    vec3 along = ARRAY == 1 ? (vec3(x, 0.0, 0.0) + depth * y) / range : depth;
+    vec3 across = ARRAY == 1 ? (vec3(y, 0.0, 0.0) - depth * x) / range : vec3(1.0, 0.0, 0.0);
+    if (range > range_high) return along;
+    if (range < range_low) return -along;
+    if (line > line_high) return across;
+    if (line < line_low) return -across;
+    return sweep;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
+    vec2 at = vec2(pixel) + 0.5;
+    vec3 from = origin + origin_dx * at.x + origin_dy * at.y;
+    vec3 unscaled = direction + direction_dx * at.x + direction_dy * at.y;
+    vec3 along = normalize(unscaled);
+    float enter = 0.0, leave = 3.0e38;
+    int face = -1; // the half-space that the ray enters last
+    for (int i = 0; i < block.entry.length(); ++i) {
+        float towards = dot(block.entry[i].xyz, along);
+        float room = block.entry[i].w - dot(block.entry[i].xyz, from);
+        // Parallel to the face: all of the ray is within, or none.
+        if (abs(towards) < 1e-12) leave = room < 0.0 ? -1.0 : leave;
+        else if (towards > 0.0) leave = min(leave, room / towards);
+        else if (room / towards > enter) {
+            enter = room / towards;
+            face = i;
+        }
+    }
+    vec4 colour = vec4(0.0);
+    if (leave > enter) {
+        int steps = max(int(ceil((leave - enter) / stride)), 1);
+        float step = (leave - enter) / float(steps);
+        // A little inside: where a face is the sector's own border, rounding must not put it outside.
+        enter += 0.02 * step;
+        int found = -1;
+        vec3 texel;
+        for (int i = 0; i < steps; ++i) {
+            if (locate(from + along * (enter + float(i) * step), texel)) {
+                found = i;
+                break;
+            }
+        }
+        if (found >= 0) {
+            float outside = enter + float(found - 1) * step, inside = enter + float(found) * step;
+            for (int i = 0; i < (found > 0 ? HALVINGS : 0); ++i) {
+                float middle = 0.5 * (outside + inside);
+                vec3 there;
+                if (locate(from + along * middle, there)) inside = middle;
+                else outside = middle;
+            }
+            vec3 p = from + along * inside;
+            locate(p, texel);
+            vec3 normal = found > 0 ? border_normal(from + along * outside) : face >= 0 ? block.entry[face].xyz : along;
+            float grey = sample_volume(texel) * (1.0 - shading * (1.0 - abs(dot(normal, along))));
+            colour = vec4(vec3(grey), 1.0);
+            if (EDGES == 1 && found == 0 && face >= 0) {
+                // Change of place on the face over one pixel.
+                float scale = inside / length(unscaled);
+                vec3 ex = origin_dx + direction_dx * scale, ey = origin_dy + direction_dy * scale;
+                float facing = dot(normal, along);
+                ex -= along * (dot(normal, ex) / facing);
+                ey -= along * (dot(normal, ey) / facing);
+                float near = 0.0;
+                for (int i = 0; i < block.entry.length(); ++i) {
+                    vec3 other = block.entry[i].xyz;
+                    float pixels = (block.entry[i].w - dot(other, p)) / max(length(vec2(dot(other, ex), dot(other, ey))), 1e-20);
+                    near = max(near, i == face ? 0.0 : 1.0 - pixels);
+                }
+                colour.rgb = mix(colour.rgb, edge_colour, edge_strength * clamp(near, 0.0, 1.0));
+            }
+        }
+    }
+    imageStore(picture, pixel, colour);
+}

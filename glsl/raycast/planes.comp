@@ -1,0 +1,49 @@
+// MPR: each pixel shows the place of its tile's plane, or what a slab about it amounts to. No ray is cast.
+// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+#version 460
+#include "common.glsl"
+layout(constant_id = 3) const int SAMPLES = 1; // through the slab
+layout(constant_id = 4) const int SLAB = 0;    // 0 mean, 1 largest, 2 smallest
+layout(scalar) uniform Params {
+#include "ray_params.glsl"
+    int columns;
+    int rows;
+};
+#include "ray.glsl"
+#include "tiles.glsl"
+uniform writeonly image2D picture;
+
+// Within what is rendered, on the near side of every clip plane.
+bool is_kept(vec3 p) {
+    bool kept = all(greaterThanEqual(p, box_low)) && all(lessThanEqual(p, box_high));
+    for (int i = 0; i < CLIPS; ++i) {
+        vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
+        kept = kept && dot(plane.xyz, p) <= plane.w;
+    }
+    return kept;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = imageSize(picture), cells = ivec2(columns, rows);
+    if (any(greaterThanEqual(pixel, size))) return;
+    ivec2 cell = cell_of(pixel, size, cells);
+    int n = cell.y * columns + cell.x;
+    float value = SLAB == 2 ? 1.0 : 0.0;
+    int count = 0;
+    if (n < tiles.entry.length()) {
+        vec2 at = vec2(pixel - cell_corner(cell, size, cells)) + 0.5;
+        vec3 middle = tiles.entry[n].corner.xyz + tiles.entry[n].dx.xyz * at.x + tiles.entry[n].dy.xyz * at.y;
+        for (int i = 0; i < SAMPLES; ++i) {
+            float through = SAMPLES > 1 ? float(i) / float(max(SAMPLES - 1, 1)) - 0.5 : 0.0;
+            vec3 p = middle + tiles.entry[n].slab.xyz * through;
+            vec3 texel;
+            if (!is_kept(p) || !locate(p, texel)) continue;
+            float v = sample_volume(texel);
+            value = SLAB == 0 ? value + v : SLAB == 1 ? max(value, v) : min(value, v);
+            ++count;
+        }
+    }
+    if (SLAB == 0) value /= float(max(count, 1));
+    imageStore(picture, pixel, count > 0 ? vec4(vec3(value), 1.0) : vec4(0.0));
+}

@@ -1,0 +1,127 @@
+//! MPR: planes and slabs through the volume, and no ray: each pixel's place lies in the plane of its tile.
+
+use super::ray;
+use crate::passes::*;
+use crate::scene::planes::{Sheet, Tile};
+use crate::scene::{Scene, Slab};
+
+pub const PASS: Pass = Pass {
+    name: "raycast_planes",
+    stage: Stage::Raycast,
+    when: When::Picture,
+    shader: |s, _| ray::variant!(s, "raycast/planes"),
+    needed: |s| match (s.is_flat(), s.cuts_planes()) {
+        (true, _) => Ok("planes are cut"),
+        (false, true) => Ok("three planes stand beside the rendering"),
+        (false, false) => Err("no plane is cut in this mode"),
+    },
+    reads: |s, _| {
+        let mut reads = ray::reads(s);
+        reads.push(whole("tiles", Slot::Tiles));
+        reads
+    },
+    writes: |s, _| vec![whole("picture", if s.is_flat() { Slot::Picture } else { Slot::Planes })],
+    extent: picture_extent,
+    repeat: once,
+    params: |s, _| {
+        let [columns, rows] = s.tile_grid();
+        // No ray is cast: a camera that moves leaves the planes as they are.
+        let params = ray::params(&unmoved(s), s.settings.planes.window);
+        params.i32("columns", columns).i32("rows", rows)
+    },
+    constants: |s, _| {
+        let mut constants = ray::constants(s);
+        constants.retain(|(name, _)| matches!(*name, "SWEEP" | "ARRAY" | "SAMPLING" | "CLIPS"));
+        constants.push(("SAMPLES", s.slab_samples() as i32));
+        constants.push(("SLAB", s.settings.planes.slab.number()));
+        constants
+    },
+    tolerance: Tolerance {
+        absolute: 1e-3,
+        relative: 0.0,
+        outliers: 4e-3,
+        why: "a place is off by 1e-5 mm in f32, so a sample by as much of a voxel's contrast, and the device's filter may \
+              round its weights; a sample at the very border of the sector or the box may fall on either side",
+    },
+    reference: |scene, _, reads, writes| {
+        let volume = reads.get("volume");
+        let picture = writes.get_mut("picture");
+        let sheet = scene.sheet();
+        for y in 0..picture.size[1] {
+            for x in 0..picture.size[0] {
+                let shown = tile_at(&sheet, x, y).and_then(|tile| {
+                    let place = place(&sheet, tile, x, y);
+                    slab(scene, volume, place, tile.plane.normal)
+                });
+                let rgba = shown.map_or([0.0; 4], |v| [v, v, v, 1.0]);
+                picture.set([x, y, 0], &rgba);
+            }
+        }
+    },
+};
+
+/// The scene without its camera and its rays' step, which no plane depends on.
+fn unmoved(scene: &Scene) -> Scene {
+    let zero = DVec3::ZERO;
+    let rays = crate::scene::Rays {
+        origin: zero,
+        origin_dx: zero,
+        origin_dy: zero,
+        direction: DVec3::Y,
+        direction_dx: zero,
+        direction_dy: zero,
+        ..scene.rays
+    };
+    Scene { rays, step: 1.0, ..scene.clone() }
+}
+
+/// The tile that holds a pixel; none where the grid has more cells than tiles.
+pub fn tile_at(sheet: &Sheet, x: usize, y: usize) -> Option<&Tile> {
+    sheet.tiles.iter().find(|tile| {
+        let within = |at: usize, axis: usize| {
+            let low = tile.corner[axis] as usize;
+            at >= low && at < low + tile.size[axis] as usize
+        };
+        within(x, 0) && within(y, 1)
+    })
+}
+
+/// The place in the tile's plane that a pixel's centre shows.
+pub fn place(sheet: &Sheet, tile: &Tile, x: usize, y: usize) -> DVec3 {
+    let from_middle = |at: usize, axis: usize| {
+        let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
+        (at as f64 + 0.5 - middle) * sheet.pixel
+    };
+    tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
+}
+
+/// What a slab about a place shows; none where all of it is cut away or not insonified.
+fn slab(scene: &Scene, volume: &Texels, place: DVec3, normal: DVec3) -> Option<f64> {
+    let settings = &scene.settings.planes;
+    let count = scene.slab_samples() as usize;
+    let values: Vec<f64> = (0..count)
+        .filter_map(|i| {
+            let through = if count > 1 { i as f64 / (count - 1) as f64 - 0.5 } else { 0.0 };
+            value(scene, volume, place + normal * (through * settings.thickness))
+        })
+        .collect();
+    if values.is_empty() {
+        return None;
+    }
+    Some(match settings.slab {
+        Slab::Mean => values.iter().sum::<f64>() / values.len() as f64,
+        Slab::Max => values.iter().copied().fold(0.0, f64::max),
+        Slab::Min => values.iter().copied().fold(1.0, f64::min),
+    })
+}
+
+/// The windowed sample at a place; none outside the region, beyond a clip plane, and outside the insonified region.
+fn value(scene: &Scene, volume: &Texels, place: DVec3) -> Option<f64> {
+    let within = (0..3).all(|axis| place[axis] >= scene.low[axis] && place[axis] <= scene.high[axis]);
+    if !within || scene.clips().any(|(normal, limit)| normal.dot(place) > limit) {
+        return None;
+    }
+    let [low, high] = scene.settings.planes.window;
+    let at = ray::texel(scene, place)?;
+    Some(((volume.trilinear(at) - low) / (high - low)).clamp(0.0, 1.0))
+}

@@ -1,0 +1,115 @@
+//! The solid block of mode cube: half-spaces in mm, from the visible box, its faces pushed in and turned, and clip planes.
+
+use super::{Scene, SceneError, refuse};
+use glam::{DMat3, DQuat, DVec3};
+
+/// Most half-spaces that bound a block: six faces, the six sides of the box where a face is turned, and four clip planes.
+pub const MAX_FACES: usize = 16;
+
+/// What lies beyond is no part of the block: dot(normal, p) > limit, the normal a unit vector that points out of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfSpace {
+    pub normal: DVec3,
+    pub limit: f64,
+}
+
+impl HalfSpace {
+    /// How far inside a place lies, mm; negative outside.
+    pub fn room(&self, place: DVec3) -> f64 {
+        self.limit - self.normal.dot(place)
+    }
+}
+
+/// Names of the faces, the axis across each, and the way out along it.
+const SIDES: [(&str, usize, f64); 6] =
+    [("left", 0, -1.0), ("right", 0, 1.0), ("near", 1, -1.0), ("far", 1, 1.0), ("bottom", 2, -1.0), ("top", 2, 1.0)];
+
+impl Scene {
+    /// The half-spaces whose common part is shown.
+    pub fn block(&self) -> Vec<HalfSpace> {
+        let mut faces = self.faces();
+        faces.extend(self.clips().map(|(normal, limit)| HalfSpace { normal, limit }));
+        faces
+    }
+
+    /// Those of the faces, and of the box where a face that is turned lets it through.
+    fn faces(&self) -> Vec<HalfSpace> {
+        let (inset, tilt) = (&self.settings.cube.inset, &self.settings.cube.tilt);
+        let insets = [inset.left, inset.right, inset.near, inset.far, inset.bottom, inset.top];
+        let tilts = [tilt.left, tilt.right, tilt.near, tilt.far, tilt.bottom, tilt.top];
+        let mut faces = Vec::new();
+        for ((_, axis, out), (inset, [first, second])) in SIDES.iter().zip(insets.iter().zip(tilts)) {
+            let outwards = DVec3::AXES[*axis] * *out;
+            let side = if *out > 0.0 { self.high } else { self.low };
+            let in_face: Vec<DVec3> = (0..3).filter(|a| a != axis).map(|a| DVec3::AXES[a]).collect();
+            let turned = DMat3::from_quat(
+                DQuat::from_axis_angle(in_face[1], second.to_radians())
+                    * DQuat::from_axis_angle(in_face[0], first.to_radians()),
+            );
+            let mut middle = (self.low + self.high) / 2.0;
+            middle[*axis] = side[*axis] - out * inset;
+            let normal = turned * outwards;
+            faces.push(HalfSpace { normal, limit: normal.dot(middle) });
+            if first != 0.0 || second != 0.0 {
+                faces.push(HalfSpace { normal: outwards, limit: outwards.dot(side) });
+            }
+        }
+        faces
+    }
+
+    /// Refuses faces that leave nothing between them.
+    pub(super) fn check_block(&self) -> Result<(), SceneError> {
+        let faces = self.faces();
+        match middle_of(&faces) {
+            Some(middle) if faces.iter().all(|f| f.room(middle) > 1e-6) => Ok(()),
+            _ => {
+                let [x, y, z] = (self.high - self.low).to_array();
+                refuse("cube.inset", format!("leaves nothing of the block of {x:.2} x {y:.2} x {z:.2} mm"))
+            }
+        }
+    }
+}
+
+/// The mean of the corners of a convex solid: strictly inside it unless it is flat or empty.
+fn middle_of(faces: &[HalfSpace]) -> Option<DVec3> {
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+    for (i, a) in faces.iter().enumerate() {
+        for (j, b) in faces.iter().enumerate().skip(i + 1) {
+            for c in faces.iter().skip(j + 1) {
+                let across = DMat3::from_cols(a.normal, b.normal, c.normal).transpose();
+                if across.determinant().abs() < 1e-9 {
+                    continue;
+                }
+                let corner = across.inverse() * DVec3::new(a.limit, b.limit, c.limit);
+                if faces.iter().all(|f| f.room(corner) > -1e-6) {
+                    sum += corner;
+                    count += 1.0;
+                }
+            }
+        }
+    }
+    (count > 0.0).then(|| sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sides(low: DVec3, high: DVec3) -> Vec<HalfSpace> {
+        let side = |&(_, axis, out): &(&str, usize, f64)| {
+            let normal = DVec3::AXES[axis] * out;
+            HalfSpace { normal, limit: normal.dot(if out > 0.0 { high } else { low }) }
+        };
+        SIDES.iter().map(side).collect()
+    }
+
+    #[test]
+    fn the_middle_of_a_box_is_its_centre_and_of_nothing_there_is_none() {
+        let (low, high) = (DVec3::new(-3.0, 10.0, -1.0), DVec3::new(5.0, 40.0, 2.0));
+        let middle = middle_of(&sides(low, high)).unwrap();
+        assert!(middle.distance((low + high) / 2.0) < 1e-9);
+        let mut faces = sides(low, high);
+        faces.push(HalfSpace { normal: DVec3::X, limit: -3.5 });
+        assert!(middle_of(&faces).is_none());
+    }
+}

@@ -1,0 +1,218 @@
+//! Planes that are cut through the volume, resolved to the tiles of a picture: which pixel shows which place in space.
+
+use super::{Layout, Mode, PlaneName, Scene, Slab};
+use glam::{DMat3, DVec3};
+
+/// Most tiles of a picture.
+pub const MAX_TILES: u32 = 64;
+/// Most samples through a slab.
+pub const MAX_SLAB: f64 = 4096.0;
+/// How a tile is kept in a buffer: vectors of four floats.
+pub const TILE_VECTORS: u32 = 9;
+
+/// A plane through the volume: a point of it, and three unit axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    pub at: DVec3,
+    pub right: DVec3,
+    pub down: DVec3,
+    pub normal: DVec3,
+}
+
+/// A tile of the picture and the plane that it shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    /// `at` is what the middle of the tile shows.
+    pub plane: Plane,
+    /// Columns and rows of pixels before the tile, and in it.
+    pub corner: [u32; 2],
+    pub size: [u32; 2],
+    pub frame: Frame,
+    /// The planes whose cross-lines are drawn, with their colours.
+    pub crossed_by: Vec<(Plane, [f64; 3])>,
+}
+
+/// What surrounds a tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Frame {
+    None,
+    /// A line of this colour on its outermost pixels.
+    Around([f64; 3]),
+    /// A line of this colour towards the tiles above and to the left.
+    Between([f64; 3]),
+}
+
+/// The tiles of a picture, on a grid of columns and rows; cells beyond the last tile are empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    pub columns: u32,
+    pub rows: u32,
+    /// mm a pixel, the same in every tile.
+    pub pixel: f64,
+    pub tiles: Vec<Tile>,
+}
+
+/// Colour of a plane's frame and of its cross-lines: told apart by every kind of sight, and never grey.
+pub fn colour(plane: PlaneName) -> [f64; 3] {
+    match plane {
+        PlaneName::A => [1.0, 0.8, 0.1],
+        PlaneName::B => [1.0, 0.35, 0.75],
+        PlaneName::C => [0.2, 0.8, 1.0],
+    }
+}
+
+/// Colour between the tiles of tomography.
+pub const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
+
+/// Pixels before the n-th of `count` cells along an edge. Cells differ by at most one pixel, and the last of two is the
+/// larger, as the tile of a 4-up picture's rendering is.
+pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
+    (u64::from(edge) * u64::from(n) / u64::from(count.max(1))) as u32
+}
+
+impl Scene {
+    /// Columns and rows of the tiles.
+    pub fn tile_grid(&self) -> [u32; 2] {
+        match (self.settings.layout, self.settings.mode) {
+            (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
+            (_, Mode::Tomography) => [self.settings.planes.columns, self.settings.planes.rows],
+            _ => [1, 1],
+        }
+    }
+
+    /// How many tiles show a plane.
+    pub fn tile_count(&self) -> u32 {
+        let [columns, rows] = self.tile_grid();
+        if self.shows_three() { 3 } else { columns.saturating_mul(rows) }
+    }
+
+    fn shows_three(&self) -> bool {
+        self.settings.layout == Layout::Four || self.settings.mode == Mode::Orthogonal
+    }
+
+    /// Whether lines are drawn over the planes of the picture: cross-lines and frames, or what stands between tiles.
+    pub fn draws_lines(&self) -> bool {
+        let several = self.shows_three() || self.settings.mode == Mode::Tomography;
+        several && self.settings.planes.lines
+    }
+
+    /// Samples through the slab: at most one slice pixel apart, both faces included.
+    pub fn slab_samples(&self) -> f64 {
+        let thickness = self.settings.planes.thickness;
+        let pixel = self.grid.pitch[0].min(self.grid.pitch[1]);
+        if thickness > 0.0 { (thickness / pixel).ceil() + 1.0 } else { 1.0 }
+    }
+
+    /// One of the three planes, where they meet.
+    pub fn plane(&self, name: PlaneName) -> Plane {
+        let settings = &self.settings.planes;
+        let at = match settings.position {
+            Some([lateral, depth, elevation]) => {
+                DVec3::new(lateral, depth + super::depth_offset(&self.geometry), elevation)
+            }
+            None => (self.low + self.high) / 2.0,
+        };
+        let turned = DMat3::from_rotation_y(-settings.azimuth.to_radians())
+            * DMat3::from_rotation_x(settings.tilt.to_radians())
+            * DMat3::from_rotation_z(-settings.roll.to_radians());
+        let (right, down, normal) = match name {
+            PlaneName::A => (DVec3::X, DVec3::Y, DVec3::Z),
+            PlaneName::B => (DVec3::Z, DVec3::Y, DVec3::X),
+            PlaneName::C => (DVec3::X, -DVec3::Z, DVec3::Y),
+        };
+        Plane { at, right: turned * right, down: turned * down, normal: turned * normal }
+    }
+
+    /// The planes of this scene as tiles.
+    pub fn sheet(&self) -> Sheet {
+        let [columns, rows] = self.tile_grid();
+        let [width, height] = self.picture_size();
+        let three = [PlaneName::A, PlaneName::B, PlaneName::C];
+        let planes: Vec<Plane> = match self.shows_three() {
+            true => three.map(|name| self.plane(name)).to_vec(),
+            false => self.stepped(columns * rows),
+        };
+        let half = (self.high - self.low) / 2.0;
+        let extent = |axis: DVec3| 2.0 * axis.abs().dot(half);
+        let fit = |p: &Plane| {
+            let across = extent(p.right) * f64::from(columns) / f64::from(width);
+            across.max(extent(p.down) * f64::from(rows) / f64::from(height))
+        };
+        let pixel = planes.iter().map(fit).fold(0.0, f64::max) / self.settings.planes.zoom;
+        let middle = (self.low + self.high) / 2.0;
+        let tile = |(n, plane): (u32, &Plane)| {
+            let (column, row) = (n % columns, n / columns);
+            let corner = [cell(width, column, columns), cell(height, row, rows)];
+            let end = [cell(width, column + 1, columns), cell(height, row + 1, rows)];
+            let at = middle - plane.normal * (middle - plane.at).dot(plane.normal);
+            let (frame, crossed_by) = match (self.draws_lines(), self.shows_three()) {
+                (false, _) => (Frame::None, Vec::new()),
+                (true, false) => (Frame::Between(BETWEEN), Vec::new()),
+                (true, true) => {
+                    let others = three.iter().zip(&planes).filter(|(_, other)| *other != plane);
+                    let crossed_by = others.map(|(name, other)| (*other, colour(*name))).collect();
+                    (Frame::Around(colour(three[n as usize])), crossed_by)
+                }
+            };
+            let size = [end[0] - corner[0], end[1] - corner[1]];
+            Tile { plane: Plane { at, ..*plane }, corner, size, frame, crossed_by }
+        };
+        Sheet { columns, rows, pixel, tiles: (0..).zip(&planes).map(tile).collect() }
+    }
+
+    /// `count` parallel planes about the position.
+    fn stepped(&self, count: u32) -> Vec<Plane> {
+        let settings = &self.settings.planes;
+        let plane = self.plane(settings.plane);
+        let through = plane.normal.abs().dot(self.high - self.low);
+        let spacing = settings.spacing.unwrap_or(through / f64::from(count));
+        let offset = |n: u32| (f64::from(n) - f64::from(count - 1) / 2.0) * spacing;
+        (0..count).map(|n| Plane { at: plane.at + plane.normal * offset(n), ..plane }).collect()
+    }
+}
+
+impl Sheet {
+    /// What the shaders read of each tile: its upper left corner in space and one pixel right and down, the way through the
+    /// slab, the frame's colour and kind, and two cross-lines (a, b, c, there) with their colours, where a x + b y + c is the
+    /// distance in pixels from the line, (x, y) counted from the tile's corner.
+    pub fn table(&self, thickness: f64) -> Vec<f64> {
+        let mut table = Vec::with_capacity(self.tiles.len() * 4 * TILE_VECTORS as usize);
+        for tile in &self.tiles {
+            let Plane { at, right, down, normal } = tile.plane;
+            let (dx, dy) = (right * self.pixel, down * self.pixel);
+            let [width, height] = tile.size.map(f64::from);
+            let corner = at - dx * (width / 2.0) - dy * (height / 2.0);
+            for v in [corner, dx, dy, normal * thickness] {
+                table.extend([v.x, v.y, v.z, 0.0]);
+            }
+            let ([r, g, b], kind) = match tile.frame {
+                Frame::None => ([0.0; 3], 0.0),
+                Frame::Around(colour) => (colour, 1.0),
+                Frame::Between(colour) => (colour, 2.0),
+            };
+            table.extend([r, g, b, kind]);
+            let line = |n: usize| {
+                let Some((other, colour)) = tile.crossed_by.get(n) else { return ([0.0; 4], [0.0; 3]) };
+                let (a, b) = (other.normal.dot(dx), other.normal.dot(dy));
+                let c = other.normal.dot(corner - other.at);
+                let per_pixel = a.hypot(b);
+                ([a / per_pixel, b / per_pixel, c / per_pixel, 1.0], *colour)
+            };
+            let lines = [line(0), line(1)];
+            lines.iter().for_each(|(line, _)| table.extend(line));
+            lines.iter().for_each(|(_, [r, g, b])| table.extend([*r, *g, *b, 0.0]));
+        }
+        table
+    }
+}
+
+impl Slab {
+    /// As the shader's constant has it.
+    pub fn number(self) -> i32 {
+        match self {
+            Slab::Mean => 0,
+            Slab::Max => 1,
+            Slab::Min => 2,
+        }
+    }
+}
