@@ -1,6 +1,6 @@
 //! What no scene may ask for, told by name and limit.
 
-use super::{Layout, Light, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma, refuse, transfer};
+use super::{Layout, Light, MAX_PICTURE, MAX_WINDOW, Noise, SceneError, Settings, Sigma, refuse, transfer};
 
 /// Everything that can be told without a geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
@@ -25,6 +25,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     check_sigma("slices.sigma", s.sigma)?;
     check_sigma("distance.sigma", settings.distance.sigma)?;
+    check_additive("distance.sigma", settings.distance.sigma.map(|s| s.noise))?;
     check_sigma("post.sigma", settings.post.sigma)?;
     if settings.distance.median > 0 {
         check_window("distance.median", settings.distance.median)?;
@@ -75,7 +76,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
     check_light(&settings.light)?;
     if let Some(e) = settings.post.enhanced_sigma {
-        check_sigma("post.enhanced_sigma", Some(Sigma { window: e.window, sigma: e.sigma }))?;
+        check_sigma("post.enhanced_sigma", Some(Sigma { window: e.window, sigma: e.sigma, ..Sigma::default() }))?;
         check_window("post.enhanced_sigma", e.largest)?;
         if e.largest < e.window {
             return refuse("post.enhanced_sigma", format!("largest is {}, less than window {}", e.largest, e.window));
@@ -142,5 +143,16 @@ fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneErr
     match sigma.sigma >= 0.0 {
         true => Ok(()),
         false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
+    }
+}
+
+/// The noise of a distance does not grow with the distance.
+fn check_additive(field: &'static str, noise: Option<Noise>) -> Result<(), SceneError> {
+    match noise {
+        Some(Noise::Multiplicative) => refuse(
+            field,
+            "noise is multiplicative, on distances it can only be additive: leave it out, and give sigma in mm",
+        ),
+        _ => Ok(()),
     }
 }

@@ -108,6 +108,15 @@ fn scenes() -> Vec<(String, Scene)> {
             "both sigmas",
             "post = { sigma = { window = 3, sigma = 0.1 }, enhanced_sigma = { window = 5, largest = 5, sigma = inf } }\nslices = { pixels = 12 }",
         ),
+        (
+            "sigmas of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = 0.3, noise = 'multiplicative' } }\n\
+             post = { sigma = { window = 7, sigma = 0.15, noise = 'multiplicative' } }",
+        ),
+        (
+            "infinite sigma of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = inf, noise = 'multiplicative' } }",
+        ),
         ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
         ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
     ] {

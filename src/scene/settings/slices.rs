@@ -38,14 +38,27 @@ pub enum VolumeFormat {
 pub struct Sigma {
     /// Odd edge of the window, pixels.
     pub window: u32,
-    /// Standard deviation of the noise: a neighbour counts within 2 sigma. In 0..1 on slices and pictures, mm on distances.
+    /// Standard deviation of the noise: a neighbour counts within 2 sigma. In 0..1 on slices and pictures, mm on distances;
+    /// a share of the centre's value where the noise is multiplicative.
     pub sigma: f64,
+    pub noise: Noise,
 }
 
 impl Default for Sigma {
     fn default() -> Self {
-        Sigma { window: 7, sigma: 0.1 }
+        Sigma { window: 7, sigma: 0.1, noise: Noise::Additive }
     }
+}
+
+/// How noise goes with the value that it is on (Lee 1983): what a sigma is measured in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    /// The same everywhere: speckle after log compression. A neighbour counts within 2 sigma.
+    #[default]
+    Additive,
+    /// In proportion to the value: speckle of linear envelopes. A neighbour counts within 2 sigma times the centre.
+    Multiplicative,
 }
 
 /// The sigma filter with a window that grows where too few neighbours are like the centre (thesis 5.4), about a centre
