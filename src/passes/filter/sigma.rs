@@ -67,7 +67,7 @@ fn asked(sigma: Option<scene::Sigma>) -> Need {
 }
 
 /// K: fewer than 4 at 7x7, fewer than 3 at 5x5 (thesis 5.3), and in proportion elsewhere.
-fn few(window: u32) -> u32 {
+pub(super) fn few(window: u32) -> u32 {
     window.saturating_sub(1) / 2
 }
 
