@@ -3,7 +3,9 @@
 
 mod common;
 mod detector;
+mod diffusion;
 mod faults;
+mod filters;
 mod goldens;
 mod known_answers;
 mod modes;

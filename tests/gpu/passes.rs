@@ -129,6 +129,75 @@ fn scenes() -> Vec<(String, Scene)> {
         ("pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', threshold = 0.5 }\nslices = { pixels = 30 }"),
         ("two rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2 }"),
         ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
+        (
+            "every diffusion, explicit",
+            "slices = { pixels = 20, perona_malik = { repeat = 3 }, smooth = { lateral = 1.0 } }\n\
+             distance = { perona_malik = { edge = 0.8, conductance = 'exponential', step = 0.25, repeat = 2 } }\n\
+             post = { perona_malik = { edge = 0.3, conductance = 'exponential', repeat = 3 } }",
+        ),
+        (
+            "diffusion with sharpest and dullest edges",
+            "slices = { pixels = 20, perona_malik = { edge = 1e-30, conductance = 'exponential', repeat = 1 } }\n\
+             distance = { perona_malik = { edge = 1e-30, repeat = 1 } }\npost = { perona_malik = { edge = inf, repeat = 1 } }",
+        ),
+        (
+            "the heat equation, edges of 0",
+            "slices = { pixels = 20, perona_malik = { edge = inf, repeat = 2 } }\n\
+             distance = { perona_malik = { edge = inf, repeat = 1 } }\npost = { perona_malik = { edge = 0.0 } }",
+        ),
+        (
+            "AOS",
+            "slices = { pixels = 41, perona_malik = { scheme = 'aos', step = 2.0, repeat = 2 } }\n\
+             post = { perona_malik = { scheme = 'aos', step = 5.0, repeat = 2, conductance = 'exponential' } }",
+        ),
+        (
+            "AOS in huge steps, between filters",
+            "slices = { pixels = 20, median = true, perona_malik = { scheme = 'aos', edge = inf, step = 1e6, repeat = 1 }, smooth = { depth = 1.0 } }\n\
+             post = { perona_malik = { scheme = 'aos', edge = 1e-30, step = 1e9, repeat = 1 } }",
+        ),
+        (
+            "enhanced sigmas, Perona-Malik centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 3, largest = 17, sigma = 0.05, centre = 'perona-malik', growth = true } }\n\
+             distance = { enhanced_sigma = { window = 5, largest = 11, sigma = 0.3, centre = 'perona-malik', edge = 0.5 } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'perona-malik', noise = 'multiplicative' } }",
+        ),
+        (
+            "enhanced sigmas, gradient-inverse centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.2, noise = 'multiplicative', centre = 'gradient-inverse', growth = true }, smooth = { lateral = 1.0 } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'gradient-inverse' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'gradient-inverse' } }",
+        ),
+        (
+            "enhanced sigmas, Nagao-Matsuyama centre",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, centre = 'nagao-matsuyama' } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'nagao-matsuyama' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'nagao-matsuyama' } }",
+        ),
+        (
+            "enhanced sigmas, median centre, window beyond the picture",
+            "slices = { pixels = 24, enhanced_sigma = { window = 63, largest = 63, sigma = inf } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 63, sigma = 0.2, centre = 'median' } }",
+        ),
+        ("Gaussian of 3x3x3", "slices = { pixels = 20, smooth = { kernel = 3 } }"),
+        ("Gaussian of 5x5x5", "slices = { pixels = 20, smooth = { kernel = 5 } }"),
+        ("slight blur", "slices = { pixels = 20, blur = true }"),
+        ("slight blur and frames joined", "slices = { pixels = 20, blur = true, smooth = { elevation = 1.0 } }"),
+        ("median estimator", "slices = { pixels = 20, estimator = 'median' }"),
+        (
+            "Perona-Malik estimator, between filters",
+            "slices = { pixels = 20, estimator = 'perona-malik', sigma = { window = 3, sigma = 0.1 } }",
+        ),
+        ("gradient-inverse estimator", "slices = { pixels = 20, estimator = 'gradient-inverse' }"),
+        ("Nagao-Matsuyama estimator", "slices = { pixels = 20, estimator = 'nagao-matsuyama' }"),
+        (
+            "sigmas of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = 0.3, noise = 'multiplicative' } }\n\
+             post = { sigma = { window = 7, sigma = 0.15, noise = 'multiplicative' } }",
+        ),
+        (
+            "infinite sigma of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = inf, noise = 'multiplicative' } }",
+        ),
         ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
         ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
     ] {
@@ -253,10 +322,11 @@ fn run_one(
     single: &mut Single,
     scene: &Scene,
     pass: &'static Pass,
+    iteration: u32,
     kind: &str,
     seed: u64,
 ) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
-    let turn = Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration: 0, image: 0 };
+    let turn = Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 };
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
     for bind in (pass.reads)(scene, &turn) {
@@ -283,12 +353,17 @@ fn every_pass_matches_its_reference() {
     for (name, scene) in scenes() {
         for (n, pass) in PASSES.iter().enumerate().filter(|(_, p)| p.is_needed(&scene)) {
             for (k, kind) in KINDS.iter().enumerate() {
-                let (_, expected, got, writes) = run_one(&mut single, &scene, pass, kind, (n * 8 + k) as u64);
-                match compare(pass, &scene, &expected, &got, &writes) {
-                    Ok(error) => errors[n].1 = error.max(errors[n].1),
-                    Err(fault) => failures.push(format!("{} in '{name}' on {kind}: {fault}", pass.name)),
+                for iteration in 0..(pass.repeat)(&scene) {
+                    let seed = (n * 8 + k) as u64;
+                    let (_, expected, got, writes) = run_one(&mut single, &scene, pass, iteration, kind, seed);
+                    match compare(pass, &scene, &expected, &got, &writes) {
+                        Ok(error) => errors[n].1 = error.max(errors[n].1),
+                        Err(fault) => {
+                            failures.push(format!("{} ({iteration}) in '{name}' on {kind}: {fault}", pass.name))
+                        }
+                    }
+                    errors[n].2 += 1;
                 }
-                errors[n].2 += 1;
             }
         }
     }
@@ -305,7 +380,7 @@ fn what_measures_the_device_computes_what_it_says() {
     let mut single = Single::new(&device).expect("single");
     let scene = measure::scene(11, 19).expect("scene");
     for pass in measure::MEASURES {
-        let (_, expected, got, writes) = run_one(&mut single, &scene, pass, "noise", 7);
+        let (_, expected, got, writes) = run_one(&mut single, &scene, pass, 0, "noise", 7);
         compare(pass, &scene, &expected, &got, &writes).unwrap_or_else(|e| panic!("{}: {e}", pass.name));
     }
 }
@@ -339,7 +414,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     ];
     for (fault, name, told, wrong) in cases {
         let pass = echolume::passes::by_name(name).expect("pass");
-        let (inputs, right, got, writes) = run_one(&mut single, told, pass, "noise", 5);
+        let (inputs, right, got, writes) = run_one(&mut single, told, pass, 0, "noise", 5);
         compare(pass, told, &right, &got, &writes).expect("unperturbed");
         let turn = Turn { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
@@ -352,7 +427,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     }
     // One voxel.
     let pass = echolume::passes::by_name("median_slice").expect("pass");
-    let (mut inputs, _, got, writes) = run_one(&mut single, &base, pass, "zero", 5);
+    let (mut inputs, _, got, writes) = run_one(&mut single, &base, pass, 0, "zero", 5);
     let mut source = inputs.get("source").clone();
     let middle = source.size[0] * (source.size[1] / 2) + source.size[0] / 2;
     (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
@@ -369,7 +444,7 @@ fn what_is_outside_the_sector_is_not_touched() {
     let mut single = Single::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
-    let (_, expected, got, _) = run_one(&mut single, &scene, pass, "one", 1);
+    let (_, expected, got, _) = run_one(&mut single, &scene, pass, 0, "one", 1);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
     let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();
     let poison = Texels::decode(

@@ -3,7 +3,6 @@
 
 use crate::passes::chain::{slice_link, writes_volume};
 use crate::passes::*;
-use crate::scene::gaussian_radius;
 
 const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
@@ -47,7 +46,7 @@ pub const ELEVATION: Pass = Pass {
     shader: |_, _| "filter/gaussian.volume",
     needed: |s| asked(s, 2),
     reads: |s, _| {
-        let part = Part::Around(gaussian_radius(s.smoothing()[2]));
+        let part = Part::Around(s.smoothing_radius()[2]);
         vec![Bind { name: "source", slot: Slot::SharpVolume, part }]
     },
     writes: |_, _| vec![Bind { name: "target", slot: Slot::Volume, part: Part::Around(0) }],
@@ -69,14 +68,14 @@ fn params(scene: &Scene, axis: usize, turn: &Turn) -> Params {
 }
 
 fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
-    vec![("RADIUS", gaussian_radius(scene.smoothing()[axis]) as i32), ("AXIS", axis as i32)]
+    vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32)]
 }
 
 fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
     let deviation = scene.smoothing()[axis];
-    let radius = i64::from(gaussian_radius(deviation));
+    let radius = i64::from(scene.smoothing_radius()[axis]);
     let slices = if axis < 2 { 0..1 } else { turn.slice as usize..(turn.slice + turn.slices) as usize };
     for z in slices {
         for y in 0..source.size[1] {
