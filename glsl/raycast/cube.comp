@@ -59,6 +59,31 @@ vec4 border(int n, vec3 p, float slice) {
     return n == 4 ? vec4(-sweep, position * pitch) : vec4(sweep, (last - position) * pitch);
 }
 
+// Distance from a line or a plane through the apex at an angle given by the tangent of its half: a x + b y with a unit
+// normal, positive on the side of larger angles.
+float beyond_angle(vec2 p, float half_tangent) {
+    float t2 = half_tangent * half_tangent;
+    return (p.x * (1.0 - t2) - p.y * 2.0 * half_tangent) / (1.0 + t2);
+}
+
+// At least as far as this is the way to the insonified region, mm: each border is a distance from a sphere, a plane or a
+// cone that holds it, and no such distance shrinks faster than a ray goes.
+float way_to_sector(vec3 p) {
+    float y = p.y, x = p.x, away = 0.0;
+    if (SWEEP == 1) y = length(vec2(p.y - axis_depth, p.z)) + axis_depth;
+    float range = ARRAY == 1 ? length(vec2(x, y)) : y;
+    away = max(away, max(range - range_high, range_low - range));
+    away = max(away, ARRAY == 1 ? max(beyond_angle(vec2(x, y), line_high), -beyond_angle(vec2(x, y), line_low))
+                                : max(x - line_high, line_low - x));
+#ifdef SWEPT
+    float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
+    vec2 q = vec2(p.z, p.y - axis_depth);
+    away = max(away, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
+                                : max(p.z - sweep_high, sweep_low - p.z));
+#endif
+    return away;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
@@ -87,11 +112,14 @@ void main() {
         enter += 0.02 * step;
         int found = -1;
         vec3 texel;
-        for (int i = 0; i < steps; ++i) {
-            if (locate(from + along * (enter + float(i) * step), texel)) {
+        for (int i = 0; i < steps;) {
+            vec3 p = from + along * (enter + float(i) * step);
+            if (locate(p, texel)) {
                 found = i;
                 break;
             }
+            // Steps that are outside for certain are left out.
+            i += max(int(way_to_sector(p) / step - 0.01), 1);
         }
         if (found >= 0) {
             float outside = enter + float(found - 1) * step, inside = enter + float(found) * step;

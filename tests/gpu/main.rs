@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod common;
+mod cube;
 mod detector;
 mod faults;
 mod goldens;
@@ -13,4 +14,5 @@ mod planes;
 mod recordings;
 mod reruns;
 mod shading;
+mod tiles;
 mod truth;

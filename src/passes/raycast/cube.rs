@@ -44,11 +44,11 @@ pub const PASS: Pass = Pass {
         constants
     },
     tolerance: Tolerance {
-        absolute: 6e-3,
+        absolute: 1e-2,
         relative: 0.0,
-        outliers: 1e-2,
+        outliers: 2e-3,
         why: "the sector's border is found to 1/64 of half a slice pixel, the reference to the end: as much of a voxel's \
-              contrast; a ray that grazes a border, and one at an edge, may fall on either side",
+              contrast and of an edge line's rise; a ray that grazes a border may fall on either side",
     },
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
