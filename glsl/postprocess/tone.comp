@@ -4,6 +4,9 @@
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int COLOUR_MAP = 0; // 1: brightness through the map below
+#ifdef LINES
+layout(constant_id = 1) const int CROSSING = 2; // planes whose lines cross each tile
+#endif
 layout(scalar) uniform Params {
     float brightness;
     float contrast;
@@ -37,7 +40,7 @@ vec3 with_lines(vec3 c, ivec2 pixel, ivec2 size) {
     if (n >= tiles.entry.length()) return c;
     ivec2 corner = cell_corner(cell, size, cells), end = cell_corner(cell + 1, size, cells);
     vec2 at = vec2(pixel - corner) + 0.5;
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < CROSSING; ++i) {
         vec4 line = tiles.entry[n].line[i];
         // As much of the pixel as a line one pixel wide covers.
         float cover = clamp(1.0 - abs(dot(line.xy, at) + line.z), 0.0, 1.0) * line.w;

@@ -10,30 +10,78 @@ layout(scalar) uniform Params {
     float shading;
     float edge_strength;
     vec3 edge_colour;
+    float slice_pitch; // mean distance of slices: rad (fan) or mm
 };
 #include "ray.glsl"
 readonly buffer Block { vec4 entry[]; } block; // outward normals and limits
 uniform writeonly image2D picture;
 
 const int HALVINGS = 6; // 1/64 of a step
+// Pixels from an edge at which its line has faded, on either side: at the block's outline there is only one, and a narrower
+// line would be a row of dots.
+const float EDGE_WIDTH = 1.5;
 
-// Normal of the sector's border nearest to a place just outside it. The motor's way over the lines of a frame turns it by
-// less than a degree and is left out.
-vec3 border_normal(vec3 p) {
+#ifdef SWEPT
+const int BORDERS = 6;
+#else
+const int BORDERS = SWEEP == 0 ? 0 : 4;
+#endif
+
+// Outward normal of one of the sector's borders near a place, and in w how far inside that lies, mm: first and last range,
+// line and slice. `slice` is the place's slice index. The motor's way over the lines of a frame turns the slices by less
+// than a degree and is left out of their normals.
+vec4 border(int n, vec3 p, float slice) {
     float beyond = p.y - axis_depth, rho = SWEEP == 1 ? max(sqrt(beyond * beyond + p.z * p.z), 1e-20) : 1.0;
-    // The frame's own depth axis and the way of the sweep, in space.
+    // The frame's own depth axis in space.
     vec3 depth = SWEEP == 1 ? vec3(0.0, beyond / rho, p.z / rho) : vec3(0.0, 1.0, 0.0);
-    vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
     float x = p.x, y = SWEEP == 1 ? rho + axis_depth : p.y;
     float range = ARRAY == 1 ? max(sqrt(x * x + y * y), 1e-20) : y;
-    float line = ARRAY == 1 ? x / max(range + y, 1e-20) : x;
     vec3 along = ARRAY == 1 ? (vec3(x, 0.0, 0.0) + depth * y) / range : depth;
+    if (n == 0) return vec4(-along, range - range_low);
+    if (n == 1) return vec4(along, range_high - range);
     vec3 across = ARRAY == 1 ? (vec3(y, 0.0, 0.0) - depth * x) / range : vec3(1.0, 0.0, 0.0);
-    if (range > range_high) return along;
-    if (range < range_low) return -along;
-    if (line > line_high) return across;
-    if (line < line_low) return -across;
-    return sweep;
+    if (n < 4) {
+        // Of two half tangents: the tangent of half the angle between them.
+        float limit = n == 2 ? line_low : line_high;
+        float line = ARRAY == 1 ? x / max(range + y, 1e-20) : x;
+        float apart = ARRAY == 1 ? 2.0 * range * (limit - line) / (1.0 + limit * line) : limit - line;
+        return n == 2 ? vec4(-across, -apart) : vec4(across, apart);
+    }
+    vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
+    // In mean pitches from the first slice.
+    float position = slice, last = float(textureSize(volume, 0).z - 1);
+#ifdef UNEVEN
+    int s = clamp(int(slice), 0, slice_table.entry.length() - 2);
+    position = mix(slice_table.entry[s].x, slice_table.entry[s + 1].x, slice - float(s));
+    last = slice_table.entry[slice_table.entry.length() - 1].x;
+#endif
+    float pitch = slice_pitch * rho;
+    return n == 4 ? vec4(-sweep, position * pitch) : vec4(sweep, (last - position) * pitch);
+}
+
+// Distance from a line or a plane through the apex at an angle given by the tangent of its half: a x + b y with a unit
+// normal, positive on the side of larger angles.
+float beyond_angle(vec2 p, float half_tangent) {
+    float t2 = half_tangent * half_tangent;
+    return (p.x * (1.0 - t2) - p.y * 2.0 * half_tangent) / (1.0 + t2);
+}
+
+// At least as far as this is the way to the insonified region, mm: each border is a distance from a sphere, a plane or a
+// cone that holds it, and no such distance shrinks faster than a ray goes.
+float way_to_sector(vec3 p) {
+    float y = p.y, x = p.x, away = 0.0;
+    if (SWEEP == 1) y = length(vec2(p.y - axis_depth, p.z)) + axis_depth;
+    float range = ARRAY == 1 ? length(vec2(x, y)) : y;
+    away = max(away, max(range - range_high, range_low - range));
+    away = max(away, ARRAY == 1 ? max(beyond_angle(vec2(x, y), line_high), -beyond_angle(vec2(x, y), line_low))
+                                : max(x - line_high, line_low - x));
+#ifdef SWEPT
+    float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
+    vec2 q = vec2(p.z, p.y - axis_depth);
+    away = max(away, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
+                                : max(p.z - sweep_high, sweep_low - p.z));
+#endif
+    return away;
 }
 
 void main() {
@@ -64,11 +112,14 @@ void main() {
         enter += 0.02 * step;
         int found = -1;
         vec3 texel;
-        for (int i = 0; i < steps; ++i) {
-            if (locate(from + along * (enter + float(i) * step), texel)) {
+        for (int i = 0; i < steps;) {
+            vec3 p = from + along * (enter + float(i) * step);
+            if (locate(p, texel)) {
                 found = i;
                 break;
             }
+            // Steps that are outside for certain are left out.
+            i += max(int(way_to_sector(p) / step - 0.01), 1);
         }
         if (found >= 0) {
             float outside = enter + float(found - 1) * step, inside = enter + float(found) * step;
@@ -79,22 +130,41 @@ void main() {
                 else outside = middle;
             }
             vec3 p = from + along * inside;
+            vec3 normal = face >= 0 ? block.entry[face].xyz : along;
+            int own = -1; // the border that is entered
+            if (found > 0) {
+                vec3 before = from + along * outside;
+                locate(before, texel);
+                float least = 3.0e38;
+                for (int i = 0; i < BORDERS; ++i) {
+                    vec4 side = border(i, before, texel.z);
+                    if (side.w >= least) continue;
+                    least = side.w;
+                    normal = side.xyz;
+                    own = i;
+                }
+                face = -1;
+            }
             locate(p, texel);
-            vec3 normal = found > 0 ? border_normal(from + along * outside) : face >= 0 ? block.entry[face].xyz : along;
             float grey = sample_volume(texel) * (1.0 - shading * (1.0 - abs(dot(normal, along))));
             colour = vec4(vec3(grey), 1.0);
-            if (EDGES == 1 && found == 0 && face >= 0) {
+            if (EDGES == 1 && (face >= 0 || own >= 0)) {
                 // Change of place on the face over one pixel.
                 float scale = inside / length(unscaled);
                 vec3 ex = origin_dx + direction_dx * scale, ey = origin_dy + direction_dy * scale;
-                float facing = dot(normal, along);
+                float facing = min(dot(normal, along), -1e-3);
                 ex -= along * (dot(normal, ex) / facing);
                 ey -= along * (dot(normal, ey) / facing);
                 float near = 0.0;
-                for (int i = 0; i < block.entry.length(); ++i) {
-                    vec3 other = block.entry[i].xyz;
-                    float pixels = (block.entry[i].w - dot(other, p)) / max(length(vec2(dot(other, ex), dot(other, ey))), 1e-20);
-                    near = max(near, i == face ? 0.0 : 1.0 - pixels);
+                int halves = block.entry.length();
+                for (int i = 0; i < halves + BORDERS; ++i) {
+                    vec4 other;
+                    if (i < halves) {
+                        other = block.entry[i];
+                        other.w -= dot(other.xyz, p);
+                    } else other = border(i - halves, p, texel.z);
+                    float pixels = other.w / max(length(vec2(dot(other.xyz, ex), dot(other.xyz, ey))), 1e-20);
+                    near = max(near, i == face || (i >= halves && i - halves == own) ? 0.0 : EDGE_WIDTH - pixels);
                 }
                 colour.rgb = mix(colour.rgb, edge_colour, edge_strength * clamp(near, 0.0, 1.0));
             }

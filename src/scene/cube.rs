@@ -3,9 +3,6 @@
 use super::{Scene, SceneError, refuse};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Most half-spaces that bound a block: six faces, the six sides of the box where a face is turned, and four clip planes.
-pub const MAX_FACES: usize = 16;
-
 /// What lies beyond is no part of the block: dot(normal, p) > limit, the normal a unit vector that points out of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {

@@ -86,7 +86,8 @@ impl Scene {
         if self.shows_three() { 3 } else { columns.saturating_mul(rows) }
     }
 
-    fn shows_three(&self) -> bool {
+    /// Whether three planes that cross are shown.
+    pub fn shows_three(&self) -> bool {
         self.settings.layout == Layout::Four || self.settings.mode == Mode::Orthogonal
     }
 

@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod common;
+mod cube;
 mod detector;
 mod diffusion;
 mod faults;
@@ -17,5 +18,6 @@ mod rays;
 mod recordings;
 mod reruns;
 mod shading;
+mod tiles;
 mod timing;
 mod truth;

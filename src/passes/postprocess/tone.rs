@@ -41,7 +41,13 @@ pub const PASS: Pass = Pass {
         let [columns, rows] = s.tile_grid();
         params.i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
     },
-    constants: |s, _| vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)],
+    constants: |s, _| {
+        let mut constants = vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)];
+        if s.draws_lines() {
+            constants.push(("CROSSING", if s.shows_three() { 2 } else { 0 }));
+        }
+        constants
+    },
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,

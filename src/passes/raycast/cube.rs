@@ -2,12 +2,14 @@
 
 use super::ray;
 use crate::passes::*;
-use crate::probe::{Array, Geometry, Motion};
+use crate::probe::{Array, Motion, Probe};
 use crate::scene::cube::HalfSpace;
 use crate::scene::{Mode, Scene};
 
 /// Colour and strength of the lines where faces meet: told from tissue, which is grey.
-const EDGE: ([f64; 3], f64) = ([0.55, 0.75, 0.95], 0.8);
+const EDGE: ([f64; 3], f64) = ([0.55, 0.75, 0.95], 0.7);
+/// Pixels from an edge at which its line has faded.
+const EDGE_WIDTH: f64 = 1.5;
 
 pub const PASS: Pass = Pass {
     name: "raycast_cube",
@@ -32,6 +34,7 @@ pub const PASS: Pass = Pass {
             .f32("shading", s.settings.cube.shading)
             .f32("edge_strength", EDGE.1)
             .vec3("edge_colour", EDGE.0)
+            .f32("slice_pitch", s.probe().map_or(0.0, |p| p.slices.pitch()))
     },
     constants: |s, _| {
         let mut constants = ray::constants(s);
@@ -41,11 +44,11 @@ pub const PASS: Pass = Pass {
         constants
     },
     tolerance: Tolerance {
-        absolute: 6e-3,
+        absolute: 1e-2,
         relative: 0.0,
-        outliers: 1e-2,
+        outliers: 2e-3,
         why: "the sector's border is found to 1/64 of half a slice pixel, the reference to the end: as much of a voxel's \
-              contrast; a ray that grazes a border, and one at an edge, may fall on either side",
+              contrast and of an edge line's rise; a ray that grazes a border may fall on either side",
     },
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
@@ -96,65 +99,86 @@ fn shown(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, y: f64) ->
         *(if is_inside(middle) { &mut inside } else { &mut outside }) = middle;
     }
     let place = origin + direction * inside;
-    let on_face = face.filter(|_| n == 0.0);
-    let normal = match on_face {
-        Some(face) => block[face].normal,
-        None if n > 0.0 => border_normal(scene, origin + direction * outside),
-        // The camera is within the block.
-        None => direction,
+    // A block face, a border of the sector, or neither: the camera is within the block.
+    let borders = |place| scene.probe().map_or(Vec::new(), |probe| borders(probe, place));
+    let before = borders(origin + direction * outside);
+    let least = (0..before.len()).min_by(|a, b| before[*a].room.total_cmp(&before[*b].room));
+    let (own, normal) = match (face, least) {
+        (_, Some(border)) if n > 0.0 => (Some(block.len() + border), before[border].normal),
+        (Some(face), _) => (Some(face), block[face].normal),
+        (None, _) => (None, direction),
     };
     let Some(texel) = ray::texel(scene, place) else { return [0.0; 4] };
     let [low, high] = scene.settings.cube.window;
     let value = ((volume.trilinear(texel) - low) / (high - low)).clamp(0.0, 1.0);
     let grey = value * (1.0 - scene.settings.cube.shading * (1.0 - normal.dot(direction).abs()));
-    let near = match on_face {
-        Some(face) if scene.settings.cube.edges => edge(scene, block, face, place, x, y),
+    let near = match own {
+        Some(own) if scene.settings.cube.edges => {
+            let faces = block.iter().map(|half| Side { normal: half.normal, room: half.room(place) });
+            let sides = faces.chain(borders(place)).enumerate();
+            edge(scene, sides.filter(|(i, _)| *i != own).map(|(_, side)| side), normal, place, x, y)
+        }
         _ => 0.0,
     };
     let [r, g, b] = EDGE.0.map(|c| grey + (c - grey) * EDGE.1 * near);
     [r, g, b, 1.0]
 }
 
-/// How much of a pixel the line where its face meets another covers: the distance to it in pixels by how fast the room to
-/// the other half-space shrinks from pixel to pixel, both seen on the face.
-fn edge(scene: &Scene, block: &[HalfSpace], face: usize, place: DVec3, x: f64, y: f64) -> f64 {
-    // Where the rays of places next to the pixel's centre meet the face.
+/// A face of the block or a border of the sector as seen from a place: the way out, and how far it is, mm.
+struct Side {
+    normal: DVec3,
+    room: f64,
+}
+
+/// How much of a pixel the line where its face meets another covers, 1 up to half a pixel from it and 0 from one and a half: the distance to it in pixels by how fast the room
+/// shrinks from pixel to pixel, both seen on the face.
+fn edge(scene: &Scene, others: impl Iterator<Item = Side>, normal: DVec3, place: DVec3, x: f64, y: f64) -> f64 {
+    // Where the rays of places next to the pixel's centre meet the face; one that is seen edge-on stays a thin one.
     let small = 1e-4;
     let on_face = |x: f64, y: f64| {
         let (origin, direction) = scene.rays.at(x, y);
-        origin + direction * (block[face].room(origin) / block[face].normal.dot(direction))
+        let along = (place - origin).dot(direction);
+        let near = origin + direction * along;
+        near + direction * (normal.dot(place - near) / normal.dot(direction).min(-1e-3))
     };
     let dx = (on_face(x + small, y) - on_face(x - small, y)) / (2.0 * small);
     let dy = (on_face(x, y + small) - on_face(x, y - small)) / (2.0 * small);
-    let others = block.iter().enumerate().filter(|(i, _)| *i != face);
-    let cover = others.map(|(_, o)| 1.0 - o.room(place) / o.normal.dot(dx).hypot(o.normal.dot(dy)).max(1e-20));
+    let cover = others.map(|o| EDGE_WIDTH - o.room / o.normal.dot(dx).hypot(o.normal.dot(dy)).max(1e-20));
     cover.fold(0.0, f64::max).clamp(0.0, 1.0)
 }
 
-/// Outward normal of the sector's border at a place just outside it: the gradient of what is exceeded there, the range, the
-/// line or the slice. (The motor's way over the lines of a frame turns it by less than a degree and is left out.)
-fn border_normal(scene: &Scene, place: DVec3) -> DVec3 {
-    let Geometry::Sweep(probe) = &scene.geometry else { return DVec3::Y };
+/// First and last range, line and slice of the sector as seen from a place. (The motor's way over the lines of a frame turns
+/// the slices by less than a degree and is left out of their normals.)
+fn borders(probe: &Probe, place: DVec3) -> Vec<Side> {
     let (x, y, position) = probe.unswept(place);
-    let (depth, sweep) = match probe.motion {
+    let (depth, sweep, mm) = match probe.motion {
         Motion::Fan { .. } => {
-            (DVec3::new(0.0, position.cos(), position.sin()), DVec3::new(0.0, -position.sin(), position.cos()))
+            let (sin, cos) = position.sin_cos();
+            (DVec3::new(0.0, cos, sin), DVec3::new(0.0, -sin, cos), y - probe.axis_depth())
         }
-        _ => (DVec3::Y, DVec3::Z),
+        _ => (DVec3::Y, DVec3::Z, 1.0),
     };
-    let (along, across) = match probe.array {
+    let (range, at, along, across) = match probe.array {
         Array::Curved { .. } => {
             let (sin, cos) = x.atan2(y).sin_cos();
-            (DVec3::X * sin + depth * cos, DVec3::X * cos - depth * sin)
+            (x.hypot(y), x.atan2(y), DVec3::X * sin + depth * cos, DVec3::X * cos - depth * sin)
         }
-        Array::Linear => (depth, DVec3::X),
+        Array::Linear => (y, x, depth, DVec3::X),
     };
-    let at = probe.to_indices(place);
-    match (at.sample / (probe.samples - 1) as f64, at.line / (probe.lines.len() - 1) as f64) {
-        (sample, _) if sample > 1.0 => along,
-        (sample, _) if sample < 0.0 => -along,
-        (_, line) if line > 1.0 => across,
-        (_, line) if line < 0.0 => -across,
-        _ => sweep,
+    let side = |normal, room| Side { normal, room };
+    let line_mm = if matches!(probe.array, Array::Linear) { 1.0 } else { range };
+    let mut sides = vec![
+        side(-along, range - probe.first_range()),
+        side(along, probe.last_range() - range),
+        side(-across, (at - probe.lines.first()) * line_mm),
+        side(across, (probe.lines.last() - at) * line_mm),
+    ];
+    if !matches!(probe.motion, Motion::Still { .. }) {
+        let line = probe.to_indices(place).line;
+        let (first, last) =
+            (probe.slice_position(line, 0.0), probe.slice_position(line, (probe.slices.len() - 1) as f64));
+        sides.push(side(-sweep, (position - first) * mm));
+        sides.push(side(sweep, (last - position) * mm));
     }
+    sides
 }

@@ -95,7 +95,7 @@ pub struct Cube {
     pub tilt: Tilt,
     /// How much darker a face is that is seen edge-on, 0..1; 0 shows samples as they are.
     pub shading: f64,
-    /// Draws thin lines where two faces meet.
+    /// Draws thin lines where two faces meet; the borders of the insonified region are faces too.
     pub edges: bool,
 }
 

@@ -1,0 +1,184 @@
+//! Pictures of several planes: lines, tiles, what runs for them and runs again, and what is refused.
+
+use crate::common::*;
+use crate::planes::{TURNED, picture};
+use echolume::plan::Plan;
+use echolume::probe::Geometry;
+use echolume::scene::{PlaneName, Scene, SceneError, Settings};
+use glam::DVec3;
+
+/// Over a black volume only lines are left: along a row or a column their centre of light is the other plane's place.
+#[test]
+fn cross_lines_run_through_the_place_where_the_planes_meet() {
+    let device = Device::new();
+    let position = DVec3::new(3.3, 31.0, -2.1);
+    for (layout, angles) in [("mode = 'orthogonal'", ""), ("mode = 'orthogonal'", TURNED)] {
+        let toml = format!(
+            "{layout}\nplanes = {{ position = [3.3, 11.0, -2.1], {angles} }}\npicture = {{ size = [121, 101] }}\nslices = {{ pixels = 40 }}
+             post = {{ colour_map = 'sepia', gamma = 2.0 }}"
+        );
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(",  }", " }"));
+        let frames = frames(&scene, |_| 0.0);
+        let screen = rendered(&device, scene.clone(), &frames).picture().expect("picture");
+        let sheet = scene.sheet();
+        assert_eq!(sheet.tiles.len(), 3);
+        for (n, tile) in sheet.tiles.iter().enumerate() {
+            // Where the three planes meet, in pixels from the tile's corner.
+            let away = position - tile.plane.at;
+            let meet: [f64; 2] = [tile.plane.right, tile.plane.down].map(|axis| away.dot(axis) / sheet.pixel);
+            let meet = [meet[0] + f64::from(tile.size[0]) / 2.0, meet[1] + f64::from(tile.size[1]) / 2.0];
+            // Far from the crossing, where one line alone is met.
+            for axis in 0..2 {
+                let across =
+                    if meet[1 - axis] > f64::from(tile.size[1 - axis]) / 2.0 { 4 } else { tile.size[1 - axis] - 5 };
+                let (mut sum, mut weight) = (0.0, 0.0);
+                for along in 1..tile.size[axis] - 1 {
+                    let mut at = [along + tile.corner[0], across + tile.corner[1]];
+                    if axis == 1 {
+                        at = [across + tile.corner[0], along + tile.corner[1]];
+                    }
+                    let pixel = &screen.rgba[4 * (at[1] * 121 + at[0]) as usize..][..3];
+                    let light: f64 = pixel.iter().map(|v| f64::from(*v)).sum();
+                    sum += light * (f64::from(along) + 0.5);
+                    weight += light;
+                }
+                assert!(weight > 100.0, "tile {n} has its line");
+                assert!((sum / weight - meet[axis]).abs() < 0.03, "tile {n}: {} for {}", sum / weight, meet[axis]);
+            }
+            let corner = 4 * (tile.corner[1] * 121 + tile.corner[0]) as usize;
+            let name = [PlaneName::A, PlaneName::B, PlaneName::C][n];
+            let frame = echolume::scene::planes::colour(name).map(|c| (c * 255.0).round() as u8);
+            assert_eq!(screen.rgba[corner..corner + 3], frame, "tile {n} is framed in its plane's colour");
+        }
+    }
+}
+
+/// Every tile of a tomography is the picture of a plane at its place, to the bit.
+#[test]
+fn a_tile_of_tomography_is_the_single_plane_at_its_offset() {
+    let device = Device::new();
+    for plane in ["a", "b", "c"] {
+        let with = |toml: String| {
+            let toml = format!("{toml}\nslices = {{ pixels = 48 }}");
+            scene(Geometry::Sweep(wobbler()), BYTES, &toml)
+        };
+        let all = with(format!(
+            "mode = 'tomography'\npicture = {{ size = [96, 60] }}
+             planes = {{ plane = '{plane}', columns = 3, rows = 2, spacing = 2.0, position = [1.0, 20.0, -0.5] }}"
+        ));
+        let frames =
+            body_frames(&all, |p| (0.5 + 0.3 * (0.9 * p.x).sin() + 0.2 * (0.7 * p.y + p.z).cos()).clamp(0.0, 1.0));
+        let mut renderer = rendered(&device, all, &frames);
+        let tiles = picture(&mut renderer);
+        let mut lit = 0;
+        for n in 0..6 {
+            let offset = 2.0 * (f64::from(n) - 2.5);
+            let mut position = [1.0, 20.0, -0.5];
+            position[match plane {
+                "a" => 2,
+                "b" => 0,
+                _ => 1,
+            }] += offset;
+            let one = with(format!(
+                "mode = 'plane'\npicture = {{ size = [32, 30] }}\nplanes = {{ plane = '{plane}', position = {position:?} }}"
+            ));
+            renderer.change(one).expect("change");
+            let single = picture(&mut renderer);
+            for (x, y) in (0..30).flat_map(|y| (0..32).map(move |x| (x, y))) {
+                let tile = tiles.get([x + 32 * (n as usize % 3), y + 30 * (n as usize / 3), 0]);
+                assert_eq!(tile, single.get([x, y, 0]), "plane {plane}, tile {n} at {x}, {y}");
+                lit += usize::from(tile[3] > 0.0);
+            }
+        }
+        assert!(lit > 500, "{lit} pixels of plane {plane} show something");
+    }
+}
+
+#[test]
+fn flat_modes_have_no_ray_no_transfer_and_no_distance_map() {
+    let plan = |toml: &str| {
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml);
+        let plan = Plan::new(&scene);
+        let passes: Vec<_> = plan.steps.iter().map(|s| s.pass.name).collect();
+        let slots: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
+        (passes.join(" "), slots.join(" "))
+    };
+    let flat = "frames scan_lut volume sweep_lut tiles picture screen";
+    for mode in ["plane", "orthogonal", "tomography"] {
+        let (passes, slots) =
+            plan(&format!("mode = '{mode}'\nlight = {{ shadow = {{}} }}\ndistance = {{ median = 3 }}"));
+        assert_eq!((passes.as_str(), slots.as_str()), ("scan_convert raycast_planes tone", flat), "{mode}");
+    }
+    let (passes, slots) = plan("mode = 'cube'");
+    assert_eq!(passes, "scan_convert raycast_cube tone");
+    assert_eq!(slots, "frames scan_lut volume sweep_lut block picture screen");
+    let (passes, slots) = plan("mode = 'vr'");
+    assert!(!passes.contains("planes") && !slots.contains("tiles") && !slots.contains("block"));
+    let (passes, slots) = plan("mode = 'vr'\nlayout = 'four'");
+    assert!(passes.contains("raycast_volume raycast_planes") && slots.contains("tiles"), "{passes}: {slots}");
+    assert!(slots.contains("rendered planes"), "{slots}");
+}
+
+#[test]
+fn a_plane_that_moves_runs_again_alone() {
+    let device = Device::new();
+    let with = |toml: &str| {
+        scene(
+            Geometry::Sweep(wobbler()),
+            BYTES,
+            &format!("picture = {{ size = [24, 24] }}\nslices = {{ pixels = 40 }}\n{toml}"),
+        )
+    };
+    let first = with("mode = 'orthogonal'");
+    let frames = body_frames(&first, |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+    let mut renderer = rendered(&device, first, &frames);
+    renderer.picture().expect("picture");
+    for (toml, expected) in [
+        ("mode = 'orthogonal'\nplanes = { position = [1, 20, 2] }", &["raycast_planes", "tone"][..]),
+        (
+            "mode = 'orthogonal'\nplanes = { position = [1, 20, 2] }\ncamera = { azimuth = 30 }\nray = { step = 0.3 }",
+            &[],
+        ),
+        ("mode = 'orthogonal'\nplanes = { position = [1, 20, 2], lines = false }", &["raycast_planes", "tone"]),
+        ("mode = 'orthogonal'\nplanes = { position = [1, 20, 2], lines = false }\npost = { gamma = 2 }", &["tone"]),
+        ("mode = 'tomography'\nplanes = { columns = 3, rows = 2 }", &["raycast_planes", "tone"]),
+        ("mode = 'cube'", &["raycast_cube", "tone"]),
+        ("mode = 'cube'\ncube = { inset = { left = 3 } }", &["raycast_cube", "tone"]),
+        ("mode = 'cube'\ncube = { inset = { left = 3 }, tilt = { left = [5, 0] } }", &["raycast_cube", "tone"]),
+    ] {
+        let scene = with(toml);
+        let names = renderer.dispatched(|r| r.change(scene.clone()).and_then(|_| r.picture())).expect("picture");
+        assert_eq!(names, expected, "{toml}");
+        let fresh = rendered(&device, scene, &frames).picture().expect("picture");
+        assert_eq!(renderer.picture().expect("picture"), fresh, "{toml}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_by_name() {
+    for (toml, field) in [
+        ("mode = 'tomography'\nplanes = { columns = 9, rows = 8 }", "planes.columns"),
+        ("mode = 'tomography'\nplanes = { columns = 0 }", "planes.columns"),
+        ("mode = 'tomography'\nplanes = { columns = 5 }\npicture = { size = [4, 9] }", "picture.size"),
+        ("mode = 'orthogonal'\npicture = { size = [1, 9] }", "picture.size"),
+        ("layout = 'four'\npicture = { size = [1, 1] }", "picture.size"),
+        ("mode = 'plane'\nplanes = { thickness = 50000 }", "planes.thickness"),
+        ("mode = 'plane'\nplanes = { thickness = -1 }", "planes.thickness"),
+        ("mode = 'plane'\nplanes = { position = [0, nan, 0] }", "planes.position"),
+        ("mode = 'plane'\nplanes = { azimuth = inf }", "planes.azimuth"),
+        ("mode = 'plane'\nplanes = { zoom = 0 }", "planes.zoom"),
+        ("mode = 'plane'\nplanes = { window = [0.5, 0.5] }", "planes.window"),
+        ("mode = 'plane'\nplanes = { spacing = 0 }", "planes.spacing"),
+        ("mode = 'cube'\ncube = { inset = { left = 40, right = 50 } }", "cube.inset"),
+        ("mode = 'cube'\ncube = { inset = { near = 500 } }", "cube.inset"),
+        ("mode = 'cube'\ncube = { inset = { near = -1 } }", "cube.inset.near"),
+        ("mode = 'cube'\ncube = { tilt = { top = [85, 0] } }", "cube.tilt.top"),
+        ("mode = 'cube'\ncube = { shading = 1.5 }", "cube.shading"),
+    ] {
+        let settings: Settings = toml::from_str(toml).expect("settings");
+        let Err(SceneError { field: named, fault }) = Scene::new(Geometry::Sweep(wobbler()), BYTES, settings) else {
+            panic!("{toml} was not refused")
+        };
+        assert!(named.contains(field) && !fault.contains('\n'), "{toml}: {named}: {fault}");
+    }
+}
