@@ -19,6 +19,7 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    mod detector;
     pub mod ray;
     pub mod surface;
     pub mod volume;
