@@ -37,12 +37,16 @@ int weak_at = 0, weak_segment = 0;
 bool again = false; // it is being looked at
 bool lasts = true;
 
+float variance_of(vec4 samples) {
+    vec4 off = samples - dot(samples, QUARTER);
+    return dot(off, off) / 3.0;
+}
+
 // Running mean and sample variance of what has left the newer half, with a memory of MEMORY samples.
 void learn() {
     if (learnt == 0.0) {
         quiet = dot(older, QUARTER);
-        vec4 off = older - quiet;
-        variance = dot(off, off) / 3.0;
+        variance = variance_of(older);
         learnt = 4.0;
         return;
     }
@@ -79,19 +83,24 @@ bool take_sample(float value, inout int i) {
     ++filled;
     float difference = polarity * dot(newer - older, QUARTER);
     bool ready = filled >= RING;
+    // What an edge must exceed to stand out. Few samples say less of the noise than many; while there are none, the scatter
+    // within the newer half stands for it.
     float doubt = 0.0;
-    if (DETECTOR > 0 && ready && state == START && !again) {
-        learn();
+    if (DETECTOR > 0 && !again) {
+        bool searches = ready && state == START;
+        // Before a Cartesian region lies the repeated border: that it is even says nothing.
+        if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
+        bool knows = learnt > 0.0;
+        float deviation = noise * sqrt(knows ? variance : variance_of(newer));
+        doubt = deviation * (knows ? 1.0 + float(RING) / learnt : 1.0);
         float height = START == SEARCH_ROUGH ? rough_threshold : threshold;
-        if (difference > max(height, weak) && i >= RING / 2) {
+        if (searches && difference > max(height, weak) && i >= RING / 2) {
             weak = difference;
             weak_at = i;
             weak_segment = segment;
-            weak_level = polarity * quiet + 0.5 * noise * sqrt(variance);
+            weak_level = polarity * (knows ? quiet : dot(older, QUARTER)) + 0.5 * deviation;
         }
     }
-    // Few samples say less of the noise than many.
-    if (DETECTOR > 0 && !again) doubt = noise * (1.0 + float(RING) / max(learnt, 1.0)) * sqrt(variance);
     if (ROUGH > 1 && state == SEARCH_ROUGH) {
         if (ready && difference > max(rough_threshold, doubt)) {
             limit = i + RING;

@@ -4,7 +4,8 @@
 //!
 //! The plain threshold is the thesis'. The adaptive one is a detector of constant false alarm rate (Rohling 1983): D must
 //! exceed the threshold and noise (1 + n/m) s, where s is the standard deviation of the m samples before the ring's newer
-//! half, with a memory of 16: a stricter bar while little is known. What stays below that bar may be a weak wall: when the
+//! half, with a memory of 16: a stricter bar while little is known, and noise times the scatter within the newer half while
+//! nothing is. What stays below that bar may be a weak wall: when the
 //! ray has nothing better, its tallest such edge is looked at again, and is the surface if the mean of the n samples from
 //! its crossing on exceeds that of what lay before it by noise s / 2. Noise of standard deviation s leaves that mean
 //! uncertain by 0.35 s and D by 0.71 s: what does not stand out by its height may by how long it lasts.
@@ -12,6 +13,7 @@
 //! The lasting detector also passes over an edge when less than half of it is left half a ring behind it: what floats in the
 //! fluid, and shells thinner than that in front of something else. A shell that is all there is on the ray is still found.
 
+use crate::probe::Geometry;
 use crate::scene::{Detector, Place, RING, Scene, Sign, Surface};
 
 /// Samples that the noise is learnt from.
@@ -28,7 +30,9 @@ pub(super) fn polarity(scene: &Scene) -> f64 {
 /// Place of the surface in samples, and the echo behind it. Sample n is the ray's sample `first + n`; the region begins at its
 /// sample 0, and half a ring later an edge in its middle may be a surface.
 pub(super) fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f64)> {
-    let ray = Ray { settings: &scene.settings.surface, polarity: polarity(scene), samples, first };
+    // A Cartesian volume repeats its border: that it is even says nothing of the noise.
+    let bordered = matches!(scene.geometry, Geometry::Cartesian(_));
+    let ray = Ray { settings: &scene.settings.surface, polarity: polarity(scene), samples, first, bordered };
     let mut state = State { noise: Noise::default(), weak: None, seen: 0 };
     match ray.search(&mut state) {
         End::Surface(place, echo) => Some((place, echo)),
@@ -62,10 +66,6 @@ impl Noise {
         let off = older[0] - self.mean;
         self.mean += off / n;
         self.variance = self.variance * (n - 2.0) / (n - 1.0) + off * off / n;
-    }
-
-    fn deviation(&self) -> f64 {
-        self.variance.sqrt()
     }
 }
 
@@ -117,6 +117,8 @@ struct Ray<'a> {
     polarity: f64,
     samples: &'a [Option<f64>],
     first: i64,
+    /// What lies before the region is not learnt from.
+    bordered: bool,
 }
 
 impl Ray<'_> {
@@ -145,11 +147,32 @@ impl Ray<'_> {
         self.settings.rough_threshold.unwrap_or(self.settings.threshold)
     }
 
-    fn bar(&self, threshold: f64, noise: &Noise) -> f64 {
-        match self.adapts() && noise.learnt > 0.0 {
-            true => threshold.max(self.settings.noise * (1.0 + f64::from(RING) / noise.learnt) * noise.deviation()),
-            false => threshold,
+    /// The four samples of a half, newest first.
+    fn half(&self, i: usize, stride: usize, from: usize) -> [f64; N / 2] {
+        std::array::from_fn(|n| self.samples[i - (n + from) * stride].unwrap_or(0.0))
+    }
+
+    /// Mean and deviation of what lies before the newer half, the deviation from the newer half while nothing was learnt.
+    fn before(&self, noise: &Noise, i: usize, stride: usize) -> (f64, f64) {
+        let noise = match noise.learnt > 0.0 {
+            true => *noise,
+            false => {
+                let (mut newer, mut older) = (Noise::default(), Noise::default());
+                newer.learn(self.half(i, stride, 0));
+                older.learn(self.half(i, stride, N / 2));
+                Noise { mean: older.mean, ..newer }
+            }
+        };
+        (noise.mean, noise.variance.sqrt())
+    }
+
+    /// What the difference at i, where the ring is full, must exceed.
+    fn bar(&self, threshold: f64, noise: &Noise, i: usize, stride: usize) -> f64 {
+        if !self.adapts() {
+            return threshold;
         }
+        let doubt = if noise.learnt > 0.0 { 1.0 + f64::from(RING) / noise.learnt } else { 1.0 };
+        threshold.max(self.settings.noise * doubt * self.before(noise, i, stride).1)
     }
 
     /// Learns from the ring's older half, and takes note of an edge above the threshold.
@@ -157,11 +180,13 @@ impl Ray<'_> {
         if !self.adapts() {
             return;
         }
-        let older = std::array::from_fn(|n| self.samples[i - (n + N / 2) * stride].unwrap_or(0.0));
-        state.noise.learn(older);
+        if !self.bordered || i as i64 + self.first >= ((N - 1) * stride) as i64 {
+            state.noise.learn(self.half(i, stride, N / 2));
+        }
         let threshold = if stride > 1 { self.rough_threshold() } else { self.settings.threshold };
         if d > threshold && self.inside(i) {
-            let level = self.polarity * state.noise.mean + self.settings.noise * state.noise.deviation() / 2.0;
+            let (mean, deviation) = self.before(&state.noise, i, stride);
+            let level = self.polarity * mean + self.settings.noise * deviation / 2.0;
             state.pass_over(Weak { difference: d, at: i, since, level: Some(level) });
         }
     }
@@ -179,11 +204,11 @@ impl Ray<'_> {
             }
             let (mut from, mut limit) = (since, usize::MAX);
             if rough > 1 {
-                let difference = self.difference(i, rough, since);
-                if let Some(d) = difference {
+                let fires = self.difference(i, rough, since).is_some_and(|d| {
                     self.learn(state, d, i, rough, since);
-                }
-                if !difference.is_some_and(|d| d > self.bar(self.rough_threshold(), &state.noise)) {
+                    d > self.bar(self.rough_threshold(), &state.noise, i, rough)
+                });
+                if !fires {
                     i += rough;
                     continue;
                 }
@@ -215,7 +240,8 @@ impl Ray<'_> {
                 if let Some(d) = self.difference(at, 1, from).filter(|_| rough == 1) {
                     self.learn(state, d, at, 1, from);
                 }
-                if self.crosses(at, from, fresh, self.bar(self.settings.threshold, &state.noise)) {
+                let noise = state.noise;
+                if self.crosses(at, from, fresh, |i| self.bar(self.settings.threshold, &noise, i, 1)) {
                     let wanted = state.seen + 1 == self.settings.number;
                     match self.follow(at, from, wanted, false) {
                         Edge::Surface(place, echo) if wanted => return End::Surface(place, echo),
@@ -254,16 +280,19 @@ impl Ray<'_> {
         let last = (weak.at + N).min(self.samples.len() - 1);
         let at = (from..=last)
             .take_while(|i| self.samples[*i].is_some())
-            .find(|i| self.crosses(*i, from, from + N - 1, self.settings.threshold))?;
+            .find(|i| self.crosses(*i, from, from + N - 1, |_| self.settings.threshold))?;
         let Edge::Surface(place, echo) = self.follow(at, from, true, true) else { return None };
         let behind: f64 = self.samples.get(at + 1..=at + N)?.iter().copied().sum::<Option<f64>>()? / N as f64;
         weak.level.is_none_or(|level| self.polarity * behind > level).then_some((place, echo))
     }
 
     /// Above the bar here and not just before: an edge that was there before the region began is none of its surfaces.
-    fn crosses(&self, i: usize, since: usize, fresh: usize, bar: f64) -> bool {
-        let rises = i == fresh || self.difference(i.wrapping_sub(1), 1, since).is_none_or(|d| d <= bar);
-        self.inside(i) && rises && self.difference(i, 1, since).is_some_and(|d| d > bar)
+    fn crosses(&self, i: usize, since: usize, fresh: usize, bar: impl Fn(usize) -> f64) -> bool {
+        self.difference(i, 1, since).is_some_and(|d| {
+            let bar = bar(i);
+            let rises = i == fresh || self.difference(i.wrapping_sub(1), 1, since).is_none_or(|before| before <= bar);
+            self.inside(i) && rises && d > bar
+        })
     }
 
     /// Where the difference is largest within the ring's length from the crossing on.
