@@ -36,6 +36,7 @@ float weak = 0.0, weak_level = 0.0;
 int weak_at = 0, weak_segment = 0;
 bool again = false; // it is being looked at
 bool lasts = true;
+bool anew = false; // behind a speck: the next edge need not have risen just now
 
 float variance_of(vec4 samples) {
     vec4 off = samples - dot(samples, QUARTER);
@@ -115,7 +116,7 @@ bool take_sample(float value, inout int i) {
     } else if (state == SEARCH_FINE) {
         float bar = max(threshold, doubt);
         // A crossing: an edge that was there before the region began is not one.
-        if (ready && i >= RING / 2 && difference > bar && (filled == RING || previous <= bar)) {
+        if (ready && i >= RING / 2 && difference > bar && (filled == RING || anew || previous <= bar)) {
             state = FOLLOW;
             fired = i;
             best = difference;
@@ -137,6 +138,7 @@ bool take_sample(float value, inout int i) {
             segment = i;
             return true;
         }
+        anew = false;
     } else {
         if (i == best_at + 1) {
             after = difference;
@@ -162,7 +164,8 @@ bool take_sample(float value, inout int i) {
                 state = SEARCH_FINE;
                 limit = ROUGH > 1 ? i + RING * ROUGH : NEVER;
                 found = false;
-                previous = -1.0e9;
+                anew = true;
+                previous = difference;
                 i += stride;
                 return true;
             }
