@@ -91,9 +91,9 @@ bool take_sample(float value, inout int i) {
         bool searches = ready && state == START;
         // Before a Cartesian region lies the repeated border: that it is even says nothing.
         if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
-        bool knows = learnt > 0.0;
+        bool knows = SWEEP > 0 || learnt > 0.0;
         float deviation = noise * sqrt(knows ? variance : variance_of(newer));
-        doubt = deviation * (knows ? 1.0 + float(RING) / learnt : 1.0);
+        doubt = deviation * (knows ? 1.0 + float(RING) / max(learnt, 1.0) : 1.0);
         float height = START == SEARCH_ROUGH ? rough_threshold : threshold;
         if (searches && difference > max(height, weak) && i >= RING / 2) {
             weak = difference;

@@ -248,8 +248,8 @@ fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
 }
 
 /// Prevents a rough detector that stops at what floats in the fluid. What it still finds at three fine steps are
-/// specks that lie one upon another. Only specks well before the wall are ridden over: where the rough one fires, the
-/// fine one begins a rough ring before, and 0.57 of those 8 to 16 steps before the wall were found.
+/// specks that lie one upon another. Shortly before the wall fewer are ridden over: the fine search begins half a rough ring
+/// and a fine one before where the rough one fires.
 #[test]
 fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
     let device = Device::new();
@@ -261,6 +261,11 @@ fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
     assert!(two.0 < 0.35, "{two:?}");
     assert!(three.0 < 0.03 && four.0 < 0.03, "{three:?}, {four:?}");
     assert!([two, three, four].iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {shares:?}");
+    let near = [3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [8.0, 16.0]));
+    println!("8 to 16 steps before the wall: {near:.4?}");
+    // Measured: 0.128, 0.399. From a whole rough ring before, 0.571 and 0.994.
+    assert!(near[0].0 < 0.16 && near[1].0 < 0.48, "{near:?}");
+    assert!(near.iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {near:?}");
 }
 
 /// What became of the rays onto a wall, shares of all rays: a surface more than 3 steps before it, none or one more than 4
@@ -345,7 +350,8 @@ fn the_adaptive_detector_is_led_astray_less_than_the_plain_one_and_misses_no_mor
     let device = Device::new();
     type Make<'a> = &'a dyn Fn(&mut Noise) -> (Vec<f64>, f64);
     // Shares of early surfaces and of lost walls, by rough step 1 and 2.
-    let cases: [(&str, Make, [(f64, f64); 2]); 8] = [
+    type Case<'a> = (&'a str, Make<'a>, [(f64, f64); 2]);
+    let cases: [Case; 8] = [
         ("no noise", &|n| noisy(n, 0.0, 0.0, 1.0), [(0.0, 0.0), (0.0, 0.0)]),
         ("noise of 0.05", &|n| noisy(n, 0.05, 0.0, 1.0), [(0.0, 0.0), (0.0, 0.0)]),
         ("noise of 0.1", &|n| noisy(n, 0.1, 0.0, 1.0), [(0.045, 0.0), (0.010, 0.0)]),
@@ -398,7 +404,7 @@ fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
             println!("specks {gap:?} steps before the wall, rough {rough}: plain {plain:.4?}, lasting {lasting:.4?}");
             assert!(plain.0 > 0.2, "specks lead the plain detector astray, rough {rough}: {plain:?}");
             // Specks that lie one upon another last.
-            assert!(lasting.0 < 0.06 && lasting.1 > 0.93, "rough {rough}: {lasting:?}");
+            assert!(lasting.0 < 0.045 && lasting.1 > 0.95, "rough {rough}: {lasting:?}");
         }
     }
     for (rough, thickness) in [(1, 2.0), (1, 3.0), (1, 5.0), (2, 2.0), (2, 4.0)] {

@@ -1,4 +1,4 @@
-//! SR: the first surface on each ray (thesis 4-3), as the [`detector`](super::detector) finds it.
+//! SR: the first surface on each ray (thesis 4-3), as the detector of `detector.rs` finds it.
 
 use super::detector::{detect, polarity};
 use super::ray;
