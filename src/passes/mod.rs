@@ -20,6 +20,7 @@ pub mod filter {
 }
 pub mod raycast {
     mod detector;
+    mod noise;
     pub mod ray;
     pub mod surface;
     pub mod volume;

@@ -6,6 +6,7 @@ mod detector;
 mod faults;
 mod goldens;
 mod known_answers;
+mod led_astray;
 mod motion;
 mod passes;
 mod pictures;

@@ -13,11 +13,10 @@
 //! The lasting detector also passes over an edge when less than half of it is left half a ring behind it: what floats in the
 //! fluid, and shells thinner than that in front of something else. A shell that is all there is on the ray is still found.
 
+use super::noise::Noise;
 use crate::probe::Geometry;
 use crate::scene::{Detector, Place, RING, Scene, Sign, Surface};
 
-/// Samples that the noise is learnt from.
-const MEMORY: f64 = 16.0;
 const N: usize = RING as usize;
 
 pub(super) fn polarity(scene: &Scene) -> f64 {
@@ -39,33 +38,6 @@ pub(super) fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Opti
         End::Nothing => None,
         End::Ray if state.seen + 1 == ray.settings.number => ray.second_look(&state.weak?),
         End::Ray => None,
-    }
-}
-
-/// Mean and variance of the samples that have left the ring's newer half.
-#[derive(Clone, Copy, Default)]
-struct Noise {
-    learnt: f64,
-    mean: f64,
-    variance: f64,
-}
-
-impl Noise {
-    /// The older half, newest first: all of it to begin with, then what has just come into it.
-    fn learn(&mut self, older: [f64; N / 2]) {
-        if self.learnt == 0.0 {
-            let count = older.len() as f64;
-            self.learnt = count;
-            self.mean = older.iter().sum::<f64>() / count;
-            self.variance = older.iter().map(|v| (v - self.mean).powi(2)).sum::<f64>() / (count - 1.0);
-            return;
-        }
-        self.learnt += 1.0;
-        // The recursions of the mean and the unbiased variance of n samples (Welford), held at n = MEMORY.
-        let n = self.learnt.min(MEMORY);
-        let off = older[0] - self.mean;
-        self.mean += off / n;
-        self.variance = self.variance * (n - 2.0) / (n - 1.0) + off * off / n;
     }
 }
 
