@@ -25,6 +25,8 @@ pub mod filter {
 }
 pub mod raycast {
     pub mod cube;
+    mod detector;
+    mod noise;
     pub mod planes;
     pub mod projection;
     pub mod ray;

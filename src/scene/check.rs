@@ -98,6 +98,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     let f = &settings.surface;
     within("surface.threshold", f.threshold, 1e-6, 1.0)?;
     within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
+    within("surface.noise", f.noise, 0.0, 10.0)?;
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
     check_light(&settings.light)?;

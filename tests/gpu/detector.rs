@@ -1,4 +1,4 @@
-//! The surface detector on walls and spheres that are formulas: where the surface is put, and what noise and specks do.
+//! The surface detector on walls and spheres that are formulas: where the surface is put.
 
 use crate::common::*;
 use echolume::passes::{Slot, Texels, is_hit};
@@ -6,10 +6,10 @@ use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 use glam::DVec3;
 
-const STEP: f64 = 0.4;
+pub const STEP: f64 = 0.4;
 
 /// Columns of voxels that parallel rays along +Y run through the middles of, one a pixel.
-fn columns(size: [usize; 3], depth_spacing: f64, surface: &str) -> Scene {
+pub fn columns(size: [usize; 3], depth_spacing: f64, surface: &str) -> Scene {
     let geometry = Geometry::Cartesian(Grid { size, spacing: [1.0, depth_spacing, 1.0], origin: [0.0; 3] });
     let toml = format!(
         "mode = 'sr'\npicture = {{ size = [{}, {}] }}\nray = {{ step = {STEP}, sampling = 'exact' }}\n\
@@ -26,7 +26,7 @@ fn distances(device: &Device, scene: &Scene, frames: &[Texels]) -> Texels {
 }
 
 /// Depth of the surface in each column, none where it was missed.
-fn depths(device: &Device, scene: &Scene, frames: &[Texels]) -> Vec<([usize; 2], Option<f64>)> {
+pub fn depths(device: &Device, scene: &Scene, frames: &[Texels]) -> Vec<([usize; 2], Option<f64>)> {
     let map = distances(device, scene, frames);
     let mut found = Vec::new();
     for y in 0..map.size[1] {
@@ -42,7 +42,7 @@ fn depths(device: &Device, scene: &Scene, frames: &[Texels]) -> Vec<([usize; 2],
 }
 
 /// 0 before the edge's middle, 1 behind it, straight in between.
-fn ramp(depth: f64, edge: f64, width: f64) -> f64 {
+pub fn ramp(depth: f64, edge: f64, width: f64) -> f64 {
     if width > 0.0 { ((depth - edge) / width + 0.5).clamp(0.0, 1.0) } else { f64::from(u8::from(depth >= edge)) }
 }
 
@@ -145,117 +145,4 @@ fn a_sphere_is_within_a_tenth_of_a_step_from_any_side() {
         println!("sphere, {sign}, {camera}: {worst:.3} steps at most over {hits} rays");
         assert!(hits > 200 && worst < 0.1, "{sign}, {camera}: {worst} steps off over {hits} rays");
     }
-}
-
-/// What noise does to a wall: the spread of the places, and shares of all rays.
-#[derive(Debug)]
-struct Spread {
-    steps: f64,
-    missed: f64,
-    /// More than 4 steps off.
-    wrong: f64,
-}
-
-fn spread(device: &Device, deviation: f64, threshold: f64, rough: u32) -> Spread {
-    // One voxel a sample: each has its own noise.
-    let surface = format!("threshold = {threshold}\nrough = {rough}");
-    let scene = columns([64, 100, 64], STEP, &surface);
-    let mut noise = Noise(7);
-    let mut normal = || (-2.0 * (1.0 - noise.next()).ln()).sqrt() * (std::f64::consts::TAU * noise.next()).cos();
-    let noise: Vec<f64> = (0..64 * 100 * 64).map(|_| deviation * normal()).collect();
-    let edge = |x: usize, z: usize| STEP * (60.0 + ((7 * x + 3 * z) % 10) as f64 / 10.0);
-    let frames = frames(&scene, |[x, y, z]| {
-        (ramp(y as f64 * STEP, edge(x, z), 2.0 * STEP) + noise[(z * 100 + y) * 64 + x]).clamp(0.0, 1.0)
-    });
-    let found = depths(device, &scene, &frames);
-    let rays = found.len() as f64;
-    let off: Vec<f64> = found.iter().filter_map(|([x, z], d)| Some((d.as_ref()? - edge(*x, *z)) / STEP)).collect();
-    let right: Vec<f64> = off.iter().copied().filter(|e| e.abs() <= 4.0).collect();
-    let mean = right.iter().sum::<f64>() / right.len() as f64;
-    let variance = right.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / right.len() as f64;
-    Spread {
-        steps: variance.sqrt(),
-        missed: 1.0 - off.len() as f64 / rays,
-        wrong: (off.len() - right.len()) as f64 / rays,
-    }
-}
-
-/// Prevents a detector that is led astray by less noise than it was, or places a noisy wall less well. Noise is
-/// clamped to the window, as recordings are. The limits are what was measured (llvmpipe; the noise is the same
-/// everywhere), the spread times 1.15 and the shares and 0.02 (0.002 where there were next to none). A threshold of a
-/// tenth of the wall, the default, is crossed by noise of a tenth of it somewhere on a third of the rays; the rough
-/// detector asks for a second such crossing.
-#[test]
-fn noise_spreads_a_wall_no_more_than_it_did() {
-    let device = Device::new();
-    // Threshold, rough; then for noise of 0, 0.05, 0.1 and 0.2 of the wall: spread in steps, share of wrong places.
-    let measured = [
-        (0.1, 1, [(0.0, 0.0), (0.089, 0.0), (0.296, 0.311), (0.911, 0.981)]),
-        (0.1, 2, [(0.0, 0.0), (0.089, 0.0), (0.298, 0.071), (0.895, 0.806)]),
-        (0.3, 1, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.382, 0.019)]),
-        (0.3, 2, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.383, 0.0005)]),
-    ];
-    for (threshold, rough, levels) in measured {
-        for (deviation, (steps, wrong)) in [0.0, 0.05, 0.1, 0.2].into_iter().zip(levels) {
-            let got = spread(&device, deviation, threshold, rough);
-            println!("threshold {threshold}, rough {rough}, noise {deviation}: {got:.4?}");
-            let what = format!("threshold {threshold}, rough {rough}, noise {deviation}: {got:?}");
-            assert!(got.steps <= 1.15 * steps + 0.005, "the wall is spread, {what}");
-            assert!(got.wrong <= wrong + if wrong > 0.01 { 0.02 } else { 0.002 }, "led astray, {what}");
-            assert!(got.missed <= 0.001, "holes, {what}");
-        }
-    }
-}
-
-/// Shares of the columns with a speck of one or two voxels in them: where a speck was found, and where the wall
-/// behind it was. The specks lie from `gap` steps before the wall on upwards.
-fn specks(device: &Device, rough: u32, gap: [f64; 2]) -> (f64, f64) {
-    // Two samples a voxel, as where specks are resolved.
-    let (voxel, wall) = (2.0 * STEP, 60.0);
-    let scene = columns([64, 100, 64], voxel, &format!("threshold = 0.4\nrough = {rough}"));
-    let mut noise = Noise(11);
-    let mut bright = vec![false; 64 * 100 * 64];
-    for _ in 0..600 {
-        let middle: [f64; 3] = std::array::from_fn(|axis| match axis {
-            1 => wall - noise.range(gap[0], gap[1]) * STEP / voxel,
-            _ => noise.range(1.0, 62.0),
-        });
-        let radius = noise.range(0.5, 1.0);
-        let corner = middle.map(|m| m.floor() as usize - 1);
-        for n in 0..64 {
-            let at = [corner[0] + n % 4, corner[1] + n / 4 % 4, corner[2] + n / 16];
-            let away = (0..3).map(|a| (at[a] as f64 - middle[a]).powi(2)).sum::<f64>().sqrt();
-            if away <= radius && at[0] < 64 && at[2] < 64 {
-                bright[(at[2] * 100 + at[1]) * 64 + at[0]] = true;
-            }
-        }
-    }
-    let frames =
-        frames(&scene, |[x, y, z]| if bright[(z * 100 + y) * 64 + x] { 1.0 } else { ramp(y as f64, wall, 2.0) });
-    let (mut crossed, mut on_speck, mut on_wall) = (0, 0, 0);
-    for ([x, z], depth) in depths(device, &scene, &frames) {
-        if (0..58).any(|y| bright[(z * 100 + y) * 64 + x]) {
-            crossed += 1;
-            on_wall += i32::from(depth.is_some_and(|d| (d - wall * voxel).abs() < 0.5 * STEP));
-            on_speck += i32::from(depth.is_some_and(|d| d < wall * voxel - 2.0 * STEP));
-        }
-    }
-    assert!(crossed > 500, "{crossed} columns have a speck");
-    (f64::from(on_speck) / f64::from(crossed), f64::from(on_wall) / f64::from(crossed))
-}
-
-/// Prevents a rough detector that stops at what floats in the fluid. What it still finds at three fine steps are
-/// specks that lie one upon another. Only specks well before the wall are ridden over: where the rough one fires, the
-/// fine one begins a rough ring before, and 0.57 of those 8 to 16 steps before the wall were found.
-#[test]
-fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
-    let device = Device::new();
-    let shares = [1, 2, 3, 4].map(|rough| specks(&device, rough, [34.0, 90.0]));
-    println!("shares of specks and of walls found, by the rough step: {shares:.4?}");
-    let [one, two, three, four] = shares;
-    // Measured: 1.0, 0.270, 0.0136, 0.0099; the rest are walls.
-    assert!(one.0 > 0.97, "without a rough detector specks are surfaces: {one:?}");
-    assert!(two.0 < 0.35, "{two:?}");
-    assert!(three.0 < 0.03 && four.0 < 0.03, "{three:?}, {four:?}");
-    assert!([two, three, four].iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {shares:?}");
 }

@@ -9,6 +9,7 @@ mod faults;
 mod filters;
 mod goldens;
 mod known_answers;
+mod led_astray;
 mod modes;
 mod motion;
 mod passes;

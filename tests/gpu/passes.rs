@@ -104,6 +104,24 @@ fn scenes() -> Vec<(String, Scene)> {
             "third surface, no rough detector",
             "surface = { number = 3, threshold = 0.05, rough = 1, place = 'first-crossing' }\nslices = { pixels = 30 }",
         ),
+        ("adaptive", "surface = { detector = 'adaptive', threshold = 0.02 }\nslices = { pixels = 30 }"),
+        (
+            "adaptive, no rough detector, second surface",
+            "surface = { detector = 'adaptive', threshold = 0.02, noise = 1.5, rough = 1, number = 2 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "adaptive, dark, roughest, first crossing",
+            "surface = { detector = 'adaptive', sign = 'dark', rough = 8, threshold = 0.02, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        ("lasting", "surface = { detector = 'lasting', threshold = 0.02, noise = 1.0 }\nslices = { pixels = 30 }"),
+        (
+            "lasting, no rough detector, first crossing",
+            "surface = { detector = 'lasting', threshold = 0.02, rough = 1, noise = 1.0, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        (
+            "lasting, dark, second surface",
+            "surface = { detector = 'lasting', threshold = 0.02, sign = 'dark', number = 2, noise = 0.0, rough = 3 }\nslices = { pixels = 30 }",
+        ),
         (
             "enhanced sigma",
             "post = { enhanced_sigma = { window = 3, largest = 11, sigma = 0.08 } }\nslices = { pixels = 12 }",

@@ -125,30 +125,33 @@ fn fit(scene: &Scene, distances: &Texels, head: &Head, mirror: DVec2) -> Fit {
 #[test]
 fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
     let device = Device::new();
-    let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
-    let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let settings: Settings = toml::from_str(SETTINGS).expect("settings");
-    let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
-    let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
-    while let Some(frame) = recording.next_frame().expect("frame") {
-        renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
-    }
-    renderer.show(0).expect("show");
-    renderer.picture().expect("picture");
-    assert_ne!(distance_end(&scene), Slot::Distance, "there are filters");
-    let distances = renderer.read(distance_end(&scene)).expect("read").expect("there");
-
     let head = Head::load();
-    let found = fit(&scene, &distances, &head, DVec2::ONE);
-    println!("the head: {found:.4?}");
-    assert!(found.rays > 4000, "{found:?}");
-    assert!(found.hits >= 0.97, "{found:?}");
-    assert!(found.off <= 0.01, "{found:?}");
-    assert!(found.rms <= 0.6, "{found:?}");
-    assert!(found.median.abs() < 1.5, "{found:?}");
-    for (mirror, name) in [(DVec2::new(-1.0, 1.0), "lateral"), (DVec2::new(1.0, -1.0), "elevation")] {
-        let mirrored = fit(&scene, &distances, &head, mirror);
-        println!("{name} mirrored: {mirrored:.4?}");
-        assert!(mirrored.rms > 2.0, "a mirrored {name} axis went unnoticed: {mirrored:?}");
+    for detector in ["threshold", "adaptive", "lasting"] {
+        let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
+        let input = Input { stored: recording.stored_type(), range: recording.range() };
+        let mut settings: Settings = toml::from_str(SETTINGS).expect("settings");
+        settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
+        let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
+        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        while let Some(frame) = recording.next_frame().expect("frame") {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+        }
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        assert_ne!(distance_end(&scene), Slot::Distance, "there are filters");
+        let distances = renderer.read(distance_end(&scene)).expect("read").expect("there");
+
+        let found = fit(&scene, &distances, &head, DVec2::ONE);
+        println!("the head, {detector}: {found:.4?}");
+        assert!(found.rays > 4000, "{found:?}");
+        assert!(found.hits >= 0.97, "{found:?}");
+        assert!(found.off <= 0.01, "{found:?}");
+        assert!(found.rms <= 0.6, "{found:?}");
+        assert!(found.median.abs() < 1.5, "{found:?}");
+        for (mirror, name) in [(DVec2::new(-1.0, 1.0), "lateral"), (DVec2::new(1.0, -1.0), "elevation")] {
+            let mirrored = fit(&scene, &distances, &head, mirror);
+            println!("{name} mirrored: {mirrored:.4?}");
+            assert!(mirrored.rms > 2.0, "a mirrored {name} axis went unnoticed: {mirrored:?}");
+        }
     }
 }

@@ -1,9 +1,9 @@
-//! SR: the first surface on each ray (thesis 4-3). At sample i, with steps of s, the difference is
-//! D = mean(v[i], v[i-s], v[i-2s], v[i-3s]) - mean(v[i-4s] ... v[i-7s]): (2/n) (newer half - older half) for a ring of n = 8.
+//! SR: the first surface on each ray (thesis 4-3), as the detector of `detector.rs` finds it.
 
+use super::detector::{detect, polarity};
 use super::ray;
 use crate::passes::*;
-use crate::scene::{Place, RING, Scene, Sign};
+use crate::scene::{Detector, Place, RING, Scene};
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface",
@@ -21,12 +21,19 @@ pub const PASS: Pass = Pass {
             .f32("threshold", surface.threshold)
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
+            .f32("noise", surface.noise)
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s);
+        let detector = match s.settings.surface.detector {
+            Detector::Threshold => 0,
+            Detector::Adaptive => 1,
+            Detector::Lasting => 2,
+        };
         constants.push(("ROUGH", s.settings.surface.rough as i32));
         constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));
         constants.push(("NUMBER", s.settings.surface.number as i32));
+        constants.push(("DETECTOR", detector));
         constants.push(("BEHIND", s.samples_behind() as i32));
         constants
     },
@@ -72,121 +79,4 @@ fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
     let count = scene.samples_behind();
     let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step)).sum();
     sum / f64::from(count.max(1))
-}
-
-fn polarity(scene: &Scene) -> f64 {
-    match scene.settings.surface.sign {
-        Sign::Bright => 1.0,
-        Sign::Dark => -1.0,
-    }
-}
-
-/// Place of the surface in samples, and the echo behind it. Sample n is the ray's sample `first + n`; the region begins at its
-/// sample 0, and half a ring later an edge in its middle may be a surface.
-fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Option<(f64, f64)> {
-    let surface = &scene.settings.surface;
-    let ring = RING as usize;
-    let rough = surface.rough as usize;
-    let rough_threshold = surface.rough_threshold.unwrap_or(surface.threshold);
-    let mean = |i: usize, stride: usize, from: usize| -> Option<f64> {
-        (from..from + ring / 2).map(|n| samples[i - n * stride]).sum::<Option<f64>>().map(|sum| sum / (ring / 2) as f64)
-    };
-    // The difference at i, once a full ring since `since` is behind it and none of it lies outside.
-    let difference = |i: usize, stride: usize, since: usize| -> Option<f64> {
-        (i < samples.len() && i >= since + (ring - 1) * stride)
-            .then(|| Some(polarity(scene) * (mean(i, stride, 0)? - mean(i, stride, ring / 2)?)))
-            .flatten()
-    };
-    // Above the threshold here and not just before: an edge that was there before the region began is none of its surfaces.
-    let crossing = |i: usize, since: usize| -> Option<f64> {
-        let inside = i as i64 + first >= i64::from(RING / 2);
-        let rises =
-            i == since + ring - 1 || difference(i.wrapping_sub(1), 1, since).is_none_or(|d| d <= surface.threshold);
-        difference(i, 1, since).filter(|d| inside && rises && *d > surface.threshold)
-    };
-    let mut since = 0;
-    let mut i = 0;
-    let mut seen = 0;
-    'rough: while i < samples.len() {
-        if samples[i].is_none() {
-            i += rough;
-            since = i;
-            continue;
-        }
-        let (start, limit) = if rough > 1 {
-            match difference(i, rough, since) {
-                Some(d) if d > rough_threshold => (i.saturating_sub(ring * rough).max(since), i + ring),
-                _ => {
-                    i += rough;
-                    continue;
-                }
-            }
-        } else {
-            (since, usize::MAX)
-        };
-        // The fine search: forwards from where the rough ring began. A gap sends it back to the rough one behind the gap.
-        let mut from = start;
-        let mut at = start;
-        loop {
-            if at >= samples.len() {
-                return None;
-            }
-            if samples[at].is_none() {
-                if rough > 1 {
-                    i = at + rough;
-                    since = i;
-                    continue 'rough;
-                }
-                from = at + 1;
-            } else if let Some(d) = crossing(at, from) {
-                seen += 1;
-                if seen == surface.number {
-                    return place(scene, &difference, &|i| mean(i, 1, 0), at, d, from);
-                }
-                // The next surface is looked for behind this one, if the ray stays inside until then.
-                let beyond = at + ring;
-                if !(at..=beyond).all(|n| samples.get(n).is_some_and(|s| s.is_some())) {
-                    return None;
-                }
-                (i, since) = (beyond, beyond);
-                continue 'rough;
-            } else if at >= limit {
-                i = limit - (ring - 2) * rough;
-                since = i;
-                continue 'rough;
-            }
-            at += 1;
-        }
-    }
-    None
-}
-
-/// The largest difference within the ring's length after the crossing, refined by a parabola through its neighbours, minus
-/// half a ring: the middle of the edge. Or the crossing itself.
-fn place(
-    scene: &Scene,
-    difference: &dyn Fn(usize, usize, usize) -> Option<f64>,
-    echo: &dyn Fn(usize) -> Option<f64>,
-    crossing: usize,
-    crossing_difference: f64,
-    since: usize,
-) -> Option<(f64, f64)> {
-    if scene.settings.surface.place == Place::FirstCrossing {
-        return Some((crossing as f64, echo(crossing)?));
-    }
-    let (mut best, mut best_at) = (crossing_difference, crossing);
-    for i in crossing + 1..crossing + RING as usize {
-        match difference(i, 1, since) {
-            Some(d) if d > best => (best, best_at) = (d, i),
-            Some(_) => {}
-            None => break,
-        }
-    }
-    let before = difference(best_at - 1, 1, since).unwrap_or(best);
-    // Without the sample after it, it may not be the peak: the ray left the insonified region on a rising edge.
-    let after = difference(best_at + 1, 1, since)?;
-    let bend = before - 2.0 * best + after;
-    // Two equal differences put it in the middle between them.
-    let shift = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
-    Some((best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at)?))
 }

@@ -107,6 +107,10 @@ pub struct TransferPoint {
 pub struct Surface {
     pub window: [f64; 2],
     pub start_depth: Option<f64>,
+    pub detector: Detector,
+    /// Of the adaptive and the lasting detector: standard deviations of the noise before it that an edge must exceed to be
+    /// a surface at once, 0..=10.
+    pub noise: f64,
     /// The detector fires above this difference of the means of the newer and the older half of its ring.
     pub threshold: f64,
     /// The rough detector's own threshold. Absent: the fine one's.
@@ -124,6 +128,8 @@ impl Default for Surface {
         Surface {
             window: [0.0, 1.0],
             start_depth: None,
+            detector: Detector::Threshold,
+            noise: 2.5,
             threshold: 0.1,
             rough_threshold: None,
             rough: 2,
@@ -132,6 +138,21 @@ impl Default for Surface {
             number: 1,
         }
     }
+}
+
+/// What makes an edge a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Detector {
+    /// The difference exceeds the threshold: the thesis' own.
+    #[default]
+    Threshold,
+    /// It also stands out from the noise before it. A ray without such an edge takes its tallest one above the threshold, if
+    /// the echo behind that lasts.
+    Adaptive,
+    /// Adaptive, and edges whose echo is gone half a ring behind them (specks in the fluid, thin shells before a wall) are
+    /// passed over unless the ray has nothing better.
+    Lasting,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
