@@ -40,12 +40,11 @@ fn dense(mut m: Vec<Vec<f64>>, mut f: Vec<f64>) -> Vec<f64> {
         let pivot = (k..n).max_by(|a, b| m[*a][k].abs().total_cmp(&m[*b][k].abs())).expect("rows");
         m.swap(k, pivot);
         f.swap(k, pivot);
-        for i in k + 1..n {
-            let share = m[i][k] / m[k][k];
-            for j in k..n {
-                m[i][j] -= share * m[k][j];
-            }
-            f[i] -= share * f[k];
+        let (above, below) = m.split_at_mut(k + 1);
+        for (i, row) in below.iter_mut().enumerate() {
+            let share = row[k] / above[k][k];
+            row[k..].iter_mut().zip(&above[k][k..]).for_each(|(v, p)| *v -= share * p);
+            f[k + 1 + i] -= share * f[k];
         }
     }
     for k in (0..n).rev() {
