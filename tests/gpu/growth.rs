@@ -3,10 +3,13 @@
 use crate::common::*;
 use crate::filters::{by_reference, on_device, plane, texels};
 use echolume::gpu::single::Single;
+use echolume::gpu::{Options, Renderer};
 use echolume::passes::filter::growth;
 use echolume::passes::{Slot, Texels};
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
+use echolume::scene::Input;
+use echolume::source::Recording;
 
 #[test]
 fn estimators_by_hand() {
@@ -136,4 +139,40 @@ fn growth_beyond_the_sector_does_not_count() {
     assert!(map.values.iter().filter(|v| **v == 3.0).count() > 500);
     let shares = growth::shares(&scene, &map);
     assert_eq!((shares[0], shares[1], shares[3]), (0.0, 1.0, 0.0));
+}
+
+/// The table of thesis 5.5 (Tables 7-9) for a simulated body: windows of 3 to 13 to start with, up to the sizes where the
+/// thesis' own tables end.
+#[test]
+fn the_larger_a_window_starts_the_more_often_it_grows() {
+    let device = Device::new();
+    let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
+    let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let geometry = recording.geometry(0);
+    let mut frame = recording.next_frame().expect("frame").expect("a frame");
+    while frame.slice != 15 {
+        frame = recording.next_frame().expect("frame").expect("a frame");
+    }
+    let mut whole = Vec::new();
+    for (window, largest) in [(3, 17), (5, 19), (7, 19), (9, 21), (11, 21), (13, 23)] {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [8, 8] }}\n\
+             slices = {{ pixels = 200, enhanced_sigma = {{ window = {window}, largest = {largest}, sigma = 0.1, growth = true }} }}"
+        );
+        let scene = scene(geometry.clone(), input, &toml);
+        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+        renderer.show(0).expect("show");
+        let shares = growth::shares(&scene, &renderer.read(Slot::Growth).expect("read").expect("there"));
+        println!(
+            "{window:2} to {largest}: {:?} %",
+            shares.iter().map(|s| (s * 1000.0).round() / 10.0).collect::<Vec<_>>()
+        );
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        whole.push(shares);
+    }
+    // More pixels have to be alike at once.
+    assert!(whole.windows(2).all(|w| w[1][0] < w[0][0]), "{whole:?}");
+    // And few are cut off where the tables end.
+    assert!(whole.iter().all(|s| s.last().is_some_and(|last| *last < 0.05)), "{whole:?}");
 }
