@@ -13,6 +13,8 @@
     ("filter/sigma.distance", include_bytes!("filter/sigma.distance.spv")),
     ("filter/sigma.picture", include_bytes!("filter/sigma.picture.spv")),
     ("postprocess/tone", include_bytes!("postprocess/tone.spv")),
+    ("preprocess/condition.plain", include_bytes!("preprocess/condition.plain.spv")),
+    ("preprocess/condition.gained", include_bytes!("preprocess/condition.gained.spv")),
     ("preprocess/load_slice.plane", include_bytes!("preprocess/load_slice.plane.spv")),
     ("preprocess/load_slice.slice", include_bytes!("preprocess/load_slice.slice.spv")),
     ("preprocess/scan_convert.plane", include_bytes!("preprocess/scan_convert.plane.spv")),

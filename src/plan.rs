@@ -198,9 +198,10 @@ impl Step {
 /// Whether a slot that the CPU makes from the scene has other content now.
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Filled::ByScene(make) = slot.filled() else { return false };
-    if slot == Slot::Transfer {
+    if matches!(slot, Slot::Transfer | Slot::Tgc) {
         return make(old) != make(new);
     }
     // The rest follow from the geometry, and their content is too long to compare.
-    (&old.geometry, old.grid, old.apron) != (&new.geometry, new.grid, new.apron)
+    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation());
+    old.geometry != new.geometry || lattice(old) != lattice(new)
 }

@@ -130,6 +130,8 @@ fn scenes() -> Vec<Scene> {
          light = { shadow = {}, occlusion = {}, skin = {} }",
         "light = { shadow = {} }",
         "light = { occlusion = {} }",
+        "conditioning = { samples = 16, dynamic_range = 60 }",
+        "conditioning = { tgc = [{ depth = 5, gain = -3 }] }",
         "slices = { median = true }",
         "slices = { sigma = {} }",
         "slices = { smooth = { lateral = 1.0 } }",
@@ -138,6 +140,9 @@ fn scenes() -> Vec<Scene> {
     let mut scenes = Vec::new();
     for geometry in &geometries {
         for filters in filters {
+            if filters.contains("conditioning") && matches!(geometry, Geometry::Cartesian(_)) {
+                continue; // has no lines
+            }
             for mode in ["vr", "sr"] {
                 let settings = toml::from_str(&format!("mode = '{mode}'\n{filters}")).expect("settings");
                 scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));

@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod common;
+mod conditioning;
 mod detector;
 mod faults;
 mod goldens;
