@@ -134,6 +134,12 @@ fn scenes() -> Vec<Scene> {
         "conditioning = { tgc = [{ depth = 5, gain = -3 }] }",
         "slices = { median = true }",
         "slices = { sigma = {} }",
+        "slices = { estimator = 'median' }",
+        "slices = { estimator = 'median', enhanced_sigma = { growth = true }, perona_malik = {}, smooth = { lateral = 1.0 } }\n\
+         distance = { enhanced_sigma = {}, perona_malik = {} }\npost = { perona_malik = {} }",
+        "slices = { enhanced_sigma = {} }",
+        "slices = { perona_malik = {} }",
+        "slices = { perona_malik = { scheme = 'aos', repeat = 2 } }\npost = { perona_malik = { scheme = 'aos' } }",
         "slices = { smooth = { lateral = 1.0 } }",
     ];
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };

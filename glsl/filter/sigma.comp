@@ -3,9 +3,10 @@
 // variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
+layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of the centre
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
-    float range; // 2 sigma
+    float range; // 2 sigma, at most 1e30
     float few;   // K
     int slice;
 };
@@ -20,6 +21,7 @@ void main() {
         write_at(at, centre);
         return;
     }
+    T within = MULTIPLICATIVE != 0 ? range * abs(centre) : T(range);
     // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
     T sum = T(0.0);
     T count = T(0.0);
@@ -27,9 +29,9 @@ void main() {
     for (int y = low.y; y <= high.y; ++y) {
         for (int x = low.x; x <= high.x; ++x) {
             T away = read_at(ivec3(x, y, at.z)) - centre;
-            T inside = WITHIN(away, range);
+            T inside = WITHIN(away, within);
             if (!VALID(away + centre)) inside = T(0.0);
-            sum += inside * min(away, T(range));
+            sum += inside * min(away, within);
             count += inside;
         }
     }

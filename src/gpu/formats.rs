@@ -16,6 +16,7 @@ pub fn vulkan(format: Format) -> vk::Format {
         Format::Rg16f => vk::Format::R16G16_SFLOAT,
         Format::Rg32f => vk::Format::R32G32_SFLOAT,
         Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
+        Format::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba8 => vk::Format::R8G8B8A8_UNORM,
     }
 }

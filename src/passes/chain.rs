@@ -1,6 +1,7 @@
 //! Filter chains: which slot the n-th filter of a stage reads and writes. Two spare slots take turns between the first and
 //! the last, and a filter that is not needed leaves no copy behind.
 
+use super::filter::aos;
 use super::{PASSES, Pass, Slot, Turn};
 use crate::scene::{Layout, Scene};
 
@@ -16,39 +17,64 @@ struct Chain {
 
 /// Every pass of stage 1 that runs on each frame. The first reads the frame itself.
 const SLICES: Chain = Chain {
-    passes: &["load_slice", "scan_convert", "median_slice", "sigma_slice", "gaussian_lateral", "gaussian_depth"],
+    passes: &[
+        "load_slice",
+        "scan_convert",
+        "median_slice",
+        "estimator_slice",
+        "sigma_slice",
+        "enhanced_sigma_slice",
+        "perona_malik_slice",
+        "aos_slice",
+        "gaussian_lateral",
+        "gaussian_depth",
+    ],
     first: |_| Slot::Frames,
     spare: [Slot::SliceA, Slot::SliceB],
     last: Some(|scene| if scene.smoothing()[2] > 0.0 { Slot::SharpVolume } else { Slot::Volume }),
 };
 
 const DISTANCES: Chain = Chain {
-    passes: &["median_distance", "bilateral_distance", "sigma_distance"],
+    passes: &[
+        "median_distance",
+        "bilateral_distance",
+        "sigma_distance",
+        "enhanced_sigma_distance",
+        "perona_malik_distance",
+    ],
     first: |_| Slot::Distance,
     spare: [Slot::DistanceA, Slot::DistanceB],
     last: None,
 };
 
 const PICTURES: Chain = Chain {
-    passes: &["sigma_picture", "enhanced_sigma_picture"],
+    passes: &["sigma_picture", "enhanced_sigma_picture", "perona_malik_picture", "aos_picture"],
     first: |_| Slot::Picture,
     spare: [Slot::SmoothPicture, Slot::SmoothPictureB],
     last: None,
 };
+
+/// Dispatches that make one link: what lies between them stays within the pass.
+fn dispatches(name: &str) -> u32 {
+    match name {
+        "aos_slice" | "aos_picture" => aos::DISPATCHES,
+        _ => 1,
+    }
+}
 
 impl Chain {
     fn needed(&self) -> impl Iterator<Item = &'static Pass> {
         PASSES.iter().filter(|p| self.passes.contains(&p.name))
     }
 
-    /// Links before this pass's iteration, and links in all.
+    /// Links before the one that this pass's iteration works on, and links in all.
     fn position(&self, scene: &Scene, name: &str, turn: &Turn) -> (u32, u32) {
         let (mut before, mut all) = (0, 0);
         for pass in self.needed().filter(|p| p.is_needed(scene)) {
             if pass.name == name {
-                before = all + turn.iteration;
+                before = all + turn.iteration / dispatches(pass.name);
             }
-            all += (pass.repeat)(scene);
+            all += (pass.repeat)(scene) / dispatches(pass.name);
         }
         (before, all)
     }

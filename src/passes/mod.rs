@@ -13,10 +13,14 @@ pub mod preprocess {
     pub mod scan_convert;
 }
 pub mod filter {
+    pub mod aos;
     pub mod bilateral;
     pub mod enhanced_sigma;
+    pub mod estimator;
     pub mod gaussian;
+    pub mod growth;
     pub mod median;
+    pub mod perona_malik;
     pub mod sigma;
 }
 pub mod raycast {
@@ -48,7 +52,12 @@ pub const PASSES: &[Pass] = &[
     preprocess::load_slice::PASS,
     preprocess::scan_convert::PASS,
     filter::median::SLICE,
+    filter::estimator::SLICE,
     filter::sigma::SLICE,
+    filter::growth::SLICE,
+    filter::enhanced_sigma::SLICE,
+    filter::perona_malik::SLICE,
+    filter::aos::SLICE,
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
@@ -57,11 +66,15 @@ pub const PASSES: &[Pass] = &[
     filter::median::DISTANCE,
     filter::bilateral::DISTANCE,
     filter::sigma::DISTANCE,
+    filter::enhanced_sigma::DISTANCE,
+    filter::perona_malik::DISTANCE,
     shade::shadow::PASS,
     shade::occlusion::PASS,
     shade::light::PASS,
     filter::sigma::PICTURE,
     filter::enhanced_sigma::PICTURE,
+    filter::perona_malik::PICTURE,
+    filter::aos::PICTURE,
     postprocess::tone::PASS,
 ];
 

@@ -21,6 +21,13 @@ pub enum Slot {
     /// Slices between filters of stage 1.
     SliceA,
     SliceB,
+    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last slice.
+    Growth,
+    /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
+    SliceShares,
+    SliceForward,
+    /// A slice diffused along its rows.
+    SliceRows,
     /// The volume before smoothing across slices.
     SharpVolume,
     /// The 3D texture that rays are cast through.
@@ -47,6 +54,10 @@ pub enum Slot {
     Picture,
     SmoothPicture,
     SmoothPictureB,
+    /// As of slices: elimination of the picture's rows or columns.
+    PictureShares,
+    PictureForward,
+    PictureRows,
     /// 8-bit result.
     Screen,
 }
@@ -69,6 +80,7 @@ pub enum Format {
     Rg16f,
     Rg32f,
     Rgba16f,
+    Rgba32f,
     Rgba8,
     /// 32-bit floats of a buffer.
     Floats,
@@ -79,7 +91,7 @@ impl Format {
         match self {
             Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::Floats => 1,
             Format::Rg16f | Format::Rg32f => 2,
-            Format::Rgba16f | Format::Rgba8 => 4,
+            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 => 4,
         }
     }
 
@@ -87,7 +99,7 @@ impl Format {
         match self {
             Format::R8 | Format::Rgba8 => 1,
             Format::R16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
-            Format::R32f | Format::Rg32f | Format::Floats => 4,
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => 4,
         }
     }
 
@@ -124,13 +136,17 @@ pub enum Filled {
 }
 
 impl Slot {
-    pub const ALL: [Slot; 24] = [
+    pub const ALL: [Slot; 31] = [
         Slot::Frames,
         Slot::Tgc,
         Slot::Conditioned,
         Slot::ScanLut,
         Slot::SliceA,
         Slot::SliceB,
+        Slot::Growth,
+        Slot::SliceShares,
+        Slot::SliceForward,
+        Slot::SliceRows,
         Slot::SharpVolume,
         Slot::Volume,
         Slot::SweepLut,
@@ -148,6 +164,9 @@ impl Slot {
         Slot::Picture,
         Slot::SmoothPicture,
         Slot::SmoothPictureB,
+        Slot::PictureShares,
+        Slot::PictureForward,
+        Slot::PictureRows,
         Slot::Screen,
     ];
 
@@ -160,6 +179,10 @@ impl Slot {
             Slot::ScanLut => "scan_lut",
             Slot::SliceA => "slice_a",
             Slot::SliceB => "slice_b",
+            Slot::Growth => "growth",
+            Slot::SliceShares => "slice_shares",
+            Slot::SliceForward => "slice_forward",
+            Slot::SliceRows => "slice_rows",
             Slot::SharpVolume => "sharp_volume",
             Slot::Volume => "volume",
             Slot::SweepLut => "sweep_lut",
@@ -177,6 +200,9 @@ impl Slot {
             Slot::Picture => "picture",
             Slot::SmoothPicture => "smooth_picture",
             Slot::SmoothPictureB => "smooth_picture_b",
+            Slot::PictureShares => "picture_shares",
+            Slot::PictureForward => "picture_forward",
+            Slot::PictureRows => "picture_rows",
             Slot::Screen => "screen",
         }
     }
@@ -188,12 +214,14 @@ impl Slot {
             Slot::Tgc => Shape::Buffer(4 * width),
             Slot::Conditioned => Shape::Two(scene.line_lattice()),
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
+            Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
             Slot::SharpVolume | Slot::Volume => Shape::Three(scene.volume_size()),
             Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * LUT_ENTRIES as u32),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
             Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
             Slot::Shadow | Slot::Occlusion | Slot::Rendered => Shape::Two(scene.ray_size()),
+            Slot::PictureShares | Slot::PictureForward | Slot::PictureRows => Shape::Two(scene.picture_size()),
             Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
                 Shape::Two(scene.picture_size())
             }
@@ -208,7 +236,9 @@ impl Slot {
                 StoredType::F32 => Format::R32f,
             },
             Slot::ScanLut => Format::Rg32f,
-            Slot::Conditioned | Slot::SliceA | Slot::SliceB => Format::R32f,
+            Slot::Conditioned | Slot::SliceA | Slot::SliceB | Slot::Growth => Format::R32f,
+            Slot::SliceShares | Slot::SliceForward | Slot::SliceRows | Slot::PictureShares => Format::R32f,
+            Slot::PictureForward | Slot::PictureRows => Format::Rgba32f,
             Slot::SharpVolume | Slot::Volume => match scene.settings.slices.format {
                 VolumeFormat::R8 => Format::R8,
                 VolumeFormat::R16 => Format::R16,

@@ -85,7 +85,9 @@ impl Texels {
                     bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
                 }
                 Format::R16f | Format::Rg16f | Format::Rgba16f => bytes.extend(f16::from_f64(v).to_le_bytes()),
-                Format::R32f | Format::Rg32f | Format::Floats => bytes.extend((v as f32).to_le_bytes()),
+                Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
+                    bytes.extend((v as f32).to_le_bytes())
+                }
             }
         }
         bytes
@@ -97,7 +99,9 @@ impl Texels {
             Format::R8 | Format::Rgba8 => f64::from(b[0]) / 255.0,
             Format::R16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => f64::from(f16::from_le_bytes(two(b))),
-            Format::R32f | Format::Rg32f | Format::Floats => f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
+                f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            }
         });
         Texels { size, channels: format.channels(), values: values.collect() }
     }
@@ -108,7 +112,7 @@ impl Texels {
             Format::R8 | Format::Rgba8 => 1.0 / 255.0,
             Format::R16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
-            Format::R32f | Format::Rg32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
         }
     }
 }

@@ -38,6 +38,9 @@ impl Grey {
         }
         reader.limits(Limits::default());
         let image = reader.decode().map_err(|e| fault(&e))?;
+        if image.width() == 0 || image.height() == 0 {
+            return Err(fault(&"has no pixels"));
+        }
         let (colour, channels) = (image.color(), u16::from(image.color().channel_count()));
         let sixteen = match u16::from(colour.bytes_per_pixel()) / channels {
             1 => false,

@@ -1,7 +1,9 @@
 //! What no scene may ask for, told by name and limit.
 
-use super::{Conditioning, Layout, Light, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, SceneError, Settings, Sigma};
-use super::{refuse, transfer};
+use super::{
+    Conditioning, Distance, EnhancedSigma, Layout, Light, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW, Noise, PeronaMalik,
+    SceneError, Scheme, Settings, Sigma, refuse, transfer,
+};
 use crate::probe::Geometry;
 
 /// Everything that can be told without a geometry.
@@ -26,15 +28,15 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
     }
     check_sigma("slices.sigma", s.sigma)?;
-    check_sigma("distance.sigma", settings.distance.sigma)?;
+    within("slices.estimator_edge", s.estimator_edge, 0.0, f64::INFINITY)?;
+    check_enhanced("slices.enhanced_sigma", s.enhanced_sigma)?;
+    check_perona_malik("slices.perona_malik", s.perona_malik)?;
+    check_distance(&settings.distance)?;
     check_sigma("post.sigma", settings.post.sigma)?;
-    if settings.distance.median > 0 {
-        check_window("distance.median", settings.distance.median)?;
-    }
-    if let Some(b) = settings.distance.bilateral {
-        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
-        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
-        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
+    check_enhanced("post.enhanced_sigma", settings.post.enhanced_sigma)?;
+    check_perona_malik("post.perona_malik", settings.post.perona_malik)?;
+    if settings.post.enhanced_sigma.is_some_and(|e| e.growth) {
+        return refuse("post.enhanced_sigma", NO_GROWTH);
     }
     for (field, [low, high]) in [
         ("volume.window", settings.volume.window),
@@ -76,13 +78,6 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
     check_light(&settings.light)?;
-    if let Some(e) = settings.post.enhanced_sigma {
-        check_sigma("post.enhanced_sigma", Some(Sigma { window: e.window, sigma: e.sigma }))?;
-        check_window("post.enhanced_sigma", e.largest)?;
-        if e.largest < e.window {
-            return refuse("post.enhanced_sigma", format!("largest is {}, less than window {}", e.largest, e.window));
-        }
-    }
     within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
     within("post.contrast", settings.post.contrast, 0.0, 10.0)?;
     within("post.gamma", settings.post.gamma, 0.1, 10.0)
@@ -195,5 +190,82 @@ fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneErr
     match sigma.sigma >= 0.0 {
         true => Ok(()),
         false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
+    }
+}
+
+const NO_GROWTH: &str = "growth is counted on slices only: leave it out";
+
+fn check_distance(d: &Distance) -> Result<(), SceneError> {
+    if d.median > 0 {
+        check_window("distance.median", d.median)?;
+    }
+    if let Some(b) = d.bilateral {
+        within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
+        within("distance.bilateral.distance", b.distance, 1e-3, 1e3)?;
+        within("distance.bilateral.repeat", f64::from(b.repeat), 1.0, 16.0)?;
+    }
+    check_sigma("distance.sigma", d.sigma)?;
+    check_enhanced("distance.enhanced_sigma", d.enhanced_sigma)?;
+    check_perona_malik("distance.perona_malik", d.perona_malik)?;
+    let noises =
+        [("distance.sigma", d.sigma.map(|s| s.noise)), ("distance.enhanced_sigma", d.enhanced_sigma.map(|e| e.noise))];
+    for (field, noise) in noises {
+        // The noise of a distance does not grow with the distance.
+        if noise == Some(Noise::Multiplicative) {
+            return refuse(
+                field,
+                "noise is multiplicative, distances take additive only: leave it out, sigma is in mm",
+            );
+        }
+    }
+    if d.enhanced_sigma.is_some_and(|e| e.growth) {
+        return refuse("distance.enhanced_sigma", NO_GROWTH);
+    }
+    match d.perona_malik {
+        Some(p) if p.scheme == Scheme::Aos => {
+            refuse("distance.perona_malik", "scheme is aos, distances take explicit only: misses tear their rows")
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Result<(), SceneError> {
+    let Some(e) = enhanced else { return Ok(()) };
+    check_sigma(field, Some(Sigma { window: e.window, sigma: e.sigma, noise: e.noise }))?;
+    check_window(field, e.largest)?;
+    check_edge(field, e.edge)?;
+    match e.largest < e.window {
+        true => refuse(field, format!("largest is {}, less than window {}", e.largest, e.window)),
+        false => Ok(()),
+    }
+}
+
+fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Result<(), SceneError> {
+    let Some(p) = settings else { return Ok(()) };
+    check_edge(field, p.edge)?;
+    if !(1..=1000).contains(&p.repeat) {
+        return refuse(field, format!("repeat is {}, must lie in 1..=1000", p.repeat));
+    }
+    match p.scheme {
+        // With four neighbours, above 1/4 a checkerboard grows at every step.
+        Scheme::Explicit if !(p.step > 0.0 && p.step <= 0.25) => refuse(
+            field,
+            format!(
+                "step is {}, the explicit scheme is stable in 0..=0.25 only: take less, or scheme 'aos', stable at any step",
+                p.step
+            ),
+        ),
+        Scheme::Aos if !(p.step > 0.0 && p.step <= 1e9) => {
+            refuse(field, format!("step is {}, must lie above 0 and be at most 1e9", p.step))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Infinity is allowed: no difference is an edge then.
+fn check_edge(field: &'static str, edge: f64) -> Result<(), SceneError> {
+    match edge >= 0.0 {
+        true => Ok(()),
+        false => refuse(field, format!("edge is {edge}, must be at least 0")),
     }
 }

@@ -210,6 +210,12 @@ impl Scene {
         [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
     }
 
+    /// What estimates the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
+    pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
+        let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
+        enhanced.centre.unwrap_or(usual)
+    }
+
     /// Samples behind the surface whose mean echo the skin look wants; 0 for none.
     pub fn samples_behind(&self) -> u32 {
         match self.settings.light.skin {
@@ -232,10 +238,18 @@ impl Scene {
     fn filter_reach(&self) -> f64 {
         let [lateral, depth, _] = self.smoothing();
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
-        let sigma = self.settings.slices.sigma.map_or(0.0, |s| (s.window / 2) as f64);
+        let slices = &self.settings.slices;
+        let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.window / 2));
+        let enhanced = slices.enhanced_sigma.map_or(0.0, |e| f64::from(e.largest / 2));
+        let estimator = match slices.estimator {
+            Some(Estimator::NagaoMatsuyama) => 2.0,
+            Some(_) => 1.0,
+            None => 0.0,
+        };
+        let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
         // To the corners of square windows, one filter after another.
         let gaussian = f64::from(gaussian_radius(lateral)).hypot(f64::from(gaussian_radius(depth)));
-        std::f64::consts::SQRT_2 * (median + sigma) + gaussian
+        std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian
     }
 }
 

@@ -132,6 +132,71 @@ fn scenes() -> Vec<(String, Scene)> {
             "both sigmas",
             "post = { sigma = { window = 3, sigma = 0.1 }, enhanced_sigma = { window = 5, largest = 5, sigma = inf } }\nslices = { pixels = 12 }",
         ),
+        (
+            "every diffusion, explicit",
+            "slices = { pixels = 20, perona_malik = { repeat = 3 }, smooth = { lateral = 1.0 } }\n\
+             distance = { perona_malik = { edge = 0.8, conductance = 'exponential', step = 0.25, repeat = 2 } }\n\
+             post = { perona_malik = { edge = 0.3, conductance = 'exponential', repeat = 3 } }",
+        ),
+        (
+            "diffusion with sharpest and dullest edges",
+            "slices = { pixels = 20, perona_malik = { edge = 1e-30, conductance = 'exponential', repeat = 1 } }\n\
+             distance = { perona_malik = { edge = 1e-30, repeat = 1 } }\npost = { perona_malik = { edge = inf, repeat = 1 } }",
+        ),
+        (
+            "the heat equation, edges of 0",
+            "slices = { pixels = 20, perona_malik = { edge = inf, repeat = 2 } }\n\
+             distance = { perona_malik = { edge = inf, repeat = 1 } }\npost = { perona_malik = { edge = 0.0 } }",
+        ),
+        (
+            "AOS",
+            "slices = { pixels = 41, perona_malik = { scheme = 'aos', step = 2.0, repeat = 2 } }\n\
+             post = { perona_malik = { scheme = 'aos', step = 5.0, repeat = 2, conductance = 'exponential' } }",
+        ),
+        (
+            "AOS in huge steps, between filters",
+            "slices = { pixels = 20, median = true, perona_malik = { scheme = 'aos', edge = inf, step = 1e6, repeat = 1 }, smooth = { depth = 1.0 } }\n\
+             post = { perona_malik = { scheme = 'aos', edge = 1e-30, step = 1e9, repeat = 1 } }",
+        ),
+        (
+            "enhanced sigmas, Perona-Malik centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 3, largest = 17, sigma = 0.05, centre = 'perona-malik', growth = true } }\n\
+             distance = { enhanced_sigma = { window = 5, largest = 11, sigma = 0.3, centre = 'perona-malik', edge = 0.5 } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'perona-malik', noise = 'multiplicative' } }",
+        ),
+        (
+            "enhanced sigmas, gradient-inverse centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.2, noise = 'multiplicative', centre = 'gradient-inverse', growth = true }, smooth = { lateral = 1.0 } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'gradient-inverse' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'gradient-inverse' } }",
+        ),
+        (
+            "enhanced sigmas, Nagao-Matsuyama centre",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, centre = 'nagao-matsuyama' } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'nagao-matsuyama' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'nagao-matsuyama' } }",
+        ),
+        (
+            "enhanced sigmas, median centre, window beyond the picture",
+            "slices = { pixels = 24, enhanced_sigma = { window = 63, largest = 63, sigma = inf } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 63, sigma = 0.2, centre = 'median' } }",
+        ),
+        ("median estimator", "slices = { pixels = 20, estimator = 'median' }"),
+        (
+            "Perona-Malik estimator, between filters",
+            "slices = { pixels = 20, estimator = 'perona-malik', sigma = { window = 3, sigma = 0.1 } }",
+        ),
+        ("gradient-inverse estimator", "slices = { pixels = 20, estimator = 'gradient-inverse' }"),
+        ("Nagao-Matsuyama estimator", "slices = { pixels = 20, estimator = 'nagao-matsuyama' }"),
+        (
+            "sigmas of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = 0.3, noise = 'multiplicative' } }\n\
+             post = { sigma = { window = 7, sigma = 0.15, noise = 'multiplicative' } }",
+        ),
+        (
+            "infinite sigma of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = inf, noise = 'multiplicative' } }",
+        ),
         ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
         ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
     ] {
@@ -244,10 +309,11 @@ fn run_one(
     single: &mut Single,
     scene: &Scene,
     pass: &'static Pass,
+    iteration: u32,
     kind: &str,
     seed: u64,
 ) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
-    let turn = Turn { layer: 2, slice: scene.slices() / 2, iteration: 0, image: 0 };
+    let turn = Turn { layer: 2, slice: scene.slices() / 2, iteration, image: 0 };
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
     for bind in (pass.reads)(scene, &turn) {
@@ -274,12 +340,17 @@ fn every_pass_matches_its_reference() {
     for (name, scene) in scenes() {
         for (n, pass) in PASSES.iter().enumerate().filter(|(_, p)| p.is_needed(&scene)) {
             for (k, kind) in KINDS.iter().enumerate() {
-                let (_, expected, got, writes) = run_one(&mut single, &scene, pass, kind, (n * 8 + k) as u64);
-                match compare(pass, &scene, &expected, &got, &writes) {
-                    Ok(error) => errors[n].1 = error.max(errors[n].1),
-                    Err(fault) => failures.push(format!("{} in '{name}' on {kind}: {fault}", pass.name)),
+                for iteration in 0..(pass.repeat)(&scene) {
+                    let seed = (n * 8 + k) as u64;
+                    let (_, expected, got, writes) = run_one(&mut single, &scene, pass, iteration, kind, seed);
+                    match compare(pass, &scene, &expected, &got, &writes) {
+                        Ok(error) => errors[n].1 = error.max(errors[n].1),
+                        Err(fault) => {
+                            failures.push(format!("{} ({iteration}) in '{name}' on {kind}: {fault}", pass.name))
+                        }
+                    }
+                    errors[n].2 += 1;
                 }
-                errors[n].2 += 1;
             }
         }
     }
@@ -319,7 +390,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     ];
     for (fault, name, told, wrong) in cases {
         let pass = echolume::passes::by_name(name).expect("pass");
-        let (inputs, right, got, writes) = run_one(&mut single, told, pass, "noise", 5);
+        let (inputs, right, got, writes) = run_one(&mut single, told, pass, 0, "noise", 5);
         compare(pass, told, &right, &got, &writes).expect("unperturbed");
         let turn = Turn { layer: 2, slice: told.slices() / 2, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
@@ -332,7 +403,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     }
     // One voxel.
     let pass = echolume::passes::by_name("median_slice").expect("pass");
-    let (mut inputs, _, got, writes) = run_one(&mut single, &base, pass, "zero", 5);
+    let (mut inputs, _, got, writes) = run_one(&mut single, &base, pass, 0, "zero", 5);
     let mut source = inputs.get("source").clone();
     let middle = source.size[0] * (source.size[1] / 2) + source.size[0] / 2;
     (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
@@ -349,7 +420,7 @@ fn what_is_outside_the_sector_is_not_touched() {
     let mut single = Single::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
-    let (_, expected, got, _) = run_one(&mut single, &scene, pass, "one", 1);
+    let (_, expected, got, _) = run_one(&mut single, &scene, pass, 0, "one", 1);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
     let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();
     let poison = Texels::decode(

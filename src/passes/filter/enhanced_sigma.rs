@@ -1,95 +1,184 @@
-//! The enhanced sigma filter (thesis 5.4, 5.5) on the lit picture: the centre is estimated by a median of 3x3, and while fewer
-//! pixels than the starting window holds lie within two sigma of it, the window grows by one on every side.
+//! The enhanced sigma filter (thesis 5.4, 5.5) on slices, distance maps and pictures: the centre is estimated first, and while
+//! fewer pixels than the starting window holds lie within two sigma of it, the window grows by one on every side.
 
-use crate::passes::chain::picture_link;
+use super::estimator::{self, LEAST, LEAST_DISTANCE};
+use super::sigma::{few, range};
+use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
 use crate::passes::*;
-use crate::scene::{EnhancedSigma, Scene};
+use crate::scene::{EnhancedSigma, Noise, Scene};
 
-const NAME: &str = "enhanced_sigma_picture";
+const WHY: &str = "a mean of at most 63^2 values in f32; a pixel at exactly 2 sigma may count or not, and with it a whole ring; \
+                   R16F stores 1 to 4.9e-4";
 
-pub const PICTURE: Pass = Pass {
-    name: NAME,
-    stage: Stage::Postprocess,
-    when: When::Picture,
-    shader: |_, _| "filter/enhanced_sigma.picture",
-    needed: |s| match s.settings.post.enhanced_sigma {
-        Some(e) if e.sigma > 0.0 => Ok("asked for"),
-        Some(_) => Err("a sigma of 0 changes nothing"),
-        None => Err("not asked for"),
+pub const SLICE: Pass = Pass {
+    name: "enhanced_sigma_slice",
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s, t| match writes_volume(s, "enhanced_sigma_slice", t) {
+        true => "filter/enhanced_sigma.slice",
+        false => "filter/enhanced_sigma.plane",
     },
-    reads: |s, t| vec![whole("source", picture_link(s, NAME, t).0)],
-    writes: |s, t| vec![whole("target", picture_link(s, NAME, t).1)],
-    extent: picture_extent,
+    needed: |s| asked(s.settings.slices.enhanced_sigma),
+    reads: |s, t| vec![whole("source", slice_link(s, "enhanced_sigma_slice", t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, "enhanced_sigma_slice", t).1)],
+    extent: slice_extent,
     repeat: once,
-    params: |s, t| {
-        let e = settings(s);
-        Params::default().f32("range", 2.0 * e.sigma).f32("few", f64::from(few(e))).i32("slice", t.slice)
-    },
-    constants: |s, _| vec![("RADIUS", (settings(s).window / 2) as i32), ("LARGEST", (settings(s).largest / 2) as i32)],
-    tolerance: Tolerance {
-        absolute: 1e-3,
-        relative: 1e-3,
-        outliers: 1e-2,
-        why: "a mean of at most 63^2 colours in f32; a pixel at exactly 2 sigma may count or not, and with it a whole ring",
-    },
-    reference: |scene, _, reads, writes| {
-        let source = reads.get("source");
-        let target = writes.get_mut("target");
-        for y in 0..source.size[1] {
-            for x in 0..source.size[0] {
-                let filtered = filtered(settings(scene), source, x as i64, y as i64);
-                target.set([x, y, 0], &filtered);
-            }
-        }
+    params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
+    constants: |s, _| constants(s, s.settings.slices.enhanced_sigma),
+    tolerance: Tolerance { absolute: 6e-4, relative: 0.0, outliers: 2e-3, why: WHY },
+    reference: |s, t, reads, writes| {
+        let enhanced = Enhanced::new(s, s.settings.slices.enhanced_sigma, LEAST, |_| true);
+        enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };
 
-fn settings(scene: &Scene) -> EnhancedSigma {
-    scene.settings.post.enhanced_sigma.unwrap_or_default()
+pub const DISTANCE: Pass = Pass {
+    name: "enhanced_sigma_distance",
+    stage: Stage::Shade,
+    when: When::Picture,
+    shader: |_, _| "filter/enhanced_sigma.distance",
+    needed: |s| match s.has_distance() {
+        true => asked(s.settings.distance.enhanced_sigma),
+        false => Err("no distance map in this mode"),
+    },
+    reads: |s, t| vec![whole("source", distance_link(s, "enhanced_sigma_distance", t).0)],
+    writes: |s, t| vec![whole("target", distance_link(s, "enhanced_sigma_distance", t).1)],
+    extent: ray_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.distance.enhanced_sigma, LEAST_DISTANCE, t),
+    constants: |s, _| constants(s, s.settings.distance.enhanced_sigma),
+    // A pixel of f32 in mm lies 4e-6 from where f64 has it, a hundred times as far as one in 0..1.
+    tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
+    reference: |s, t, reads, writes| {
+        let enhanced = Enhanced::new(s, s.settings.distance.enhanced_sigma, LEAST_DISTANCE, is_hit);
+        enhanced.filter(t, reads, writes, |found| found.mean);
+    },
+};
+
+pub const PICTURE: Pass = Pass {
+    name: "enhanced_sigma_picture",
+    stage: Stage::Postprocess,
+    when: When::Picture,
+    shader: |_, _| "filter/enhanced_sigma.picture",
+    needed: |s| asked(s.settings.post.enhanced_sigma),
+    reads: |s, t| vec![whole("source", picture_link(s, "enhanced_sigma_picture", t).0)],
+    writes: |s, t| vec![whole("target", picture_link(s, "enhanced_sigma_picture", t).1)],
+    extent: picture_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.post.enhanced_sigma, LEAST, t),
+    constants: |s, _| constants(s, s.settings.post.enhanced_sigma),
+    tolerance: Tolerance { absolute: 1e-3, relative: 1e-3, outliers: 1e-2, why: WHY },
+    reference: |s, t, reads, writes| {
+        let enhanced = Enhanced::new(s, s.settings.post.enhanced_sigma, LEAST, |_| true);
+        enhanced.filter(t, reads, writes, |found| found.mean);
+    },
+};
+
+/// A sigma of 0 keeps every pixel: no pass.
+pub(super) fn asked(enhanced: Option<EnhancedSigma>) -> Need {
+    match enhanced {
+        Some(e) if e.sigma > 0.0 => Ok("asked for"),
+        Some(_) => Err("a sigma of 0 changes nothing"),
+        None => Err("not asked for"),
+    }
 }
 
-/// K: at most this many alike, and the four neighbours' mean is taken instead (thesis 5-5).
-fn few(e: EnhancedSigma) -> u32 {
-    e.window.saturating_sub(1) / 2
+pub(super) fn params(enhanced: Option<EnhancedSigma>, least: f64, turn: &Turn) -> Params {
+    let e = enhanced.unwrap_or_default();
+    let params = Params::default().f32("range", range(e.sigma)).f32("few", f64::from(few(e.window)));
+    estimator::params(params, e.edge, least).i32("slice", turn.slice)
 }
 
-/// Rec. 709.
-fn brightness(colour: &[f64]) -> f64 {
-    0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
+pub(super) fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(&'static str, i32)> {
+    let e = enhanced.unwrap_or_default();
+    vec![
+        ("RADIUS", (e.window / 2) as i32),
+        ("LARGEST", (e.largest / 2) as i32),
+        ("ESTIMATOR", estimator::constant(scene.centre(e))),
+        ("MULTIPLICATIVE", i32::from(e.noise == Noise::Multiplicative)),
+    ]
 }
 
-fn filtered(e: EnhancedSigma, source: &Texels, x: i64, y: i64) -> [f64; 4] {
-    let [width, height, _] = source.size;
-    let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width as i64 && y < height as i64;
-    let clamped = |i: i64, n: usize| i.clamp(0, n as i64 - 1) as usize;
-    let mut near: Vec<f64> = (0..9)
-        .map(|i| brightness(source.get([clamped(x + i % 3 - 1, width), clamped(y + i / 3 - 1, height), 0])))
-        .collect();
-    near.sort_by(f64::total_cmp);
-    let centre = near[4];
-    let range = f64::from((2.0 * e.sigma).min(f64::from(f32::MAX)) as f32);
-    // Pixels of the picture within a window, and those of them like the centre.
-    let window = |radius: i64| {
-        let all = (y - radius..=y + radius).flat_map(move |j| (x - radius..=x + radius).map(move |i| (i, j)));
-        let there: Vec<&[f64]> =
-            all.filter(|&(i, j)| inside(i, j)).map(|(i, j)| source.get([i as usize, j as usize, 0])).collect();
-        let count = there.len();
-        let alike: Vec<&[f64]> = there.into_iter().filter(|c| (brightness(c) - centre).abs() <= range).collect();
-        (count, alike)
-    };
-    let (start, largest) = (i64::from(e.window / 2), i64::from(e.largest / 2));
-    let (wanted, mut alike) = window(start);
-    let mut radius = start;
-    while alike.len() < wanted && radius < largest {
-        radius += 1;
-        alike = window(radius).1;
+/// Rec. 709; a slice or a distance is its own.
+fn brightness(texel: &[f64]) -> f64 {
+    if texel.len() < 3 { texel[0] } else { 0.2126 * texel[0] + 0.7152 * texel[1] + 0.0722 * texel[2] }
+}
+
+/// The filter's reference.
+pub(super) struct Enhanced {
+    settings: EnhancedSigma,
+    centre: crate::scene::Estimator,
+    least: f64,
+    valid: fn(f64) -> bool,
+}
+
+/// What the filter finds at a pixel.
+pub(super) struct Found {
+    pub mean: Vec<f64>,
+    /// How many rings the window grew.
+    pub rings: u32,
+}
+
+impl Enhanced {
+    pub fn new(scene: &Scene, settings: Option<EnhancedSigma>, least: f64, valid: fn(f64) -> bool) -> Enhanced {
+        let settings = settings.unwrap_or_default();
+        Enhanced { settings, centre: scene.centre(settings), least, valid }
     }
-    if alike.len() as u32 <= few(e) {
-        let four = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)].into_iter().filter(|&(i, j)| inside(i, j));
-        alike = four.map(|(i, j)| source.get([i as usize, j as usize, 0])).collect();
+
+    pub fn filter(&self, turn: &Turn, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
+        let source = reads.get("source");
+        let target = writes.get_mut("target");
+        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        for y in 0..source.size[1] {
+            for x in 0..source.size[0] {
+                target.set([x, y, z], &value(self.at(source, x as i64, y as i64)));
+            }
+        }
     }
-    if alike.is_empty() {
-        alike = vec![source.get([x as usize, y as usize, 0])];
+
+    fn at(&self, source: &Texels, x: i64, y: i64) -> Found {
+        let e = &self.settings;
+        let here = source.get([x as usize, y as usize, 0]);
+        if !(self.valid)(here[0]) {
+            return Found { mean: here.to_vec(), rings: 0 };
+        }
+        let [width, height] = [source.size[0] as i64, source.size[1] as i64];
+        let near = |dx: i64, dy: i64| {
+            let (i, j) = ((x + dx).clamp(0, width - 1), (y + dy).clamp(0, height - 1));
+            brightness(source.get([i as usize, j as usize, 0]))
+        };
+        let centre = estimator::estimate(self.centre, &near, self.valid, e.edge, self.least);
+        let range = match e.noise {
+            Noise::Additive => range(e.sigma),
+            Noise::Multiplicative => range(e.sigma) * centre.abs(),
+        };
+        let there = |i: i64, j: i64| {
+            let inside = i >= 0 && j >= 0 && i < width && j < height;
+            inside.then(|| source.get([i as usize, j as usize, 0])).filter(|v| (self.valid)(v[0]))
+        };
+        // Pixels within a window, and those of them like the centre.
+        let window = |radius: i64| {
+            let all = (y - radius..=y + radius).flat_map(move |j| (x - radius..=x + radius).map(move |i| (i, j)));
+            let there: Vec<&[f64]> = all.filter_map(|(i, j)| there(i, j)).collect();
+            let count = there.len();
+            let alike: Vec<&[f64]> = there.into_iter().filter(|v| (brightness(v) - centre).abs() <= range).collect();
+            (count, alike)
+        };
+        let (start, largest) = (i64::from(e.window / 2), i64::from(e.largest / 2));
+        let (wanted, mut alike) = window(start);
+        let mut radius = start;
+        while alike.len() < wanted && radius < largest {
+            radius += 1;
+            alike = window(radius).1;
+        }
+        if alike.len() as u32 <= few(e.window) {
+            let four = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)];
+            alike = four.into_iter().filter_map(|(i, j)| there(i, j)).collect();
+        }
+        if alike.is_empty() {
+            alike = vec![here];
+        }
+        let mean = |c: usize| alike.iter().map(|v| v[c]).sum::<f64>() / alike.len() as f64;
+        Found { mean: (0..source.channels).map(mean).collect(), rings: (radius - start) as u32 }
     }
-    std::array::from_fn(|c| alike.iter().map(|colour| colour[c]).sum::<f64>() / alike.len() as f64)
 }

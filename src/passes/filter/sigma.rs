@@ -1,5 +1,6 @@
 //! Lee's sigma filter on slices, distance maps and pictures (Lee 1983; thesis 5.3): the mean of the pixels of a window that
-//! lie within two sigma of the centre; where no more than K do, the mean of the four immediate neighbours.
+//! lie within two sigma of the centre (additive noise), or two sigma times the centre (multiplicative); where no more than K
+//! do, the mean of the four immediate neighbours.
 
 use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
 use crate::passes::*;
@@ -66,26 +67,34 @@ fn asked(sigma: Option<scene::Sigma>) -> Need {
 }
 
 /// K: fewer than 4 at 7x7, fewer than 3 at 5x5 (thesis 5.3), and in proportion elsewhere.
-fn few(window: u32) -> u32 {
+pub(super) fn few(window: u32) -> u32 {
     window.saturating_sub(1) / 2
+}
+
+/// D, or D over the centre: 2 sigma. As the shader gets it, so that a pixel at its very edge counts on both sides; 1e30 is
+/// infinite to every value there is, and stays finite when multiplied by one.
+pub(super) fn range(sigma: f64) -> f64 {
+    f64::from((2.0 * sigma).min(1e30) as f32)
 }
 
 fn params(sigma: Option<scene::Sigma>, turn: &Turn) -> Params {
     let sigma = sigma.unwrap_or_default();
     Params::default()
-        .f32("range", 2.0 * sigma.sigma)
+        .f32("range", range(sigma.sigma))
         .f32("few", if sigma.sigma > 0.0 { f64::from(few(sigma.window)) } else { 0.0 })
         .i32("slice", turn.slice)
 }
 
 fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
-    vec![("RADIUS", (sigma.unwrap_or_default().window / 2) as i32)]
+    let sigma = sigma.unwrap_or_default();
+    vec![
+        ("RADIUS", (sigma.window / 2) as i32),
+        ("MULTIPLICATIVE", i32::from(sigma.noise == scene::Noise::Multiplicative)),
+    ]
 }
 
 fn reference(sigma: Option<scene::Sigma>, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
     let sigma = sigma.unwrap_or_default();
-    // The range as the shader gets it, so that a pixel at its very edge counts on both sides.
-    let range = f64::from((2.0 * sigma.sigma).min(f64::from(f32::MAX)) as f32);
     let radius = i64::from(sigma.window / 2);
     let source = reads.get("source");
     let target = writes.get_mut("target");
@@ -101,6 +110,10 @@ fn reference(sigma: Option<scene::Sigma>, turn: &Turn, reads: &Arrays, writes: &
                     if !valid(centre[c]) {
                         return centre[c];
                     }
+                    let range = match sigma.noise {
+                        scene::Noise::Additive => range(sigma.sigma),
+                        scene::Noise::Multiplicative => range(sigma.sigma) * centre[c].abs(),
+                    };
                     let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
                     let close: Vec<f64> = window
                         .filter(|&(i, j)| inside(i, j))

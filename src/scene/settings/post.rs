@@ -1,6 +1,6 @@
 //! Settings of stage 4.
 
-use super::slices::{EnhancedSigma, Sigma};
+use super::slices::{EnhancedSigma, PeronaMalik, Sigma};
 use serde::{Deserialize, Serialize};
 
 /// Stage 4.
@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Post {
     pub sigma: Option<Sigma>,
     pub enhanced_sigma: Option<EnhancedSigma>,
+    pub perona_malik: Option<PeronaMalik>,
     /// Added, -1..1.
     pub brightness: f64,
     /// Multiplied about the middle grey, 0..10.
@@ -23,6 +24,7 @@ impl Default for Post {
         Post {
             sigma: None,
             enhanced_sigma: None,
+            perona_malik: None,
             brightness: 0.0,
             contrast: 1.0,
             gamma: 1.0,

@@ -1,6 +1,6 @@
 //! Settings of stage 3: filters of the distance map, lights, shadow, occlusion, skin. Lengths in mm.
 
-use super::slices::Sigma;
+use super::slices::{EnhancedSigma, PeronaMalik, Sigma};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +13,10 @@ pub struct Distance {
     pub bilateral: Option<Bilateral>,
     /// A sigma filter whose sigma is in mm.
     pub sigma: Option<Sigma>,
+    /// Sigma and edge in mm. A miss stays a miss and counts nowhere.
+    pub enhanced_sigma: Option<EnhancedSigma>,
+    /// Edge in mm, explicit scheme. Nothing flows to or from a miss.
+    pub perona_malik: Option<PeronaMalik>,
 }
 
 /// Gaussian in place and in distance.

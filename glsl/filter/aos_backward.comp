@@ -1,0 +1,39 @@
+// Backward substitution along a row or a column: u[i] = forward[i] + shares[i] u[i+1]. That of the columns averages with what
+// the rows gave, which ends a step of the AOS scheme.
+// variants: rows; plane COLUMNS; slice COLUMNS SLICE; picture_rows PICTURE; picture COLUMNS PICTURE
+#version 460
+#include "aos.glsl"
+layout(scalar) uniform Params {
+    int slice;
+};
+uniform texture2D shares;
+uniform texture2D forward;
+#ifdef COLUMNS
+uniform texture2D rows;
+#endif
+#ifdef SLICE
+uniform writeonly image3D target;
+#else
+uniform writeonly image2D target;
+#endif
+
+void main() {
+    int line = int(gl_GlobalInvocationID.x);
+    ivec2 size = textureSize(shares, 0);
+    if (line >= size[1 - AXIS]) return;
+    T u = T(0.0);
+    for (int i = size[AXIS] - 1; i >= 0; --i) {
+        ivec2 at = texel(line, i);
+        u = LOADED(texelFetch(forward, at, 0)) + texelFetch(shares, at, 0).x * u;
+#ifdef COLUMNS
+        T result = 0.5 * (LOADED(texelFetch(rows, at, 0)) + u);
+#else
+        T result = u;
+#endif
+#ifdef SLICE
+        imageStore(target, ivec3(at, slice), STORED(result));
+#else
+        imageStore(target, at, STORED(result));
+#endif
+    }
+}

@@ -1,0 +1,20 @@
+// A local estimator as a filter of its own: median, Perona-Malik, gradient-inverse, Nagao-Matsuyama (thesis 5.4).
+// variants: plane; slice SLICE
+#version 460
+layout(constant_id = 0) const int ESTIMATOR = 0;
+#extension GL_EXT_scalar_block_layout : require
+layout(scalar) uniform Params {
+    float edge;  // k of Perona-Malik
+    float least; // difference that gradient-inverse takes for none
+    int slice;
+};
+#include "filter.glsl"
+float level(ivec2 at) { return read_at(ivec3(at, 0)); }
+#include "estimators.glsl"
+
+void main() {
+    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 size = source_size();
+    if (any(greaterThanEqual(at, size))) return;
+    write_at(at, estimate(at.xy, size.xy - 1));
+}

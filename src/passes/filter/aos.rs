@@ -1,0 +1,216 @@
+//! Anisotropic diffusion in semi-implicit steps by additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998):
+//! u' = 1/2 sum over both axes of (I - 2 tau A(u))^-1 u, with Perona and Malik's conductance between neighbours. Stable at any
+//! tau, and within the range of what was there. Each axis is eliminated forwards and substituted backwards, an invocation a
+//! row or a column: four dispatches a step.
+
+use super::estimator::storable_edge;
+use super::perona_malik::{asked, conductance, constant};
+use crate::passes::chain::{picture_link, slice_link, writes_volume};
+use crate::passes::*;
+use crate::scene::{PeronaMalik, Scheme};
+
+/// Of one step: rows forward and backward, columns forward and backward.
+pub const DISPATCHES: u32 = 4;
+
+const TOLERANCE: Tolerance = Tolerance {
+    absolute: 3e-5,
+    relative: 3e-6,
+    outliers: 0.0,
+    why: "every term of the sweeps is positive, so that a row of n pixels is off by about n ulp; noise in place of shares of at \
+          most 1 sums to tens; then what the target's format stores",
+};
+
+pub const SLICE: Pass = Pass {
+    name: "aos_slice",
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s, t| match turn_of(t) {
+        (_, Sweep::Forward) => "filter/aos_forward.plane",
+        (0, Sweep::Backward) => "filter/aos_backward.rows",
+        _ if writes_volume(s, "aos_slice", t) => "filter/aos_backward.slice",
+        _ => "filter/aos_backward.plane",
+    },
+    needed: |s| asked(s.settings.slices.perona_malik, Scheme::Aos),
+    reads: |s, t| SLICE_SLOTS.reads(slice_link(s, "aos_slice", t).0, t),
+    writes: |s, t| SLICE_SLOTS.writes(slice("target", slice_link(s, "aos_slice", t).1), t),
+    extent: |s, t| lines(s.grid.size, t),
+    repeat: |s| DISPATCHES * s.settings.slices.perona_malik.unwrap_or_default().repeat,
+    params: |s, t| params(s.settings.slices.perona_malik, t),
+    constants: |s, t| constants(s.settings.slices.perona_malik, t),
+    tolerance: TOLERANCE,
+    reference: |s, t, reads, writes| reference(s.settings.slices.perona_malik, t, reads, writes),
+};
+
+pub const PICTURE: Pass = Pass {
+    name: "aos_picture",
+    stage: Stage::Postprocess,
+    when: When::Picture,
+    shader: |_, t| match turn_of(t) {
+        (_, Sweep::Forward) => "filter/aos_forward.picture",
+        (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
+        _ => "filter/aos_backward.picture",
+    },
+    needed: |s| asked(s.settings.post.perona_malik, Scheme::Aos),
+    reads: |s, t| PICTURE_SLOTS.reads(picture_link(s, "aos_picture", t).0, t),
+    writes: |s, t| PICTURE_SLOTS.writes(whole("target", picture_link(s, "aos_picture", t).1), t),
+    extent: |s, t| lines(s.picture_size(), t),
+    repeat: |s| DISPATCHES * s.settings.post.perona_malik.unwrap_or_default().repeat,
+    params: |s, t| params(s.settings.post.perona_malik, t),
+    constants: |s, t| constants(s.settings.post.perona_malik, t),
+    tolerance: TOLERANCE,
+    reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes),
+};
+
+/// What lies between the sweeps.
+struct Between {
+    shares: Slot,
+    forward: Slot,
+    rows: Slot,
+}
+
+const SLICE_SLOTS: Between = Between { shares: Slot::SliceShares, forward: Slot::SliceForward, rows: Slot::SliceRows };
+const PICTURE_SLOTS: Between =
+    Between { shares: Slot::PictureShares, forward: Slot::PictureForward, rows: Slot::PictureRows };
+
+#[derive(Clone, Copy, PartialEq)]
+enum Sweep {
+    Forward,
+    Backward,
+}
+
+/// The axis (0 along rows, 1 along columns) and the direction of a dispatch.
+fn turn_of(turn: &Turn) -> (usize, Sweep) {
+    let sweep = if turn.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
+    ((turn.iteration % DISPATCHES / 2) as usize, sweep)
+}
+
+impl Between {
+    fn reads(&self, source: Slot, turn: &Turn) -> Vec<Bind> {
+        let swept = || vec![whole("shares", self.shares), whole("forward", self.forward)];
+        match turn_of(turn) {
+            (_, Sweep::Forward) => vec![whole("source", source)],
+            (0, Sweep::Backward) => swept(),
+            _ => [swept(), vec![whole("rows", self.rows)]].concat(),
+        }
+    }
+
+    fn writes(&self, target: Bind, turn: &Turn) -> Vec<Bind> {
+        match turn_of(turn) {
+            (_, Sweep::Forward) => vec![whole("shares", self.shares), whole("forward", self.forward)],
+            (0, Sweep::Backward) => vec![whole("target", self.rows)],
+            _ => vec![target],
+        }
+    }
+}
+
+fn lines(size: [u32; 2], turn: &Turn) -> [u32; 3] {
+    [size[1 - turn_of(turn).0], 1, 1]
+}
+
+fn params(settings: Option<PeronaMalik>, turn: &Turn) -> Params {
+    let p = settings.unwrap_or_default();
+    match turn_of(turn).1 {
+        Sweep::Forward => Params::default().f32("edge", storable_edge(p.edge)).f32("tau", p.step),
+        Sweep::Backward => Params::default().i32("slice", turn.slice),
+    }
+}
+
+fn constants(settings: Option<PeronaMalik>, turn: &Turn) -> Vec<(&'static str, i32)> {
+    let (axis, sweep) = turn_of(turn);
+    let mut constants = vec![("AXIS", axis as i32)];
+    constants.extend((sweep == Sweep::Forward).then(|| constant(settings)));
+    constants
+}
+
+fn reference(settings: Option<PeronaMalik>, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+    let p = settings.unwrap_or_default();
+    let (axis, sweep) = turn_of(turn);
+    let size = reads.get(if sweep == Sweep::Forward { "source" } else { "shares" }).size;
+    for line in 0..size[1 - axis] {
+        let texel = |i: usize| if axis == 0 { [i, line, 0] } else { [line, i, 0] };
+        match sweep {
+            Sweep::Forward => {
+                let source = reads.get("source");
+                let values: Vec<&[f64]> = (0..size[axis]).map(|i| source.get(texel(i))).collect();
+                let weights: Vec<f64> = values.windows(2).map(|w| 2.0 * p.step * conductance(&p, w[0], w[1])).collect();
+                for i in 0..size[axis] {
+                    let (share, forward) = eliminated(&weights, &values, i);
+                    writes.get_mut("shares").set(texel(i), &[share]);
+                    writes.get_mut("forward").set(texel(i), &forward);
+                }
+            }
+            Sweep::Backward => {
+                let (shares, forward) = (reads.get("shares"), reads.get("forward"));
+                let target = writes.get_mut("target");
+                for i in 0..size[axis] {
+                    // All that later pixels pass on, each through the shares of those between.
+                    let mut u = vec![0.0; forward.channels];
+                    let mut through = 1.0;
+                    for j in i..size[axis] {
+                        u.iter_mut().zip(forward.get(texel(j))).for_each(|(u, f)| *u += through * f);
+                        through *= shares.one(texel(j)[0], texel(j)[1], 0);
+                    }
+                    if axis == 1 {
+                        u.iter_mut().zip(reads.get("rows").get(texel(i))).for_each(|(u, r)| *u = 0.5 * (*u + r));
+                    }
+                    let [x, y, _] = texel(i);
+                    target.set([x, y, if target.size[2] > 1 { turn.slice as usize } else { 0 }], &u);
+                }
+            }
+        }
+    }
+}
+
+/// What elimination has to leave at pixel i, u[i] = forward + share u[i+1], told without eliminating: the last unknown of the
+/// first i + 1 equations, whose solution is linear in u[i+1]. `forward` is that solution with u[i+1] = 0, and `share` what a
+/// u[i+1] of 1 adds to it.
+fn eliminated(weights: &[f64], values: &[&[f64]], i: usize) -> (f64, Vec<f64>) {
+    let weight = |j: usize| weights.get(j).copied().unwrap_or(0.0);
+    let last = |right: Vec<f64>| {
+        let rows = right.into_iter().enumerate().map(|(j, right)| {
+            let before = if j > 0 { weight(j - 1) } else { 0.0 };
+            Row { before: -before, diagonal: 1.0 + before + weight(j), after: -weight(j), right }
+        });
+        solved(rows.collect())[i]
+    };
+    let channels = values[0].len();
+    let forward = (0..channels).map(|c| last(values[..=i].iter().map(|v| v[c]).collect())).collect();
+    let share = last((0..=i).map(|j| if j == i { weight(i) } else { 0.0 }).collect());
+    (share, forward)
+}
+
+/// One equation of a tridiagonal system.
+#[derive(Clone, Copy)]
+struct Row {
+    before: f64,
+    diagonal: f64,
+    after: f64,
+    right: f64,
+}
+
+/// Cyclic reduction (Hockney 1965): every other unknown is eliminated until one is left.
+fn solved(rows: Vec<Row>) -> Vec<f64> {
+    let none = Row { before: 0.0, diagonal: 1.0, after: 0.0, right: 0.0 };
+    if rows.len() == 1 {
+        return vec![rows[0].right / rows[0].diagonal];
+    }
+    let odd = (1..rows.len()).step_by(2).map(|i| {
+        let (low, here, high) = (rows[i - 1], rows[i], rows.get(i + 1).copied().unwrap_or(none));
+        let (a, c) = (here.before / low.diagonal, here.after / high.diagonal);
+        Row {
+            before: -a * low.before,
+            diagonal: here.diagonal - a * low.after - c * high.before,
+            after: -c * high.after,
+            right: here.right - a * low.right - c * high.right,
+        }
+    });
+    let found = solved(odd.collect());
+    let mut all = vec![0.0; rows.len()];
+    found.into_iter().enumerate().for_each(|(n, u)| all[2 * n + 1] = u);
+    for i in (0..rows.len()).step_by(2) {
+        let before = if i > 0 { rows[i].before * all[i - 1] } else { 0.0 };
+        let after = if i + 1 < rows.len() { rows[i].after * all[i + 1] } else { 0.0 };
+        all[i] = (rows[i].right - before - after) / rows[i].diagonal;
+    }
+    all
+}

@@ -1,0 +1,133 @@
+//! Local estimators of a pixel from those around it, which thesis 5.4 compares: as a filter of slices of their own, and as the
+//! centre of the enhanced sigma filter. Beyond the border the nearest pixel stands in; of distances, misses count nowhere.
+
+use crate::passes::chain::{slice_link, writes_volume};
+use crate::passes::*;
+use crate::scene::Estimator;
+
+const NAME: &str = "estimator_slice";
+
+pub const SLICE: Pass = Pass {
+    name: NAME,
+    stage: Stage::Preprocess,
+    when: When::Frame,
+    shader: |s, t| if writes_volume(s, NAME, t) { "filter/estimator.slice" } else { "filter/estimator.plane" },
+    needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
+    reads: |s, t| vec![whole("source", slice_link(s, NAME, t).0)],
+    writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
+    extent: slice_extent,
+    repeat: once,
+    params: |s, t| params(Params::default(), s.settings.slices.estimator_edge, LEAST).i32("slice", t.slice),
+    constants: |s, _| vec![("ESTIMATOR", constant(s.settings.slices.estimator.unwrap_or_default()))],
+    tolerance: Tolerance {
+        absolute: 6e-4,
+        relative: 0.0,
+        outliers: 1e-3,
+        why: "at most 25 values in f32; of two masks that vary alike to f32's rounding either may win; R16F stores 1 to 4.9e-4",
+    },
+    reference: |scene, turn, reads, writes| {
+        let slices = &scene.settings.slices;
+        let source = reads.get("source");
+        let target = writes.get_mut("target");
+        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        for y in 0..source.size[1] {
+            for x in 0..source.size[0] {
+                let around = |dx: i64, dy: i64| source.clamped(x as i64 + dx, y as i64 + dy, 0);
+                let estimator = slices.estimator.unwrap_or_default();
+                target.set([x, y, z], &[estimate(estimator, &around, |_| true, slices.estimator_edge, LEAST)]);
+            }
+        }
+    },
+};
+
+/// Difference below which a gradient is taken for none: half a level of 255, as Wang, Vagnucci and Li do on whole levels.
+pub(super) const LEAST: f64 = 0.5 / 255.0;
+/// The same on distances, mm: less than a detector can tell.
+pub(super) const LEAST_DISTANCE: f64 = 0.01;
+
+/// The shader's word for it.
+pub(super) fn constant(estimator: Estimator) -> i32 {
+    match estimator {
+        Estimator::Median => 0,
+        Estimator::PeronaMalik => 1,
+        Estimator::GradientInverse => 2,
+        Estimator::NagaoMatsuyama => 3,
+    }
+}
+
+pub(super) fn params(params: Params, edge: f64, least: f64) -> Params {
+    params.f32("edge", storable_edge(edge)).f32("least", least)
+}
+
+/// An edge constant that f32 divides by: 1e-30 is 0 and 1e30 is infinite to every difference there is.
+pub(super) fn storable_edge(edge: f64) -> f64 {
+    edge.clamp(1e-30, 1e30)
+}
+
+/// The estimate at the pixel whose surroundings `around` gives by offset; that pixel itself must be `valid`.
+pub(super) fn estimate(
+    estimator: Estimator,
+    around: &dyn Fn(i64, i64) -> f64,
+    valid: fn(f64) -> bool,
+    edge: f64,
+    least: f64,
+) -> f64 {
+    let here = around(0, 0);
+    let square = || (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
+    match estimator {
+        Estimator::Median => {
+            let mut values: Vec<f64> = square().map(|(dx, dy)| around(dx, dy)).filter(|v| valid(*v)).collect();
+            values.sort_by(f64::total_cmp);
+            values[(values.len() - 1) / 2]
+        }
+        Estimator::PeronaMalik => {
+            let four = [(0, -1), (-1, 0), (0, 1), (1, 0)].map(|(dx, dy)| around(dx, dy));
+            let flux = four.into_iter().filter(|v| valid(*v)).map(|v| (v - here) * quotient(v - here, edge));
+            here + 0.2 * flux.sum::<f64>()
+        }
+        Estimator::GradientInverse => {
+            let eight = square().filter(|at| *at != (0, 0)).map(|(dx, dy)| around(dx, dy));
+            let weighted: Vec<(f64, f64)> =
+                eight.filter(|v| valid(*v)).map(|v| (1.0 / (v - here).abs().max(least), v)).collect();
+            let weights: f64 = weighted.iter().map(|(w, _)| w).sum();
+            if weighted.is_empty() {
+                return here;
+            }
+            0.5 * here + 0.5 * weighted.iter().map(|(w, v)| w * v).sum::<f64>() / weights
+        }
+        Estimator::NagaoMatsuyama => {
+            let mut best = (f64::INFINITY, here);
+            for mask in masks() {
+                let values: Vec<f64> = mask.iter().map(|&(dx, dy)| around(dx, dy)).collect();
+                if !values.iter().all(|v| valid(*v)) {
+                    continue;
+                }
+                let mean = values.iter().sum::<f64>() / values.len() as f64;
+                let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+                if variance < best.0 {
+                    best = (variance, mean);
+                }
+            }
+            best.1
+        }
+    }
+}
+
+/// 1 / (1 + (g/k)^2); nothing flows where k is 0.
+pub(super) fn quotient(difference: f64, edge: f64) -> f64 {
+    if edge > 0.0 { 1.0 / (1.0 + (difference / edge).powi(2)) } else { 0.0 }
+}
+
+/// Nagao and Matsuyama's nine: the square of 3x3, and a mask towards an edge and one towards a corner, each turned four times.
+fn masks() -> Vec<Vec<(i64, i64)>> {
+    let square = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).collect();
+    let mut edge = vec![(0, 0), (-1, -1), (0, -1), (1, -1), (-1, -2), (0, -2), (1, -2)];
+    let mut corner = vec![(0, 0), (-1, 0), (0, -1), (-1, -1), (-2, -1), (-1, -2), (-2, -2)];
+    let (mut edges, mut corners) = (Vec::new(), Vec::new());
+    for _ in 0..4 {
+        edges.push(edge.clone());
+        corners.push(corner.clone());
+        edge.iter_mut().chain(&mut corner).for_each(|at| *at = (-at.1, at.0));
+    }
+    [vec![square], edges, corners].concat()
+}
