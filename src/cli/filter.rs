@@ -13,18 +13,60 @@ use echolume::source::{Geometry, Grid, StoredType};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Filters by the names of the command line, and the settings that they are. The plain one is switched on, not set.
-const FILTERS: &[(&str, &str)] = &[("median", "median"), ("sigma", "sigma"), ("gaussian", "smooth")];
-const PLAIN: &str = "median";
+/// One row of the growth table: sigma, starting and largest window, and the settings that make it.
+type Row = (f64, [u32; 2], Settings);
+
+/// A filter of stage 1 under the name that the command line gives it.
+struct Known {
+    name: &'static str,
+    /// The setting that switches it on.
+    on: &'static str,
+    /// Keys and the settings that they are; where there are none, keys are those of the table that `on` names.
+    keys: &'static [(&'static str, &'static str)],
+}
+
+/// In the order in which they run.
+const FILTERS: &[Known] = &[
+    Known { name: "median", on: "slices.median=true", keys: &[] },
+    Known {
+        name: "estimator",
+        on: "slices.estimator=median",
+        keys: &[("kind", "slices.estimator"), ("edge", "slices.estimator_edge")],
+    },
+    Known { name: "sigma", on: "slices.sigma={}", keys: &[] },
+    Known { name: ENHANCED, on: "slices.enhanced_sigma={}", keys: &[] },
+    Known { name: "perona-malik", on: "slices.perona_malik={}", keys: &[] },
+    Known { name: "gaussian", on: "slices.smooth={}", keys: &[] },
+];
+const ENHANCED: &str = "enhanced-sigma";
+
+impl Known {
+    /// The setting of a key, or what this filter has instead.
+    fn setting(&self, key: &str) -> Result<String, String> {
+        let (table, value) = self.on.split_once('=').unwrap_or((self.on, ""));
+        match self.keys.iter().find(|(name, _)| *name == key) {
+            Some((_, setting)) => Ok(setting.to_string()),
+            None if value == "{}" => Ok(format!("{table}.{key}")),
+            None if self.keys.is_empty() => Err(format!("{} has no settings", self.name)),
+            None => {
+                let there = self.keys.iter().map(|k| k.0).collect::<Vec<_>>().join(", ");
+                Err(format!("{} has no {key:?}; there are: {there}", self.name))
+            }
+        }
+    }
+}
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Filters: median (3x3), sigma (window, sigma), gaussian (lateral, depth: standard deviations, pixels). Their \
-                        keys are those of `slices` in a scene file. One of each kind; they run in the order of stage 1, which is \
-                        the order given here, whatever the order of the flags.\n\nExamples:\n  \
+    after_help = "Filters: median (3x3); estimator (kind: median, perona-malik, gradient-inverse, nagao-matsuyama; edge); sigma \
+                        (window, sigma, noise); enhanced-sigma (window, largest, sigma, noise, centre, edge); perona-malik \
+                        (scheme: explicit, aos; edge, conductance, step, repeat); gaussian (lateral, depth: standard deviations, \
+                        pixels). Keys and defaults are those of `slices` in a scene file. One of each kind; they run in the order \
+                        of stage 1, which is the order given here, whatever the order of the flags.\n\nExamples:\n  \
                         echolume filter scan.png -o smooth.png --filter sigma:window=9,sigma=0.1\n  \
                         echolume filter scan.jpg -o smooth.png --filter median --filter gaussian:lateral=1.5,depth=1.5 \
-                        --region 40,60,32,32 --background 200,60,32,32"
+                        --region 40,60,32,32 --background 200,60,32,32\n  \
+                        echolume filter scan.png --growth-table --filter enhanced-sigma:sigma=0.1 --csv growth.csv"
 )]
 pub struct Filter {
     /// PNG, JPEG, PNM or BMP of 8 or 16 bits; colour becomes grey
@@ -41,7 +83,8 @@ pub struct Filter {
     /// ... and its contrast-to-noise ratio against this one
     #[arg(long, value_name = "X,Y,W,H", requires = "region")]
     background: Option<String>,
-    /// Print how far the windows of the enhanced sigma filter grow (thesis Tables 7-9)
+    /// Print how far the windows of the enhanced sigma filter grow (thesis Tables 7-9): for windows from 3 to 13 pixels and
+    /// sigmas of 0.03, 0.1 and 0.17, or the ones given with --filter enhanced-sigma
     #[arg(long)]
     growth_table: bool,
     /// Write that table to this file, too
@@ -61,6 +104,7 @@ pub struct Filter {
 impl Filter {
     pub fn run(&self) -> Result<(), Failure> {
         let settings = self.settings(&[])?;
+        let rows = if self.growth_table { self.growth_rows()? } else { Vec::new() };
         let grey = Grey::load(&self.image).map_err(input)?;
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
@@ -79,7 +123,8 @@ impl Filter {
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
 
         if let Some(output) = &self.output {
-            let mut renderer = send(&context, scene, &grey)?;
+            let mut renderer = Renderer::new(&context, scene, &Options::default()).map_err(failed)?;
+            renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
             let filtered = read(&mut renderer, Slot::Volume)?.values;
             grey.with(&filtered).save(output).map_err(failed)?;
             say!("picture: {}", output.display());
@@ -93,7 +138,7 @@ impl Filter {
             }
         }
         if self.growth_table {
-            self.print_growth(&context, &grey)?;
+            self.print_growth(&context, &grey, rows)?;
         }
         match context.messages().first() {
             None => Ok(()),
@@ -101,38 +146,32 @@ impl Filter {
         }
     }
 
-    /// Slices in one volume of one slice of 1 mm pixels, the filters as given and `more` settings over them.
+    /// The filters as given, and `more` settings over them.
     fn settings(&self, more: &[String]) -> Result<Settings, Failure> {
         let mut layers = Layers::default();
-        // Nothing is rendered: the picture is the slice.
-        for set in ["mode=volume", "picture.size=[1,1]", "slices.format=r32f"] {
+        // Nothing is rendered: the picture is the slice, a plane.
+        for set in ["mode=plane", "picture.size=[1,1]", "slices.format=r32f"] {
             layers.set(set).map_err(input)?;
         }
         let mut seen = Vec::new();
         for text in &self.filter {
             let flag = format!("--filter {text}");
             let (name, keys) = text.split_once(':').unwrap_or((text, ""));
-            let Some((name, setting)) = FILTERS.iter().find(|f| f.0 == name) else {
-                let known = FILTERS.iter().map(|f| f.0).collect::<Vec<_>>().join(", ");
-                return Err(input(format!("{flag}: no filter is called {name:?}; there are: {known}")));
+            let Some(known) = FILTERS.iter().find(|f| f.name == name) else {
+                let names = FILTERS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ");
+                return Err(input(format!("{flag}: no filter is called {name:?}; there are: {names}")));
             };
-            if seen.contains(name) {
+            if seen.contains(&name) {
                 return Err(input(format!("{flag}: {name} is given twice; give its keys in one --filter")));
             }
             seen.push(name);
-            if *name == PLAIN {
-                if !keys.is_empty() {
-                    return Err(input(format!("{flag}: {name} has no settings")));
-                }
-                layers.set_by(&flag, &format!("slices.{setting}=true")).map_err(input)?;
-                continue;
-            }
-            layers.set_by(&flag, &format!("slices.{setting}={{}}")).map_err(input)?;
+            layers.set_by(&flag, known.on).map_err(input)?;
             for pair in keys.split(',').filter(|k| !k.is_empty()) {
-                if !pair.contains('=') {
+                let Some((key, value)) = pair.split_once('=') else {
                     return Err(input(format!("{flag}: must read NAME:KEY=VALUE,KEY=VALUE")));
-                }
-                layers.set_by(&flag, &format!("slices.{setting}.{pair}")).map_err(input)?;
+                };
+                let setting = known.setting(key.trim()).map_err(|e| input(format!("{flag}: {e}")))?;
+                layers.set_by(&flag, &format!("{setting}={value}")).map_err(input)?;
             }
         }
         for set in more {
@@ -175,12 +214,43 @@ impl Filter {
         }
     }
 
-    /// Tables 7-9: for the thesis' windows, and its deviations unless one is given.
-    fn print_growth(&self, context: &Arc<Context>, grey: &Grey) -> Result<(), Failure> {
-        let base = self.settings(&["slices.enhanced_sigma.growth=true".to_string()])?;
-        let given = self.filter.iter().any(|f| f.starts_with("enhanced-sigma:") && f.contains("sigma="));
-        let _ = (base, given, context, grey, growth::SIGMAS);
-        let rows: Vec<Growth> = Vec::new();
+    /// The rows of the growth table: the thesis', unless the filter was given its own.
+    fn growth_rows(&self) -> Result<Vec<Row>, Failure> {
+        let keys = self.filter.iter().filter_map(|f| f.split_once(':')).filter(|f| f.0 == ENHANCED);
+        let keys: Vec<&str> = keys.flat_map(|f| f.1.split(',')).filter_map(|k| k.split('=').next()).collect();
+        let given = |key: &str| keys.iter().any(|k| k.trim() == key);
+        let asked = self.settings(&[])?.slices.enhanced_sigma.unwrap_or_default();
+        let sigmas = if given("sigma") { vec![asked.sigma] } else { growth::SIGMAS.to_vec() };
+        if asked.sigma <= 0.0 {
+            return Err(input(
+                "--growth-table: with a sigma of 0 no pixel is like another and the filter does nothing",
+            ));
+        }
+        let is_one = given("window") || given("largest");
+        let windows = if is_one { vec![[asked.window, asked.largest]] } else { growth::WINDOWS.to_vec() };
+        let rows = sigmas.iter().flat_map(|sigma| windows.iter().map(move |windows| (*sigma, *windows)));
+        rows.map(|(sigma, [window, largest])| {
+            let set = format!("{{window={window},largest={largest},sigma={sigma:?},growth=true}}");
+            Ok((sigma, [window, largest], self.settings(&[format!("slices.enhanced_sigma={set}")])?))
+        })
+        .collect()
+    }
+
+    /// One picture through the filter for every row; only the filter changes in between.
+    fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<Row>) -> Result<(), Failure> {
+        let (mut rows, mut renderer) = (Vec::new(), None);
+        for (sigma, windows, settings) in asked {
+            let scene = scene(grey, settings)?;
+            let renderer = match &mut renderer {
+                None => renderer.insert(Renderer::new(context, scene, &Options::default()).map_err(failed)?),
+                Some(there) => {
+                    there.change(scene).map_err(failed)?;
+                    there
+                }
+            };
+            renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
+            rows.push(Growth::new(sigma, windows, &read(renderer, Slot::Growth)?.values));
+        }
         say!("{}", growth::table(&rows).trim_end());
         if let Some(csv) = &self.csv {
             picture::replace(csv, growth::csv(&rows).as_bytes()).map_err(failed)?;
@@ -195,14 +265,6 @@ fn scene(grey: &Grey, settings: Settings) -> Result<Scene, Failure> {
     let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
     let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
     Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings).map_err(input)
-}
-
-/// A renderer through whose stage 1 the picture has gone.
-fn send(context: &Arc<Context>, scene: Scene, grey: &Grey) -> Result<Renderer, Failure> {
-    let mut renderer = Renderer::new(context, scene, &Options::default()).map_err(failed)?;
-    renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
-    renderer.show(0).map_err(failed)?;
-    Ok(renderer)
 }
 
 fn read(renderer: &mut Renderer, slot: Slot) -> Result<Texels, Failure> {
