@@ -4,6 +4,8 @@
 mod common;
 mod conditioning;
 mod detector;
+mod extreme_geometry;
+mod extremes;
 mod faults;
 mod goldens;
 mod known_answers;
