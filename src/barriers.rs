@@ -227,11 +227,14 @@ mod tests {
     fn every_barrier_of_a_real_plan_is_needed_and_none_is_missing() {
         use crate::passes::{PASSES, When};
         use crate::probe::{Geometry, Grid};
-        let settings =
-            "slices = { median = true, sigma = {}, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }
+        let settings = "slices.median = true
+            slices.sigma = {}
+            slices.enhanced_sigma = { growth = true }
+            slices.perona_malik = { scheme = 'aos', repeat = 2 }
+            slices.smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 }
             distance = { median = 3, bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 }, sigma = {} }
             light = { shadow = {}, occlusion = {} }
-            post = { sigma = {}, enhanced_sigma = {} }";
+            post = { sigma = {}, enhanced_sigma = {}, perona_malik = { scheme = 'aos' } }";
         let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
         let input = crate::scene::Input { stored: crate::source::StoredType::U8, range: [0.0, 255.0] };
         let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();

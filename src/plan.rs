@@ -76,16 +76,16 @@ impl Plan {
                     let names = |slots: Vec<crate::passes::Bind>| {
                         slots.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
                     };
-                    let turn = Turn::default();
-                    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
-                    let _ = writeln!(
-                        text,
-                        "    {:<19} {}: {} -> {}",
-                        "",
-                        (pass.shader)(scene, &turn),
-                        names(reads),
-                        names(writes)
-                    );
+                    // A pass that repeats may take several shaders in turn: each once.
+                    let mut told = Vec::new();
+                    for turn in (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..Turn::default() }) {
+                        let shader = (pass.shader)(scene, &turn);
+                        if !told.contains(&shader) {
+                            told.push(shader);
+                            let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+                            let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
+                        }
+                    }
                 }
                 Err(why) => {
                     let _ = writeln!(text, "  - {:<19} {why}", pass.name);

@@ -293,7 +293,8 @@ mod tests {
     fn a_module_tells_its_names_types_offsets_and_workgroup() {
         let module = reflect(&words(embedded("filter/sigma.slice").unwrap())).unwrap();
         assert_eq!(module.local_size, [8, 8, 1]);
-        assert_eq!(module.constants, [Constant { name: "RADIUS".into(), id: 0 }]);
+        let constants = [("RADIUS", 0), ("MULTIPLICATIVE", 1)].map(|(name, id)| Constant { name: name.into(), id });
+        assert_eq!(module.constants, constants);
         let names: Vec<_> = module.params.iter().map(|p| (p.name.as_str(), p.offset, p.is_float)).collect();
         assert_eq!(names, [("range", 0, true), ("few", 4, true), ("slice", 8, false)]);
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();

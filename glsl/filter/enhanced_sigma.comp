@@ -63,7 +63,8 @@ void main() {
     write_at(at, float(rings));
 #else
     T result = sum / max(count, 1.0);
-    if (count <= few) {
+    // Beyond the border are no pixels that could be alike: all there are is enough.
+    if (count <= min(few, wanted - 1.0)) {
         sum = T(0.0);
         count = 0.0;
         for (int i = 0; i < 4; ++i) {

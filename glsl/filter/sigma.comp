@@ -1,5 +1,5 @@
-// Lee's sigma filter: the mean of the neighbours within `range` of the centre; where no more than `few` are, the mean of
-// the four immediate neighbours. (Lee 1983; thesis 5.3.)
+// Lee's sigma filter: the mean of the neighbours within `range` of the centre; where no more than `few` are, nor all that
+// there are, the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.)
 // variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
@@ -25,12 +25,15 @@ void main() {
     // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
     T sum = T(0.0);
     T count = T(0.0);
+    float there = 0.0;
     ivec2 low = max(at.xy - RADIUS, ivec2(0)), high = min(at.xy + RADIUS, size.xy - 1);
     for (int y = low.y; y <= high.y; ++y) {
         for (int x = low.x; x <= high.x; ++x) {
             T away = read_at(ivec3(x, y, at.z)) - centre;
             T inside = WITHIN(away, within);
-            if (!VALID(away + centre)) inside = T(0.0);
+            bool valid = VALID(away + centre);
+            if (!valid) inside = T(0.0);
+            there += valid ? 1.0 : 0.0;
             sum += inside * min(away, within);
             count += inside;
         }
@@ -48,8 +51,8 @@ void main() {
     T mean = sum / count;
     T neighbours = near_count > 0.0 ? near_sum / near_count : T(0.0);
 #ifdef PICTURE
-    write_at(at, centre + mix(mean, neighbours, lessThanEqual(count, vec4(few))));
+    write_at(at, centre + mix(mean, neighbours, lessThanEqual(count, vec4(min(few, there - 1.0)))));
 #else
-    write_at(at, centre + (count <= few ? neighbours : mean));
+    write_at(at, centre + (count <= min(few, there - 1.0) ? neighbours : mean));
 #endif
 }

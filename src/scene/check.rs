@@ -26,6 +26,17 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         within("slices.smooth.lateral", smooth.lateral, 0.0, 1000.0)?;
         within("slices.smooth.depth", smooth.depth, 0.0, 1000.0)?;
         within("slices.smooth.elevation", smooth.elevation, 0.0, 1000.0)?;
+        if let Some(kernel) = smooth.kernel {
+            if kernel != 3 && kernel != 5 {
+                return refuse("slices.smooth.kernel", format!("is {kernel}, must be 3 or 5"));
+            }
+            if smooth.lateral != 0.0 || smooth.depth != 0.0 || smooth.elevation != 0.0 {
+                return refuse(
+                    "slices.smooth.kernel",
+                    "stands instead of lateral, depth and elevation: set it, or them",
+                );
+            }
+        }
     }
     check_sigma("slices.sigma", s.sigma)?;
     within("slices.estimator_edge", s.estimator_edge, 0.0, f64::INFINITY)?;

@@ -207,7 +207,28 @@ impl Scene {
     /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices.
     pub fn smoothing(&self) -> [f64; 3] {
         let smooth = self.settings.slices.smooth.unwrap_or_default();
+        if let Some(taps) = smooth.kernel {
+            return [binomial_deviation(taps); 3];
+        }
+        if self.blurs() {
+            return [binomial_deviation(3), binomial_deviation(3), smooth.elevation];
+        }
         [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
+    }
+
+    /// Taps of that Gaussian on one side, along each axis.
+    pub fn smoothing_radius(&self) -> [u32; 3] {
+        if let Some(taps) = self.settings.slices.smooth.and_then(|s| s.kernel) {
+            return [taps / 2; 3];
+        }
+        let [lateral, depth, elevation] = self.smoothing().map(gaussian_radius);
+        if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
+    }
+
+    /// Whether slices get the slight blur against wood grain: asked for, and no smoothing does as much in their plane.
+    fn blurs(&self) -> bool {
+        let smooth = self.settings.slices.smooth.unwrap_or_default();
+        self.settings.slices.blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
     /// What estimates the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
@@ -236,7 +257,7 @@ impl Scene {
 
     /// How many pixels away a slice's filters look.
     fn filter_reach(&self) -> f64 {
-        let [lateral, depth, _] = self.smoothing();
+        let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
         let slices = &self.settings.slices;
         let sigma = slices.sigma.map_or(0.0, |s| f64::from(s.window / 2));
@@ -248,9 +269,14 @@ impl Scene {
         };
         let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
         // To the corners of square windows, one filter after another.
-        let gaussian = f64::from(gaussian_radius(lateral)).hypot(f64::from(gaussian_radius(depth)));
+        let gaussian = lateral.hypot(depth);
         std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian
     }
+}
+
+/// Standard deviation of the binomial of that many taps.
+fn binomial_deviation(taps: u32) -> f64 {
+    f64::from(taps - 1).sqrt() / 2.0
 }
 
 /// Taps on one side of a Gaussian: three standard deviations hold 99.7 % of it.

@@ -181,6 +181,10 @@ fn scenes() -> Vec<(String, Scene)> {
             "slices = { pixels = 24, enhanced_sigma = { window = 63, largest = 63, sigma = inf } }\n\
              distance = { enhanced_sigma = { window = 3, largest = 63, sigma = 0.2, centre = 'median' } }",
         ),
+        ("Gaussian of 3x3x3", "slices = { pixels = 20, smooth = { kernel = 3 } }"),
+        ("Gaussian of 5x5x5", "slices = { pixels = 20, smooth = { kernel = 5 } }"),
+        ("slight blur", "slices = { pixels = 20, blur = true }"),
+        ("slight blur and frames joined", "slices = { pixels = 20, blur = true, smooth = { elevation = 1.0 } }"),
         ("median estimator", "slices = { pixels = 20, estimator = 'median' }"),
         (
             "Perona-Malik estimator, between filters",

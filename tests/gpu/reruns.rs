@@ -128,12 +128,21 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
         "bilateral = { pixels = 1.0, distance = 2.0, repeat = 2 }, ",
         "bilateral = { pixels = 1.0, distance = 0.5, repeat = 3 }, ",
     ];
-    let sigmas = ["", "sigma = { window = 3, sigma = 0.5 }", "sigma = { window = 5, sigma = 0.2 }"];
+    let sigmas = [
+        "",
+        "sigma = { window = 3, sigma = 0.5 }",
+        "sigma = { window = 5, sigma = 0.2 }",
+        "enhanced_sigma = { window = 3, largest = 5, sigma = 0.2 }, perona_malik = { edge = 0.5, repeat = 2 }",
+        "perona_malik = { edge = 0.5, repeat = 3 }",
+    ];
     let lights = ["", "light = { direction = [1.0, 0.0, 0.4], shadow = {} }", "light = { occlusion = {}, skin = {} }"];
     let posts = [
         "",
         "post = { sigma = { window = 3, sigma = 0.2 } }",
         "post = { gamma = 2.0, sigma = { window = 3, sigma = 0.2 }, enhanced_sigma = { window = 3, largest = 7, sigma = 0.1 } }",
+        "post = { perona_malik = { repeat = 2 } }",
+        "post = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 2 } }",
+        "post = { sigma = { window = 3, sigma = 0.2 }, perona_malik = { scheme = 'aos', step = 4.0, repeat = 1 } }",
     ];
     let modes = ["sr", "sr", "sr", "vr"];
     let mut noise = Noise(3);
@@ -144,9 +153,9 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
             modes[pick(4)],
             medians[pick(3)],
             bilaterals[pick(3)],
-            sigmas[pick(3)],
+            sigmas[pick(5)],
             lights[pick(3)],
-            posts[pick(3)]
+            posts[pick(6)]
         );
         scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace(", }", " }"))
     };

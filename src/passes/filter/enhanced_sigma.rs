@@ -171,7 +171,7 @@ impl Enhanced {
             radius += 1;
             alike = window(radius).1;
         }
-        if alike.len() as u32 <= few(e.window) {
+        if alike.len() as u32 <= few(e.window) && alike.len() < wanted {
             let four = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)];
             alike = four.into_iter().filter_map(|(i, j)| there(i, j)).collect();
         }

@@ -3,7 +3,6 @@
 
 use crate::passes::chain::{slice_link, writes_volume};
 use crate::passes::*;
-use crate::scene::gaussian_radius;
 
 const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
@@ -66,14 +65,14 @@ fn params(scene: &Scene, axis: usize, turn: &Turn) -> Params {
 }
 
 fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
-    vec![("RADIUS", gaussian_radius(scene.smoothing()[axis]) as i32), ("AXIS", axis as i32)]
+    vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32)]
 }
 
 fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
     let deviation = scene.smoothing()[axis];
-    let radius = i64::from(gaussian_radius(deviation));
+    let radius = i64::from(scene.smoothing_radius()[axis]);
     for z in 0..source.size[2] {
         for y in 0..source.size[1] {
             for x in 0..source.size[0] {

@@ -1,6 +1,6 @@
 //! Lee's sigma filter on slices, distance maps and pictures (Lee 1983; thesis 5.3): the mean of the pixels of a window that
 //! lie within two sigma of the centre (additive noise), or two sigma times the centre (multiplicative); where no more than K
-//! do, the mean of the four immediate neighbours.
+//! do, nor all that there are, the mean of the four immediate neighbours.
 
 use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
 use crate::passes::*;
@@ -79,10 +79,7 @@ pub(super) fn range(sigma: f64) -> f64 {
 
 fn params(sigma: Option<scene::Sigma>, turn: &Turn) -> Params {
     let sigma = sigma.unwrap_or_default();
-    Params::default()
-        .f32("range", range(sigma.sigma))
-        .f32("few", if sigma.sigma > 0.0 { f64::from(few(sigma.window)) } else { 0.0 })
-        .i32("slice", turn.slice)
+    Params::default().f32("range", range(sigma.sigma)).f32("few", f64::from(few(sigma.window))).i32("slice", turn.slice)
 }
 
 fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
@@ -115,12 +112,10 @@ fn reference(sigma: Option<scene::Sigma>, turn: &Turn, reads: &Arrays, writes: &
                         scene::Noise::Multiplicative => range(sigma.sigma) * centre[c].abs(),
                     };
                     let window = (y - radius..=y + radius).flat_map(|j| (x - radius..=x + radius).map(move |i| (i, j)));
-                    let close: Vec<f64> = window
-                        .filter(|&(i, j)| inside(i, j))
-                        .map(|(i, j)| at(i, j))
-                        .filter(|v| valid(*v) && (v - centre[c]).abs() <= range)
-                        .collect();
-                    if close.len() as u32 > few(sigma.window) || sigma.sigma == 0.0 {
+                    let there: Vec<f64> =
+                        window.filter(|&(i, j)| inside(i, j)).map(|(i, j)| at(i, j)).filter(|v| valid(*v)).collect();
+                    let close: Vec<f64> = there.iter().copied().filter(|v| (v - centre[c]).abs() <= range).collect();
+                    if close.len() as u32 > few(sigma.window) || close.len() == there.len() {
                         return close.iter().sum::<f64>() / close.len() as f64;
                     }
                     let near: Vec<f64> = [(x, y - 1), (x - 1, y), (x, y + 1), (x + 1, y)]

@@ -18,6 +18,9 @@ pub struct Slices {
     pub enhanced_sigma: Option<EnhancedSigma>,
     pub perona_malik: Option<PeronaMalik>,
     pub smooth: Option<Smooth>,
+    /// A slight Gaussian blur of 3x3 against wood grain (thesis Fig. 32, 33): what is left of the pixel lattice on a tilted
+    /// surface. Where `smooth` blurs slices already, this adds nothing.
+    pub blur: bool,
     pub format: VolumeFormat,
 }
 
@@ -32,6 +35,7 @@ impl Default for Slices {
             enhanced_sigma: None,
             perona_malik: None,
             smooth: None,
+            blur: false,
             format: VolumeFormat::R16f,
         }
     }
@@ -182,7 +186,7 @@ pub enum Conductance {
     Exponential,
 }
 
-/// Separable 3D Gaussian in texture space; standard deviations, 0 for none.
+/// Separable 3D Gaussian in texture space; standard deviations, 0 for none, or the edge of a small kernel instead.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Smooth {
@@ -192,4 +196,7 @@ pub struct Smooth {
     pub depth: f64,
     /// Slices.
     pub elevation: f64,
+    /// Taps along each axis, 3 or 5: a Gaussian in pixels, pixels and slices, as wide as the binomial of as many
+    /// (deviation sqrt(n - 1) / 2) and cut off there. Instead of the deviations above.
+    pub kernel: Option<u32>,
 }

@@ -1,0 +1,299 @@
+//! The sigma filters: known answers, extremes, misses, what is refused; plans of every filter in a row.
+
+use crate::common::*;
+use echolume::gpu::renderer::size_of;
+use echolume::gpu::single::Single;
+use echolume::passes::{Arrays, MISS, Pass, Slot, Texels, Turn, When, by_name, is_hit};
+use echolume::plan::Plan;
+use echolume::scene::{Scene, Settings};
+use std::collections::BTreeMap;
+
+pub const CENTRES: [&str; 4] = ["median", "perona-malik", "gradient-inverse", "nagao-matsuyama"];
+
+/// One slice in f32, so that what a filter of slices does is seen before a volume's format rounds it.
+pub fn plane(size: [usize; 2], filters: &str) -> Scene {
+    scene(cartesian([size[0], size[1], 1]), FLOATS, &format!("slices = {{ format = 'r32f', {filters} }}"))
+}
+
+/// Values that f32 holds.
+pub fn texels(size: [usize; 2], f: impl Fn(usize, usize) -> f64) -> Texels {
+    Texels::from_fn([size[0], size[1], 1], 1, |[x, y, _], _| f64::from(f(x, y) as f32))
+}
+
+pub fn noise(size: [usize; 2], seed: u64) -> Texels {
+    let mut noise = Noise(seed);
+    let values: Vec<f64> = (0..size[0] * size[1]).map(|_| noise.next()).collect();
+    texels(size, |x, y| values[y * size[0] + x])
+}
+
+/// All iterations of one pass in a row, each on what the one before left.
+fn filtered(
+    scene: &Scene,
+    name: &str,
+    source: &Texels,
+    mut run: impl FnMut(&'static Pass, &Turn, &Arrays) -> Arrays,
+) -> Texels {
+    let pass = by_name(name).expect("pass");
+    assert!(pass.is_needed(scene), "{name}: {:?}", (pass.needed)(scene));
+    let mut held = Arrays::default();
+    held.insert("source", source.clone());
+    for iteration in 0..(pass.repeat)(scene) {
+        let turn = Turn { iteration, ..Turn::default() };
+        let written = run(pass, &turn, &held);
+        for bind in (pass.writes)(scene, &turn) {
+            let name = match (bind.name, bind.slot) {
+                (_, Slot::SliceRows | Slot::PictureRows) => "rows",
+                ("target", _) => "source",
+                (name, _) => name,
+            };
+            held.insert(name, written.get(bind.name).clone());
+        }
+    }
+    held.get("source").clone()
+}
+
+pub fn on_device(single: &mut Single, scene: &Scene, name: &str, source: &Texels) -> Texels {
+    filtered(scene, name, source, |pass, turn, held| single.run(scene, pass, turn, held, 0.654).expect("dispatch"))
+}
+
+pub fn by_reference(scene: &Scene, name: &str, source: &Texels) -> Texels {
+    filtered(scene, name, source, |pass, turn, held| reference(scene, pass, turn, held))
+}
+
+fn reference(scene: &Scene, pass: &Pass, turn: &Turn, inputs: &Arrays) -> Arrays {
+    let mut written = Arrays::default();
+    for bind in (pass.writes)(scene, turn) {
+        let size = size_of(bind.slot.shape(scene));
+        written.insert(bind.name, Texels::untouched(size, bind.slot.format(scene).channels()));
+    }
+    (pass.reference)(scene, turn, inputs, &mut written);
+    written
+}
+
+pub fn largest_difference(a: &Texels, b: &Texels) -> f64 {
+    assert_eq!(a.values.len(), b.values.len());
+    // Not f64::max, which drops NaN.
+    a.values.iter().zip(&b.values).map(|(a, b)| (a - b).abs()).fold(0.0, |m, d| if d <= m { m } else { d })
+}
+
+/// The sigma filter and the enhanced one about each centre, as settings of a slice, with the pass that runs.
+fn sigma_filters(window: u32, largest: u32, sigma: &str) -> Vec<(String, &'static str)> {
+    let enhanced = CENTRES.map(|centre| {
+        let of = format!("window = {window}, largest = {largest}, sigma = {sigma}, centre = '{centre}'");
+        (format!("enhanced_sigma = {{ {of} }}"), "enhanced_sigma_slice")
+    });
+    let lee = (format!("sigma = {{ window = {window}, sigma = {sigma} }}"), "sigma_slice");
+    [vec![lee], enhanced.to_vec()].concat()
+}
+
+#[test]
+fn a_constant_stays_and_a_hot_pixel_goes() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let size = [21, 15];
+    for (filter, pass) in sigma_filters(5, 11, "0.1") {
+        let scene = plane(size, &filter);
+        for value in [0.0, 0.37, 1.0] {
+            let flat = texels(size, |_, _| value);
+            assert_eq!(on_device(&mut single, &scene, pass, &flat), flat, "{filter} on {value}");
+        }
+        for at in [(10, 7), (0, 0), (20, 3)] {
+            let hot = texels(size, |x, y| f64::from((x, y) == at));
+            let got = on_device(&mut single, &scene, pass, &hot);
+            assert!(got.values.iter().all(|v| *v == 0.0), "{filter}: a hot pixel at {at:?} is left");
+        }
+    }
+}
+
+#[test]
+fn an_infinite_sigma_is_the_box_mean_and_a_sigma_of_0_is_no_pass() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    // The second window is larger than the picture.
+    for (size, window) in [([23, 17], 5u32), ([5, 4], 63), ([1, 1], 3)] {
+        let source = noise(size, 3);
+        let radius = window as usize / 2;
+        let mean = texels(size, |x, y| {
+            let (left, right) = (x.saturating_sub(radius), (x + radius).min(size[0] - 1));
+            let (low, high) = (y.saturating_sub(radius), (y + radius).min(size[1] - 1));
+            let sum: f64 =
+                (low..=high).flat_map(|j| (left..=right).map(move |i| (i, j))).map(|(i, j)| source.one(i, j, 0)).sum();
+            sum / ((right - left + 1) * (high - low + 1)) as f64
+        });
+        for (filter, pass) in sigma_filters(window, 63, "inf") {
+            // Fewer pixels than K, which goes by the window, but all there are.
+            let got = on_device(&mut single, &plane(size, &filter), pass, &source);
+            let error = largest_difference(&got, &mean);
+            assert!(error < 1e-6, "{filter} on {size:?}: {error}");
+        }
+    }
+    for (filter, pass) in sigma_filters(5, 11, "0.0") {
+        let scene = plane([9, 9], &filter);
+        assert!(!by_name(pass).expect("pass").is_needed(&scene), "{filter}");
+    }
+}
+
+#[test]
+fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let size = [33, 27];
+    for (filter, pass) in sigma_filters(7, 19, "0.05") {
+        let got = on_device(&mut single, &plane(size, &filter), pass, &noise(size, 8));
+        assert!(got.values.iter().all(|v| (0.0..=1.0).contains(v)), "{filter} leaves the range");
+    }
+    // Two flat halves whose noise is a tenth of them: 2 sigma additive spans all of the dark half and little of the bright.
+    let mut random = Noise(4);
+    let rough: Vec<f64> = (0..size[0] * size[1]).map(|_| random.range(-0.1, 0.1)).collect();
+    let level = |x: usize| if x < 16 { 0.08 } else { 0.8 };
+    let source = texels(size, |x, y| level(x) * (1.0 + rough[y * size[0] + x]));
+    let spread = |got: &Texels, columns: std::ops::Range<usize>| {
+        let off = (4..23).flat_map(|y| columns.clone().map(move |x| got.one(x, y, 0) / level(x) - 1.0));
+        let squares: Vec<f64> = off.map(|d| d * d).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    };
+    let run = |single: &mut Single, settings: &str| {
+        let scene = plane(size, &format!("sigma = {{ window = 7, {settings} }}"));
+        on_device(single, &scene, "sigma_slice", &source)
+    };
+    let multiplicative = run(&mut single, "sigma = 0.1, noise = 'multiplicative'");
+    let additive = run(&mut single, "sigma = 0.01");
+    let (dark, bright) = (4..12, 20..29);
+    // The same share of noise is left in both halves by the one, and not by the other.
+    let even = spread(&multiplicative, bright.clone()) / spread(&multiplicative, dark.clone());
+    assert!((0.8..1.25).contains(&even), "{even}");
+    let uneven = spread(&additive, bright) / spread(&additive, dark);
+    assert!(uneven > 2.0, "{uneven}");
+}
+
+#[test]
+fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
+    let device = Device::new();
+    let mut single = Single::new(&device).expect("single");
+    let mut random = Noise(2);
+    let rough: Vec<f64> = (0..80 * 80).map(|_| random.range(-0.3, 0.3)).collect();
+    // Two plates 15 mm apart, nothing below, a hole in one and a lone hit where nothing is.
+    let source = texels([80, 80], |x, y| match (x * 3 + y < 140, y > 55) {
+        _ if (x, y) == (60, 70) => 38.0,
+        (_, true) => MISS,
+        _ if (x, y) == (10, 20) => MISS,
+        (true, _) => 30.0 + rough[y * 80 + x],
+        (false, _) => 45.0 + rough[y * 80 + x],
+    });
+    let centres = CENTRES.map(|c| {
+        (
+            format!("enhanced_sigma = {{ window = 5, largest = 13, sigma = 0.2, centre = '{c}', edge = 0.5 }}"),
+            "enhanced_sigma_distance",
+        )
+    });
+    let diffusions = ["quotient", "exponential"].map(|c| {
+        (format!("perona_malik = {{ edge = 0.5, conductance = '{c}', repeat = 8 }}"), "perona_malik_distance")
+    });
+    for (filter, pass) in centres.into_iter().chain(diffusions) {
+        let toml = format!("mode = 'sr'\npicture = {{ size = [80, 80] }}\ndistance = {{ {filter} }}");
+        let scene = scene(cartesian([8, 8, 8]), FLOATS, &toml);
+        let got = on_device(&mut single, &scene, pass, &source);
+        let is_near = |v: f64, plate: f64| (v - plate).abs() < 0.5;
+        for (before, after) in source.values.iter().zip(&got.values) {
+            assert_eq!(is_hit(*before), is_hit(*after), "{filter}: hits stay hits and misses misses");
+            assert!(
+                *before == 38.0 || !is_hit(*after) || is_near(*after, if *before < 35.0 { 30.0 } else { 45.0 }),
+                "{filter}: {before} became {after}"
+            );
+        }
+        assert_eq!(got.one(60, 70, 0), 38.0, "{filter}: a hit that is alone stays");
+        let spread = |map: &Texels| {
+            let inside: Vec<f64> = (25..50).flat_map(|y| (2..22).map(move |x| map.one(x, y, 0) - 30.0)).collect();
+            (inside.iter().map(|v| v * v).sum::<f64>() / inside.len() as f64).sqrt()
+        };
+        assert!(spread(&got) < 0.6 * spread(&source), "{filter} smooths: {} of {}", spread(&got), spread(&source));
+    }
+}
+
+#[test]
+fn what_no_filter_can_do_is_refused_by_name_and_limit() {
+    for (toml, words) in [
+        ("distance = { sigma = { noise = 'multiplicative' } }", ["distance.sigma", "additive"]),
+        ("distance = { enhanced_sigma = { noise = 'multiplicative' } }", ["distance.enhanced_sigma", "additive"]),
+        ("distance = { enhanced_sigma = { growth = true } }", ["distance.enhanced_sigma", "slices only"]),
+        ("post = { enhanced_sigma = { growth = true } }", ["post.enhanced_sigma", "slices only"]),
+        ("slices = { enhanced_sigma = { window = 9, largest = 7 } }", ["slices.enhanced_sigma", "less than window 9"]),
+        ("slices = { enhanced_sigma = { edge = -1.0 } }", ["slices.enhanced_sigma", "at least 0"]),
+        ("slices = { enhanced_sigma = { edge = nan } }", ["slices.enhanced_sigma", "at least 0"]),
+        ("slices = { estimator_edge = nan }", ["slices.estimator_edge", "0"]),
+        ("slices = { perona_malik = { step = 0.2500001 } }", ["0.25", "aos"]),
+        ("post = { perona_malik = { step = 10.0 } }", ["0.25", "aos"]),
+        ("slices = { perona_malik = { step = 0.0 } }", ["slices.perona_malik", "0.25"]),
+        ("slices = { perona_malik = { scheme = 'aos', step = inf } }", ["slices.perona_malik", "1e9"]),
+        ("slices = { perona_malik = { repeat = 0 } }", ["slices.perona_malik", "1..=1000"]),
+        ("distance = { perona_malik = { scheme = 'aos' } }", ["distance.perona_malik", "explicit"]),
+        ("slices = { smooth = { kernel = 4 } }", ["slices.smooth.kernel", "3 or 5"]),
+        ("slices = { smooth = { kernel = 3, depth = 1.0 } }", ["slices.smooth.kernel", "instead"]),
+    ] {
+        let settings: Settings = toml::from_str(toml).expect("settings");
+        let error = Scene::new(cartesian([8, 8, 8]), BYTES, settings).expect_err(toml).to_string();
+        assert!(words.iter().all(|w| error.contains(w)) && !error.contains('\n'), "{toml}: {error}");
+    }
+}
+
+/// Every step of a plan that runs at `when`, by its references, from what the slots hold.
+pub fn run_by_references(scene: &Scene, when: When, slots: &mut BTreeMap<Slot, Texels>) {
+    for (_, step) in Plan::new(scene).steps_of(when) {
+        let turn = Turn { iteration: step.iteration, ..Turn::default() };
+        let mut inputs = Arrays::default();
+        for bind in (step.pass.reads)(scene, &turn) {
+            inputs
+                .insert(bind.name, slots.get(&bind.slot).unwrap_or_else(|| panic!("{:?} is empty", bind.slot)).clone());
+        }
+        let written = reference(scene, step.pass, &turn, &inputs);
+        for bind in (step.pass.writes)(scene, &turn) {
+            slots.insert(bind.slot, written.get(bind.name).clone());
+        }
+    }
+}
+
+#[test]
+fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
+    let device = Device::new();
+    let size = [37, 29];
+    let source = noise(size, 21);
+    let before = "median = true, estimator = 'gradient-inverse', sigma = { window = 5, sigma = 0.4 }, enhanced_sigma = { window = 3, largest = 9, sigma = 0.4, growth = true }";
+    for (after, flat) in [
+        (
+            "perona_malik = { scheme = 'aos', step = 3.0, repeat = 2 }",
+            "perona_malik = { scheme = 'aos', step = 3.0, repeat = 2 }",
+        ),
+        ("perona_malik = { repeat = 3 }, blur = true", "sigma = { sigma = 0.3 }, perona_malik = { repeat = 3 }"),
+    ] {
+        let toml = format!(
+            "mode = 'vr'\nray = {{ sampling = 'exact' }}\npicture = {{ size = [31, 23] }}\nslices = {{ format = 'r32f', {before}, {after} }}\npost = {{ {flat} }}"
+        );
+        let scene = scene(cartesian([size[0], size[1], 1]), FLOATS, &toml);
+        let mut renderer = rendered(&device, scene.clone(), std::slice::from_ref(&source));
+        renderer.picture().expect("picture");
+        let mut read = |slot| renderer.read(slot).expect("read").expect("there");
+        let mut slots = BTreeMap::from([(Slot::Frames, source.clone())]);
+        run_by_references(&scene, When::Frame, &mut slots);
+        let error = largest_difference(&read(Slot::Volume), &slots[&Slot::Volume]);
+        // Rounding before a sigma filter may move a pixel across its range's edge: none does here.
+        assert!(error < 5e-6, "{after}: slices are {error} off");
+        // From the picture that stage 2 made, through the filters of stage 4.
+        let mut slots = BTreeMap::from([(Slot::Picture, read(Slot::Picture))]);
+        let end = echolume::passes::chain::picture_end(&scene);
+        for pass in ["sigma_picture", "perona_malik_picture", "aos_picture"].map(|n| by_name(n).expect("pass")) {
+            for iteration in 0..if pass.is_needed(&scene) { (pass.repeat)(&scene) } else { 0 } {
+                let turn = Turn { iteration, ..Turn::default() };
+                let mut inputs = Arrays::default();
+                (pass.reads)(&scene, &turn).iter().for_each(|b| inputs.insert(b.name, slots[&b.slot].clone()));
+                let written = reference(&scene, pass, &turn, &inputs);
+                (pass.writes)(&scene, &turn).iter().for_each(|b| {
+                    slots.insert(b.slot, written.get(b.name).clone());
+                });
+            }
+        }
+        assert!(!std::ptr::eq(&slots[&Slot::Picture], &slots[&end]), "the filters write elsewhere");
+        let error = largest_difference(&read(end), &slots[&end]);
+        // R16F between the filters: 2.5e-4 each below 1, four of them.
+        assert!(error < 1e-3, "{flat}: the picture is {error} off");
+    }
+}
