@@ -35,6 +35,8 @@
     ("postprocess/assemble.four", include_bytes!("postprocess/assemble.four.spv")),
     ("postprocess/tone.plain", include_bytes!("postprocess/tone.plain.spv")),
     ("postprocess/tone.lines", include_bytes!("postprocess/tone.lines.spv")),
+    ("preprocess/condition.plain", include_bytes!("preprocess/condition.plain.spv")),
+    ("preprocess/condition.gained", include_bytes!("preprocess/condition.gained.spv")),
     ("preprocess/load_slice.plane", include_bytes!("preprocess/load_slice.plane.spv")),
     ("preprocess/load_slice.slice", include_bytes!("preprocess/load_slice.slice.spv")),
     ("preprocess/scan_convert.plane", include_bytes!("preprocess/scan_convert.plane.spv")),

@@ -1,5 +1,7 @@
 //! A rendered 2D result, and its way to and from a file.
 
+pub mod grey;
+
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use std::io::Write;
@@ -27,22 +29,7 @@ impl Picture {
         let (channels, colour) = if is_grey { (1, ExtendedColorType::L8) } else { (3, ExtendedColorType::Rgb8) };
         let texels: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| &p[..channels]).copied().collect();
         encoder.write_image(&texels, self.width, self.height, colour).map_err(|e| cannot(&e))?;
-        if std::fs::metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-            // A device or a pipe is written to; renaming would replace it.
-            let opened = std::fs::OpenOptions::new().write(true).open(file);
-            return opened.and_then(|mut f| f.write_all(&bytes)).map_err(|e| cannot(&e));
-        }
-        check_target(file)?;
-        // Through a link to the file itself, and beside it, so that renaming stays within one file system.
-        let target = file.canonicalize().unwrap_or_else(|_| file.to_path_buf());
-        let part = target.with_file_name(format!(".echolume-{}.part", std::process::id()));
-        let opened = std::fs::OpenOptions::new().write(true).create_new(true).open(&part);
-        let mut opened = opened.map_err(|e| cannot(&e))?;
-        let written = opened.write_all(&bytes).and_then(|()| std::fs::rename(&part, &target));
-        written.map_err(|e| {
-            let _ = std::fs::remove_file(&part);
-            cannot(&e)
-        })
+        replace(file, &bytes)
     }
 
     /// Reads a PNG.
@@ -53,6 +40,30 @@ impl Picture {
         let rgba = image.to_rgba8();
         Ok(Picture { width: rgba.width(), height: rgba.height(), rgba: rgba.into_raw() })
     }
+}
+
+/// Writes bytes beside the target first and renames: a full disk leaves the old file as it was.
+///
+/// # Errors
+/// One line naming the file and the fault.
+pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
+    let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
+    if std::fs::metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        // A device or a pipe is written to; renaming would replace it.
+        let opened = std::fs::OpenOptions::new().write(true).open(file);
+        return opened.and_then(|mut f| f.write_all(bytes)).map_err(|e| cannot(&e));
+    }
+    check_target(file)?;
+    // Through a link to the file itself, and beside it, so that renaming stays within one file system.
+    let target = file.canonicalize().unwrap_or_else(|_| file.to_path_buf());
+    let part = target.with_file_name(format!(".echolume-{}.part", std::process::id()));
+    let opened = std::fs::OpenOptions::new().write(true).create_new(true).open(&part);
+    let mut opened = opened.map_err(|e| cannot(&e))?;
+    let written = opened.write_all(bytes).and_then(|()| std::fs::rename(&part, &target));
+    written.map_err(|e| {
+        let _ = std::fs::remove_file(&part);
+        cannot(&e)
+    })
 }
 
 /// Whether a picture could be written there, before the work is done.

@@ -219,13 +219,14 @@ impl Step {
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Filled::ByScene(make) = slot.filled() else { return false };
     match slot {
-        Slot::Transfer | Slot::Tiles | Slot::Block => return make(old) != make(new),
+        Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block => return make(old) != make(new),
         // Follows from the other, which is shorter.
         Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
         _ => {}
     }
     // The rest follow from the geometry, and their content is too long to compare.
-    (&old.geometry, old.grid, old.apron) != (&new.geometry, new.grid, new.apron)
+    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation());
+    old.geometry != new.geometry || lattice(old) != lattice(new)
 }
 
 #[cfg(test)]

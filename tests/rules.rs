@@ -130,6 +130,8 @@ fn scenes() -> Vec<Scene> {
          light = { shadow = {}, occlusion = {}, skin = {} }",
         "light = { shadow = {} }",
         "light = { occlusion = {} }",
+        "conditioning = { samples = 16, dynamic_range = 60 }",
+        "conditioning = { tgc = [{ depth = 5, gain = -3 }] }",
         "slices = { median = true }",
         "slices = { sigma = {} }",
         "slices = { estimator = 'median' }",
@@ -145,6 +147,9 @@ fn scenes() -> Vec<Scene> {
     let mut scenes = Vec::new();
     for geometry in &geometries {
         for filters in filters {
+            if filters.contains("conditioning") && matches!(geometry, Geometry::Cartesian(_)) {
+                continue; // has no lines
+            }
             for mode in [
                 "'vr'",
                 "'sr'",

@@ -1,6 +1,7 @@
 //! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage.
 
 mod devices;
+mod filter;
 mod info;
 mod phantom;
 mod render;
@@ -52,6 +53,8 @@ struct Arguments {
 enum Command {
     /// Render a recording, or without one a synthetic fetal head, to a picture
     Render(Box<render::Render>),
+    /// Run the 2D filters on an ordinary picture, and measure what they do
+    Filter(Box<filter::Filter>),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(phantom::MakePhantom),
     /// Say what is in a recording (never who)
@@ -89,6 +92,7 @@ pub fn run() -> ExitCode {
     };
     let done = start_log(arguments.verbose, arguments.log_file.as_deref()).and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
+        Command::Filter(filter) => filter.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),

@@ -9,6 +9,7 @@ pub mod tables;
 pub mod texels;
 
 pub mod preprocess {
+    pub mod condition;
     pub mod load_slice;
     pub mod scan_convert;
 }
@@ -54,6 +55,7 @@ pub fn is_hit(distance: f64) -> bool {
 
 /// All passes in the order in which they run.
 pub const PASSES: &[Pass] = &[
+    preprocess::condition::PASS,
     preprocess::load_slice::PASS,
     preprocess::scan_convert::PASS,
     filter::median::SLICE,

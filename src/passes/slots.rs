@@ -13,7 +13,11 @@ pub const FRAMES_IN_FLIGHT: u32 = 4;
 pub enum Slot {
     /// Arriving frames, one a layer.
     Frames,
-    /// (sample, line) of every slice pixel; -1 outside the sector.
+    /// Gain of every sample of a line.
+    Tgc,
+    /// The frame after line conditioning: decimated samples x lines.
+    Conditioned,
+    /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
     ScanLut,
     /// Slices between filters of stage 1.
     SliceA,
@@ -143,6 +147,8 @@ pub enum Filled {
 impl Slot {
     pub const ALL: &'static [Slot] = &[
         Slot::Frames,
+        Slot::Tgc,
+        Slot::Conditioned,
         Slot::ScanLut,
         Slot::SliceA,
         Slot::SliceB,
@@ -181,6 +187,8 @@ impl Slot {
     pub fn name(self) -> &'static str {
         match self {
             Slot::Frames => "frames",
+            Slot::Tgc => "tgc",
+            Slot::Conditioned => "conditioned",
             Slot::ScanLut => "scan_lut",
             Slot::SliceA => "slice_a",
             Slot::SliceB => "slice_b",
@@ -220,6 +228,8 @@ impl Slot {
         let [width, height] = scene.frame_size();
         match self {
             Slot::Frames => Shape::Layers([width, height, FRAMES_IN_FLIGHT]),
+            Slot::Tgc => Shape::Buffer(4 * width),
+            Slot::Conditioned => Shape::Two(scene.line_lattice()),
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
             Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
             Slot::SharpVolume | Slot::Volume => Shape::Three(scene.volume_size()),
@@ -246,7 +256,7 @@ impl Slot {
                 StoredType::F32 => Format::R32f,
             },
             Slot::ScanLut => Format::Rg32f,
-            Slot::SliceA | Slot::SliceB | Slot::Growth => Format::R32f,
+            Slot::Conditioned | Slot::SliceA | Slot::SliceB | Slot::Growth => Format::R32f,
             Slot::SliceShares | Slot::SliceForward | Slot::SliceRows | Slot::PictureShares => Format::R32f,
             Slot::PictureForward | Slot::PictureRows => Format::Rgba32f,
             Slot::SharpVolume | Slot::Volume => match scene.settings.slices.format {
@@ -255,7 +265,9 @@ impl Slot {
                 VolumeFormat::R16f => Format::R16f,
                 VolumeFormat::R32f => Format::R32f,
             },
-            Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => Format::Floats,
+            Slot::Tgc | Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => {
+                Format::Floats
+            }
             Slot::Tiles | Slot::Block => Format::Floats,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
@@ -270,6 +282,7 @@ impl Slot {
     pub fn filled(self) -> Filled {
         match self {
             Slot::Frames => Filled::ByFrames,
+            Slot::Tgc => Filled::ByScene(tables::tgc),
             Slot::ScanLut => Filled::ByScene(tables::scan_lut),
             Slot::SweepLut => Filled::ByScene(tables::sweep_lut),
             Slot::LineLut => Filled::ByScene(tables::line_lut),

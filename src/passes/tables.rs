@@ -27,19 +27,32 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     lut
 }
 
-/// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none.
+/// Gain of every sample of a line: a factor of linear envelopes, an addend of samples that are compressed already.
+pub fn tgc(scene: &Scene) -> Vec<f32> {
+    let Some(probe) = scene.probe() else { return Vec::new() };
+    let c = &scene.settings.conditioning;
+    floats((0..probe.samples).map(|i| {
+        let gain = c.gain(probe.start_depth + probe.sample_pitch * i as f64);
+        if c.dynamic_range.is_some() { 10f64.powf(gain / 20.0) } else { gain / c.compressed_range }
+    }))
+}
+
+/// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none. Samples are counted on the lattice that is
+/// scan-converted: decimated by M, sample j lies at sample j M of the frame, and what lies beyond the last takes the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
+    let factor = f64::from(scene.decimation());
+    let kept = factor * f64::from(scene.line_lattice()[0] - 1);
     let (last_sample, last_line) = ((probe.samples - 1) as f64, (probe.lines.len() - 1) as f64);
     if scene.apron <= 0.0 {
-        let inside = sample >= 0.0 && sample < last_sample && line >= 0.0 && line < last_line;
-        return inside.then_some((sample, line));
+        let inside = sample >= 0.0 && sample < kept && line >= 0.0 && line < last_line;
+        return inside.then_some((sample / factor, line));
     }
     let (near_sample, near_line) = (sample.clamp(0.0, last_sample), line.clamp(0.0, last_line));
     let (near_x, near_y) = probe.plane_point(near_sample, near_line);
     let [px, py] = scene.grid.pitch;
     let away = ((x - near_x) / px).hypot((y - near_y) / py);
-    (away <= scene.apron).then_some((near_sample, near_line))
+    (away <= scene.apron).then_some((near_sample.min(kept) / factor, near_line))
 }
 
 /// The parameter that the sweep look-up table is entered by: the tangent of half the angle about the wobble axis, or mm.

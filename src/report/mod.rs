@@ -1,5 +1,7 @@
 //! What came of a run, in words and pictures.
 
 pub mod dump;
+pub mod growth;
+pub mod regions;
 pub mod times;
 pub mod whole;

@@ -1,9 +1,10 @@
 //! What no scene may ask for, told by name and limit.
 
 use super::{
-    Clip, Distance, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_PICTURE, MAX_WINDOW, Noise, PeronaMalik, SceneError,
-    Scheme, Settings, Sigma, refuse, transfer,
+    Clip, Conditioning, Distance, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW,
+    Noise, PeronaMalik, SceneError, Scheme, Settings, Sigma, refuse, transfer,
 };
+use crate::probe::Geometry;
 use glam::DVec3;
 
 /// Everything that can be told without a geometry.
@@ -121,6 +122,57 @@ fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
         }
     }
     Ok(())
+}
+
+/// Of lines: what makes no sense by itself, and what these frames cannot be conditioned by.
+pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Result<(), SceneError> {
+    for (i, point) in c.tgc.iter().enumerate() {
+        within("conditioning.tgc", point.depth, 0.0, 1e4)?;
+        within("conditioning.tgc", point.gain, -120.0, 120.0)?;
+        if i > 0 && c.tgc[i - 1].depth >= point.depth {
+            return refuse("conditioning.tgc", format!("point {}: depths must rise from point to point", i + 1));
+        }
+    }
+    if let Some(range) = c.dynamic_range {
+        within("conditioning.dynamic_range", range, 1.0, 200.0)?;
+    }
+    within("conditioning.compressed_range", c.compressed_range, 1.0, 200.0)?;
+    if let Some(deviation) = c.low_pass {
+        within("conditioning.low_pass", deviation, 0.0, MAX_DEVIATION)?;
+    }
+    if let Some(samples) = c.samples {
+        within("conditioning.samples", f64::from(samples), 2.0, 65536.0)?;
+    }
+    match geometry {
+        Geometry::Cartesian(_) => {
+            // `samples` is a limit of lines: without lines there is nothing that it could touch.
+            for (field, asked) in [
+                ("conditioning.tgc", !c.tgc.is_empty()),
+                ("conditioning.dynamic_range", c.dynamic_range.is_some()),
+                ("conditioning.low_pass", c.low_pass.is_some_and(|d| d > 0.0)),
+            ] {
+                if asked {
+                    return refuse(field, "conditions the lines of polar frames, and this volume is Cartesian already");
+                }
+            }
+            Ok(())
+        }
+        Geometry::Sweep(probe) => {
+            let factor = c.factor(probe.samples);
+            match c.deviation(factor) <= MAX_DEVIATION {
+                true => Ok(()),
+                false => refuse(
+                    "conditioning.samples",
+                    format!(
+                        "makes one sample of {factor}, whose low pass of {} samples is more than the {MAX_DEVIATION} that \
+                         can be filtered; ask for at least {} samples, or set conditioning.low_pass",
+                        c.deviation(factor),
+                        probe.samples.div_ceil(2 * MAX_DEVIATION as usize)
+                    ),
+                ),
+            }
+        }
+    }
 }
 
 fn check_light(l: &Light) -> Result<(), SceneError> {

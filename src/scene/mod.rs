@@ -95,6 +95,7 @@ impl Scene {
         }
         check::check(&settings)?;
         check_planes::check(&settings)?;
+        check::check_conditioning(&settings.conditioning, &geometry)?;
         let [low, high] = input.range;
         if !(low.is_finite() && high.is_finite() && low < high) {
             return refuse("samples.range", format!("[{low}, {high}] must be finite and rise"));
@@ -139,6 +140,24 @@ impl Scene {
     /// Width and height of an arriving frame: samples x lines, or columns x rows.
     pub fn frame_size(&self) -> [u32; 2] {
         self.geometry.frame_size().map(|n| n as u32)
+    }
+
+    /// Whether lines are conditioned before scan conversion.
+    pub fn conditions(&self) -> bool {
+        let c = &self.settings.conditioning;
+        let on = !c.tgc.is_empty() || c.dynamic_range.is_some() || c.deviation(1) > 0.0 || self.decimation() > 1;
+        on && self.probe().is_some()
+    }
+
+    /// Samples of an arriving line that become one.
+    pub fn decimation(&self) -> u32 {
+        self.probe().map_or(1, |probe| self.settings.conditioning.factor(probe.samples))
+    }
+
+    /// Samples and lines of what is scan-converted.
+    pub fn line_lattice(&self) -> [u32; 2] {
+        let [samples, lines] = self.frame_size();
+        [(samples - 1) / self.decimation() + 1, lines]
     }
 
     /// Width, height and slices of the volume.

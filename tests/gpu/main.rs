@@ -2,9 +2,12 @@
 //! every test, and any message fails the test that caused it.
 
 mod common;
+mod conditioning;
 mod cube;
 mod detector;
 mod diffusion;
+mod extreme_geometry;
+mod extremes;
 mod faults;
 mod filters;
 mod goldens;

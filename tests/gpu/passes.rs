@@ -71,6 +71,30 @@ fn scenes() -> Vec<(String, Scene)> {
         let toml = "slices = { pixels = 9 }\npicture = { size = [1, 1] }\nray = { sampling = 'exact' }";
         add(&format!("frames in {name}, one pixel"), &sweep, Input { stored, range }, toml);
     }
+    for (name, stored, range, conditioning) in [
+        ("decimated, the last sample left over", StoredType::U8, [0.0, 255.0], "samples = 13"),
+        ("decimated to the least", StoredType::U8, [0.0, 255.0], "samples = 2"),
+        ("decimated without a low pass", StoredType::U8, [0.0, 255.0], "samples = 22, low_pass = 0"),
+        (
+            "every conditioning",
+            StoredType::U16,
+            [1000.0, 40000.0],
+            "samples = 17, low_pass = 1.3, dynamic_range = 20, tgc = [{ depth = 3, gain = -20 }, { depth = 40, gain = 35.5 }]",
+        ),
+        ("log alone", StoredType::F32, [-0.25, 1.5], "dynamic_range = 60"),
+        ("low pass wider than the line", StoredType::F32, [0.0, 1.0], "low_pass = 32"),
+        (
+            "gain of compressed lines",
+            StoredType::U8,
+            [0.0, 255.0],
+            "compressed_range = 45, tgc = [{ depth = 0, gain = 12 }, { depth = 12.5, gain = -30 }]",
+        ),
+    ] {
+        let toml =
+            format!("conditioning = {{ {conditioning} }}\nslices = {{ pixels = 33 }}\npicture = {{ size = [9, 7] }}");
+        add(name, &sweep, Input { stored, range }, &toml);
+        add(&format!("{name}, linear array"), &Geometry::Sweep(linear()), Input { stored, range }, &toml);
+    }
     for (name, toml) in [
         ("sigma 0", "slices = { pixels = 20, sigma = { window = 7, sigma = 0.0 } }"),
         (

@@ -8,12 +8,12 @@ use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 
 /// A block of 60 mm seen along its depth axis, 0.25 mm a pixel, parallel.
-fn plate(toml: &str) -> Scene {
+pub fn plate(toml: &str) -> Scene {
     let block = Geometry::Cartesian(Grid { size: [61, 61, 61], spacing: [1.0; 3], origin: [0.0; 3] });
     scene(block, BYTES, &format!("picture = {{ size = [244, 244] }}\n{toml}"))
 }
 
-fn map(scene: &Scene, f: impl Fn(usize, usize) -> f64) -> Texels {
+pub fn map(scene: &Scene, f: impl Fn(usize, usize) -> f64) -> Texels {
     let [width, height] = scene.picture_size().map(|n| n as usize);
     let texels = Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f(x, y));
     let format = Slot::Distance.format(scene);
@@ -21,7 +21,7 @@ fn map(scene: &Scene, f: impl Fn(usize, usize) -> f64) -> Texels {
 }
 
 /// One output of one pass on a distance map; everything else it reads says "found, bright, lit, open".
-fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Texels {
+pub fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Texels {
     let pass = by_name(pass).expect("pass");
     let turn = Turn::default();
     let mut inputs = Arrays::default();

@@ -18,11 +18,17 @@ pub const PASS: Pass = Pass {
         Some(_) => Ok("frames are polar"),
         None => Err("the volume is Cartesian already"),
     },
-    reads: |_, _| vec![layer("frames", Slot::Frames), whole("scan_lut", Slot::ScanLut)],
+    reads: |s, _| {
+        let frames = if s.conditions() { whole("frames", Slot::Conditioned) } else { layer("frames", Slot::Frames) };
+        vec![frames, whole("scan_lut", Slot::ScanLut)]
+    },
     writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
     extent: slice_extent,
     repeat: once,
-    params: load_params,
+    params: |s, t| {
+        let (gain, offset) = scale(s);
+        Params::default().f32("gain", gain).f32("offset", offset).i32("slice", t.slice)
+    },
     constants: no_constants,
     tolerance: Tolerance {
         absolute: 1e-3,
@@ -36,7 +42,7 @@ pub const PASS: Pass = Pass {
         let frames = reads.get("frames");
         let target = writes.get_mut("target");
         let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
-        let (gain, offset) = normalisation(scene);
+        let (gain, offset) = scale(scene);
         for row in 0..scene.grid.size[1] {
             for column in 0..scene.grid.size[0] {
                 let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
@@ -54,6 +60,11 @@ fn bilinear(frames: &Texels, sample: f64, line: f64) -> f64 {
     let (u, v) = (sample - i as f64, line - j as f64);
     let at = |di, dj| frames.clamped(i + di, j + dj, 0);
     (1.0 - v) * ((1.0 - u) * at(0, 0) + u * at(1, 0)) + v * ((1.0 - u) * at(0, 1) + u * at(1, 1))
+}
+
+/// Of what is converted: conditioned frames are scaled already.
+fn scale(scene: &Scene) -> (f64, f64) {
+    if scene.conditions() { (1.0, 0.0) } else { normalisation(scene) }
 }
 
 /// Gain and offset from what the frame's texture yields to 0..1.

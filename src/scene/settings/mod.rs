@@ -1,6 +1,7 @@
 //! What a user may ask of a picture: the TOML scene file, its presets and defaults. Lengths in mm, angles in degrees,
 //! samples and opacities in 0..1. Every struct refuses unknown keys, so that a typing error is not silently a default.
 
+mod conditioning;
 mod modes;
 mod planes;
 mod post;
@@ -8,6 +9,7 @@ mod rays;
 mod shade;
 mod slices;
 
+pub use conditioning::*;
 pub use modes::*;
 pub use planes::*;
 pub use post::*;
@@ -23,6 +25,7 @@ pub struct Settings {
     pub mode: Mode,
     pub layout: Layout,
     pub picture: Picture,
+    pub conditioning: Conditioning,
     pub slices: Slices,
     pub region: Region,
     /// Planes that cut away what lies on the side that their normal points to; at most 4.

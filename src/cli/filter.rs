@@ -1,0 +1,273 @@
+//! `echolume filter`: the 2D filters of slices on an ordinary picture.
+
+use super::{Failure, failed, input, say};
+use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::passes::{Slot, Texels};
+use echolume::picture::{self, grey::Grey};
+use echolume::report::growth::{self, Growth};
+use echolume::report::regions::{self, Region};
+use echolume::report::times;
+use echolume::scene::load::Layers;
+use echolume::scene::{Input, Scene, Settings};
+use echolume::source::{Geometry, Grid, StoredType};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One row of the growth table: sigma, starting and largest window, and the settings that make it.
+type Row = (f64, [u32; 2], Settings);
+
+/// A filter of stage 1 under the name that the command line gives it.
+struct Known {
+    name: &'static str,
+    /// The setting that switches it on.
+    on: &'static str,
+    /// Keys and the settings that they are; where there are none, keys are those of the table that `on` names.
+    keys: &'static [(&'static str, &'static str)],
+}
+
+/// In the order in which they run.
+const FILTERS: &[Known] = &[
+    Known { name: "median", on: "slices.median=true", keys: &[] },
+    Known {
+        name: "estimator",
+        on: "slices.estimator=median",
+        keys: &[("kind", "slices.estimator"), ("edge", "slices.estimator_edge")],
+    },
+    Known { name: "sigma", on: "slices.sigma={}", keys: &[] },
+    Known { name: ENHANCED, on: "slices.enhanced_sigma={}", keys: &[] },
+    Known { name: "perona-malik", on: "slices.perona_malik={}", keys: &[] },
+    Known { name: "gaussian", on: "slices.smooth={}", keys: &[] },
+];
+const ENHANCED: &str = "enhanced-sigma";
+
+impl Known {
+    /// The setting of a key, or what this filter has instead.
+    fn setting(&self, key: &str) -> Result<String, String> {
+        let (table, value) = self.on.split_once('=').unwrap_or((self.on, ""));
+        match self.keys.iter().find(|(name, _)| *name == key) {
+            Some((_, setting)) => Ok(setting.to_string()),
+            None if value == "{}" => Ok(format!("{table}.{key}")),
+            None if self.keys.is_empty() => Err(format!("{} has no settings", self.name)),
+            None => {
+                let there = self.keys.iter().map(|k| k.0).collect::<Vec<_>>().join(", ");
+                Err(format!("{} has no {key:?}; there are: {there}", self.name))
+            }
+        }
+    }
+}
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Filters: median (3x3); estimator (kind: median, perona-malik, gradient-inverse, nagao-matsuyama; edge); sigma \
+                        (window, sigma, noise); enhanced-sigma (window, largest, sigma, noise, centre, edge); perona-malik \
+                        (scheme: explicit, aos; edge, conductance, step, repeat); gaussian (lateral, depth: standard deviations, \
+                        pixels). Keys and defaults are those of `slices` in a scene file. One of each kind; they run in the order \
+                        of stage 1, which is the order given here, whatever the order of the flags.\n\nExamples:\n  \
+                        echolume filter scan.png -o smooth.png --filter sigma:window=9,sigma=0.1\n  \
+                        echolume filter scan.jpg -o smooth.png --filter median --filter gaussian:lateral=1.5,depth=1.5 \
+                        --region 40,60,32,32 --background 200,60,32,32\n  \
+                        echolume filter scan.png --growth-table --filter enhanced-sigma:sigma=0.1 --csv growth.csv"
+)]
+pub struct Filter {
+    /// PNG, JPEG, PNM or BMP of 8 or 16 bits; colour becomes grey
+    image: PathBuf,
+    /// The picture to write (PNG, grey, 16 bits where the input has 16)
+    #[arg(short, long, value_name = "FILE", required_unless_present = "growth_table")]
+    output: Option<PathBuf>,
+    /// A filter and its settings; may be given again for another kind
+    #[arg(long, value_name = "NAME[:KEY=VALUE,...]", required_unless_present = "growth_table")]
+    filter: Vec<String>,
+    /// Print mean, standard deviation and signal-to-noise ratio of this rectangle before and after, pixels
+    #[arg(long, value_name = "X,Y,W,H")]
+    region: Option<String>,
+    /// ... and its contrast-to-noise ratio against this one
+    #[arg(long, value_name = "X,Y,W,H", requires = "region")]
+    background: Option<String>,
+    /// Print how far the windows of the enhanced sigma filter grow (thesis Tables 7-9): for windows from 3 to 13 pixels and
+    /// sigmas of 0.03, 0.1 and 0.17, or the ones given with --filter enhanced-sigma
+    #[arg(long)]
+    growth_table: bool,
+    /// Write that table to this file, too
+    #[arg(long, value_name = "FILE", requires = "growth_table")]
+    csv: Option<PathBuf>,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<Choice>,
+    /// Print the time of every pass
+    #[arg(long)]
+    timings: bool,
+    /// Run with Vulkan validation; any message is a failure
+    #[arg(long)]
+    validate: bool,
+}
+
+impl Filter {
+    pub fn run(&self) -> Result<(), Failure> {
+        let settings = self.settings(&[])?;
+        let rows = if self.growth_table { self.growth_rows()? } else { Vec::new() };
+        let grey = Grey::load(&self.image).map_err(input)?;
+        let region = self.region("--region", self.region.as_deref(), &grey)?;
+        let background = self.region("--background", self.background.as_deref(), &grey)?;
+        let scene = scene(&grey, settings)?;
+        self.check_targets()?;
+
+        let device = self.device.clone().unwrap_or(Choice::Best);
+        let context = Context::new(&ContextOptions { device, validation: self.validate }).map_err(|e| match e {
+            GpuError::NoSuchDevice { .. } => input(e),
+            e => failed(e),
+        })?;
+        let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
+        say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
+        let bits = if grey.sixteen { 16 } else { 8 };
+        let colour = if grey.from_colour { ", colour became grey by the weights of Rec. 709" } else { "" };
+        say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
+
+        if let Some(output) = &self.output {
+            let mut renderer = Renderer::new(&context, scene, &Options::default()).map_err(failed)?;
+            renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
+            let filtered = read(&mut renderer, Slot::Volume)?.values;
+            grey.with(&filtered).save(output).map_err(failed)?;
+            say!("picture: {}", output.display());
+            if let Some(region) = &region {
+                let table = regions::table(&grey.shares(), &filtered, grey.width, region, background.as_ref());
+                say!("{}", table.trim_end());
+            }
+            if self.timings {
+                let measured = renderer.take_times().map_err(failed)?;
+                say!("{}", times::table(&measured, renderer.scene()).trim_end());
+            }
+        }
+        if self.growth_table {
+            self.print_growth(&context, &grey, rows)?;
+        }
+        match context.messages().first() {
+            None => Ok(()),
+            Some(first) => Err(failed(format!("validation: {first}"))),
+        }
+    }
+
+    /// The filters as given, and `more` settings over them.
+    fn settings(&self, more: &[String]) -> Result<Settings, Failure> {
+        let mut layers = Layers::default();
+        // Nothing is rendered: the picture is the slice, a plane.
+        for set in ["mode=plane", "picture.size=[1,1]", "slices.format=r32f"] {
+            layers.set(set).map_err(input)?;
+        }
+        let mut seen = Vec::new();
+        for text in &self.filter {
+            let flag = format!("--filter {text}");
+            let (name, keys) = text.split_once(':').unwrap_or((text, ""));
+            let Some(known) = FILTERS.iter().find(|f| f.name == name) else {
+                let names = FILTERS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ");
+                return Err(input(format!("{flag}: no filter is called {name:?}; there are: {names}")));
+            };
+            if seen.contains(&name) {
+                return Err(input(format!("{flag}: {name} is given twice; give its keys in one --filter")));
+            }
+            seen.push(name);
+            layers.set_by(&flag, known.on).map_err(input)?;
+            for pair in keys.split(',').filter(|k| !k.is_empty()) {
+                let Some((key, value)) = pair.split_once('=') else {
+                    return Err(input(format!("{flag}: must read NAME:KEY=VALUE,KEY=VALUE")));
+                };
+                let setting = known.setting(key.trim()).map_err(|e| input(format!("{flag}: {e}")))?;
+                layers.set_by(&flag, &format!("{setting}={value}")).map_err(input)?;
+            }
+        }
+        for set in more {
+            layers.set_by("--growth-table", set).map_err(input)?;
+        }
+        let settings = layers.finish().map_err(input)?;
+        match settings.slices.smooth {
+            Some(smooth) if smooth.elevation > 0.0 => {
+                Err(input("--filter gaussian: elevation: a picture has no neighbouring slices"))
+            }
+            Some(smooth) if smooth.lateral == 0.0 && smooth.depth == 0.0 => {
+                Err(input("--filter gaussian: give lateral, depth or both, standard deviations in pixels"))
+            }
+            _ => Ok(settings),
+        }
+    }
+
+    fn region(&self, flag: &str, text: Option<&str>, grey: &Grey) -> Result<Option<Region>, Failure> {
+        let Some(text) = text else { return Ok(None) };
+        let region: Region = text.parse().map_err(|e| input(format!("{flag} {text}: {e}")))?;
+        region.check([grey.width, grey.height]).map_err(|e| input(format!("{flag} {text}: {e}")))?;
+        Ok(Some(region))
+    }
+
+    /// Refuses to write over what is read, or twice to one place, before any work is done.
+    fn check_targets(&self) -> Result<(), Failure> {
+        let there = |file: &Path| file.canonicalize().ok();
+        let targets = [("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())];
+        for (flag, file) in targets.into_iter().filter_map(|(flag, file)| Some((flag, file?))) {
+            picture::check_target(file).map_err(failed)?;
+            if there(file).is_some_and(|t| there(&self.image) == Some(t)) {
+                return Err(input(format!("{flag} {}: would replace the input", file.display())));
+            }
+        }
+        match (&self.output, &self.csv) {
+            (Some(output), Some(csv)) if output == csv || there(output).is_some_and(|t| there(csv) == Some(t)) => {
+                Err(input(format!("--csv {}: is the picture's file", csv.display())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The rows of the growth table: the thesis', unless the filter was given its own.
+    fn growth_rows(&self) -> Result<Vec<Row>, Failure> {
+        let keys = self.filter.iter().filter_map(|f| f.split_once(':')).filter(|f| f.0 == ENHANCED);
+        let keys: Vec<&str> = keys.flat_map(|f| f.1.split(',')).filter_map(|k| k.split('=').next()).collect();
+        let given = |key: &str| keys.iter().any(|k| k.trim() == key);
+        let asked = self.settings(&[])?.slices.enhanced_sigma.unwrap_or_default();
+        let sigmas = if given("sigma") { vec![asked.sigma] } else { growth::SIGMAS.to_vec() };
+        if asked.sigma <= 0.0 {
+            return Err(input(
+                "--growth-table: with a sigma of 0 no pixel is like another and the filter does nothing",
+            ));
+        }
+        let is_one = given("window") || given("largest");
+        let windows = if is_one { vec![[asked.window, asked.largest]] } else { growth::WINDOWS.to_vec() };
+        let rows = sigmas.iter().flat_map(|sigma| windows.iter().map(move |windows| (*sigma, *windows)));
+        rows.map(|(sigma, [window, largest])| {
+            let set = format!("{{window={window},largest={largest},sigma={sigma:?},growth=true}}");
+            Ok((sigma, [window, largest], self.settings(&[format!("slices.enhanced_sigma={set}")])?))
+        })
+        .collect()
+    }
+
+    /// One picture through the filter for every row; only the filter changes in between.
+    fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<Row>) -> Result<(), Failure> {
+        let (mut rows, mut renderer) = (Vec::new(), None);
+        for (sigma, windows, settings) in asked {
+            let scene = scene(grey, settings)?;
+            let renderer = match &mut renderer {
+                None => renderer.insert(Renderer::new(context, scene, &Options::default()).map_err(failed)?),
+                Some(there) => {
+                    there.change(scene).map_err(failed)?;
+                    there
+                }
+            };
+            renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
+            rows.push(Growth::new(sigma, windows, &read(renderer, Slot::Growth)?.values));
+        }
+        say!("{}", growth::table(&rows).trim_end());
+        if let Some(csv) = &self.csv {
+            picture::replace(csv, growth::csv(&rows).as_bytes()).map_err(failed)?;
+            say!("table: {}", csv.display());
+        }
+        Ok(())
+    }
+}
+
+/// The picture as a Cartesian volume of one slice.
+fn scene(grey: &Grey, settings: Settings) -> Result<Scene, Failure> {
+    let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
+    let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
+    Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings).map_err(input)
+}
+
+fn read(renderer: &mut Renderer, slot: Slot) -> Result<Texels, Failure> {
+    let texels = renderer.read(slot).map_err(failed)?;
+    texels.ok_or_else(|| failed(format!("slot '{}' is not in the plan", slot.name())))
+}

@@ -1,0 +1,307 @@
+//! Stiff and extreme cases of light, samples, distance maps and time stamps, a test a case; those of geometry and pictures are
+//! in `extreme_geometry`. Rows of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot pixels, windows wider
+//! than the picture) are in `filters` and, against every reference, in `passes`.
+
+use crate::common::*;
+use crate::shading::{map, plate, run};
+use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::passes::{MISS, Slot, Texels, is_hit};
+use echolume::probe::{Geometry, Grid};
+use echolume::report::times;
+use echolume::scene::{Input, transfer};
+use echolume::source::Recording;
+use half::f16;
+use std::sync::Arc;
+
+/// One ray through `voxels` of constant opacity in steps of `step` voxels, and what it gathers, against 1 - exp(-y).
+struct Medium {
+    voxels: usize,
+    step: f64,
+    opacity: f64,
+}
+
+impl Medium {
+    /// Absorption of the whole path.
+    fn depth(&self) -> f64 {
+        self.voxels as f64 * transfer::absorption(self.opacity)
+    }
+
+    /// Colour and opacity of the middle ray for a colour of the medium.
+    fn seen(&self, device: &Device, colour: [f64; 3]) -> Vec<f64> {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {}, early_end = 0.0 }}\n\
+             [volume]\ntransfer = [{{ at = 0.0, colour = {colour:?}, opacity = {:?} }}]",
+            0.5 * self.step,
+            self.opacity
+        );
+        let block = Geometry::Cartesian(Grid { size: [4, self.voxels, 4], spacing: [0.5; 3], origin: [0.0; 3] });
+        let scene = scene(block, BYTES, &toml);
+        let frames = frames(&scene, |_| 1.0);
+        let mut renderer = rendered(device, scene, &frames);
+        renderer.picture().expect("picture");
+        renderer.read(Slot::Picture).expect("read").expect("there").get([1, 1, 0]).to_vec()
+    }
+
+    /// Whether the shader's own f32 result lies within `share` of `expected`. The picture is R16F, whose 11 bits cannot tell; but
+    /// which of two neighbouring R16F values a colour c times the result is stored as tells on which side of their border b it
+    /// lies, so with c = b / (expected (1 +- share)) the two colours must fall on different sides. Where the border lies is the
+    /// device's choice: `rounds` to the nearest, or cuts off.
+    fn is_within(&self, device: &Device, rounds: bool, expected: f64, share: f64) -> bool {
+        let low = f16::from_f64(0.9 * expected);
+        let high = f16::from_bits(low.to_bits() + 1);
+        let border = if rounds { (f64::from(low) + f64::from(high)) / 2.0 } else { f64::from(high) };
+        let [below, above] = [1.0 + share, 1.0 - share].map(|s| border / (expected * s));
+        let seen = self.seen(device, [below, above, 0.0]);
+        assert!(seen.iter().all(|v| (0.0..=1.0).contains(v)), "leaves 0..1: {seen:?}");
+        (seen[0], seen[1]) == (f64::from(low), f64::from(high))
+    }
+}
+
+/// Whether what is stored as R16F is rounded to the nearest (Vulkan leaves it open): told by a colour beyond the middle of two
+/// neighbours, behind an opaque step.
+fn rounds(device: &Device) -> bool {
+    let (low, high) = (f16::from_f64(0.75), f16::from_bits(f16::from_f64(0.75).to_bits() + 1));
+    let beyond = f64::from(low) + 0.75 * (f64::from(high) - f64::from(low));
+    Medium { voxels: 1, step: 1.0, opacity: 1.0 }.seen(device, [beyond; 3])[0] == f64::from(high)
+}
+
+/// Row: kappa ds from 1e-6 to 1e6, a = 1, 1e4 samples of a = 1e-4: relative error under 1e-5.
+#[test]
+fn opacity_keeps_five_digits_from_absorptions_of_a_millionth_to_a_million() {
+    let device = Device::new();
+    let rounds = rounds(&device);
+    // One step of y = kappa ds; beyond y = 36 no opacity below 1 is left in f64, and a = 1 is y = 1e6.
+    let single = (-12..=3).map(|e| 10f64.powf(f64::from(e) / 2.0)).chain([0.4999, 0.5001, 0.7, 2.0, 20.0]);
+    let mut media: Vec<Medium> =
+        single.map(|y| Medium { voxels: 1, step: 1.0, opacity: transfer::opacity(y) }).collect();
+    media.push(Medium { voxels: 1, step: 1.0, opacity: 1.0 });
+    // 1e4 samples of a = 1e-4 each (0.0025 voxels long), and a thousand and one that leave a part of a step.
+    media.push(Medium { voxels: 25, step: 0.0025, opacity: -(400.0 * (-1e-4f64).ln_1p()).exp_m1() });
+    media.push(Medium { voxels: 25, step: 0.02497, opacity: 0.03 });
+    // 1e4 samples of kappa ds = 1e-6.
+    media.push(Medium { voxels: 40, step: 0.004, opacity: transfer::opacity(1e-6 / 0.004) });
+    media.push(Medium { voxels: 40, step: 0.004, opacity: 1.0 });
+    for medium in &media {
+        let expected = transfer::opacity(medium.depth());
+        let said = format!("{} voxels of {} in steps of {}", medium.voxels, medium.opacity, medium.step);
+        assert!(medium.is_within(&device, rounds, expected, 1e-5), "{said}: more than 1e-5 from {expected}");
+    }
+    // The measure itself: three times the error allowed, either way, is seen.
+    for medium in [&media[6], &media[21], &media[22]] {
+        let expected = transfer::opacity(medium.depth());
+        for wrong in [expected * (1.0 + 3e-5), expected * (1.0 - 3e-5)] {
+            assert!(!medium.is_within(&device, rounds, wrong, 1e-5), "an error of 3e-5 went unnoticed at {expected}");
+        }
+    }
+}
+
+/// Row: A in 0..1 and monotone in kappa.
+#[test]
+fn more_absorption_is_never_less_opaque() {
+    let device = Device::new();
+    for (voxels, step) in [(1, 1.0), (30, 0.37), (30, 1000.0)] {
+        let mut last = 0.0;
+        for e in -24..=6 {
+            let opacity = if e == 6 { 1.0 } else { transfer::opacity(10f64.powf(f64::from(e) / 4.0)) };
+            let seen = Medium { voxels, step, opacity }.seen(&device, [1.0, 0.5, 0.0])[3];
+            assert!(
+                (last..=1.0).contains(&seen),
+                "{voxels} voxels, step {step}, opacity {opacity}: {seen} after {last}"
+            );
+            last = seen;
+        }
+        assert_eq!(last, 1.0, "an opaque medium is opaque");
+    }
+}
+
+/// Row: NaN, Inf, denormal and negative samples. (What is counted and stored: `sources`.)
+#[test]
+fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
+    let device = Device::new();
+    let hostile = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, -1e-42, -3.0, f32::MIN_POSITIVE / 2.0];
+    let folder = std::env::temp_dir().join(format!("echolume-extremes-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let header = "ObjectType = Image\nNDims = 3\nDimSize = 20 22 18\nElementSpacing = 0.5 0.5 0.5\n\
+                  ElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
+    let values = |bad: &dyn Fn(f32) -> f32| -> Vec<u8> {
+        let value = |i: usize| match i % 11 {
+            0 => bad(hostile[i / 11 % hostile.len()]),
+            _ => (i as f32 * 0.37).sin().abs(),
+        };
+        header.bytes().chain((0..20 * 22 * 18).flat_map(|i| value(i).to_le_bytes())).collect()
+    };
+    let drawn = |name: &str, bytes: Vec<u8>| {
+        let file = folder.join(name);
+        std::fs::write(&file, bytes).expect("written");
+        let mut recording = Recording::open(&file, None).expect("recording");
+        let input = Input { stored: recording.stored_type(), range: recording.range() };
+        let filters = "slices = { median = true, sigma = {}, enhanced_sigma = {}, perona_malik = {}, \
+                       smooth = { lateral = 0.5, depth = 0.5, elevation = 0.7 }, format = 'r32f' }";
+        let mut pictures = Vec::new();
+        for mode in ["vr", "sr"] {
+            recording.rewind();
+            let toml = format!("mode = '{mode}'\npicture = {{ size = [24, 24] }}\n{filters}");
+            let mut renderer = Renderer::new(&device, scene(recording.geometry(0), input, &toml), &Options::default())
+                .expect("renderer");
+            while let Some(frame) = recording.next_frame().expect("frame") {
+                renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+            }
+            renderer.show(0).expect("show");
+            pictures.push(renderer.picture().expect("picture"));
+            for slot in renderer.plan().slots.clone() {
+                let Some(texels) = renderer.read(slot).expect("read") else { continue };
+                assert!(texels.values.iter().all(|v| v.is_finite()), "{mode}: slot '{}' is not finite", slot.name());
+            }
+        }
+        ((recording.replaced(), recording.flushed()), pictures)
+    };
+    let ((replaced, flushed), dirty) = drawn("dirty.mha", values(&|v| v));
+    // 720 bad samples: three kinds not finite, three denormal, one negative, which is a number.
+    let of = |kinds: &[usize]| (0..720).filter(|n| kinds.contains(&(n % 7))).count() as u64;
+    assert_eq!((replaced, flushed), (of(&[0, 1, 2]), of(&[3, 4, 6])));
+    let (counted, clean) = drawn("clean.mha", values(&|v| if v.is_normal() { v } else { 0.0 }));
+    assert_eq!(counted, (0, 0));
+    assert!(dirty == clean, "a replaced sample is not a sample of 0");
+    // Reported once, however many frames have them, and counted in what is said of the file.
+    let told =
+        std::process::Command::new(env!("CARGO_BIN_EXE_echolume")).arg("info").arg(folder.join("dirty.mha")).output();
+    let told = told.expect("start the program");
+    let [said, warned] = [told.stdout, told.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    assert_eq!(warned.matches("read as 0").count(), 1, "{warned}");
+    assert!(said.contains(&format!("{replaced} not finite, {flushed} denormal")), "{said}");
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+const LIGHTS: [&str; 9] = [
+    "direction = [-0.6, 0.5, 0.6]",
+    "direction = [0.0, 0.0, -1.0]",
+    "direction = [1.0, 0.0, 0.0]",
+    "position = [0.0, 0.0, 0.0]",
+    "position = [0.0, 0.0, -50.0]",
+    "position = [5.0, -10.0, 45.0]",
+    "shininess = 0.0",
+    "shininess = 1000000.0",
+    "shininess = 1000000.0, direction = [0.0, 0.0, 1.0]",
+];
+
+/// Row: cliff at infinity, no false edge. (All misses, one hit and the lights' extremes: `shading`.)
+#[test]
+fn a_cliff_at_infinity_leaves_the_surface_before_it_alone() {
+    let device = Device::new();
+    for light in LIGHTS {
+        for skin in ["", ", skin = { wrap = 0.0, translucency = 0.0 }"] {
+            let scene = plate(&format!(
+                "light = {{ {light}, shadow = {{}}, occlusion = {{}} {skin} }}\n\
+                 distance = {{ median = 5, bilateral = {{ pixels = 2.0, distance = 1.0 }}, sigma = {{}}, \
+                 enhanced_sigma = {{}}, perona_malik = {{}} }}"
+            ));
+            let (origin, direction) = scene.rays.at(122.5, 122.5);
+            let is_lit = match scene.light_place() {
+                Some(place) => (place - origin).dot(direction) < 31.0,
+                None => scene.settings.light.direction.z > 0.1,
+            };
+            let whole = map(&scene, |_, _| 31.5);
+            let half = map(&scene, |x, y| if x + y / 3 < 160 { 31.5 } else { MISS });
+            for pass in ["median_distance", "bilateral_distance", "sigma_distance", "enhanced_sigma_distance"] {
+                let filtered = run(&device, &scene, pass, &half);
+                let off = filtered.values.iter().find(|v| is_hit(**v) && (**v - 31.5).abs() > 1e-4);
+                assert!(off.is_none(), "{pass} draws the surface to {off:?}");
+            }
+            for pass in ["shadow", "occlusion", "light"] {
+                // What light from behind or along the plane reaches of it adds nothing to the colour, and may go round its edge.
+                let unseen = pass == "shadow" && !is_lit;
+                let (whole, cut) = (run(&device, &scene, pass, &whole), run(&device, &scene, pass, &half));
+                for (i, (a, b)) in whole.values.iter().zip(&cut.values).enumerate() {
+                    let texel = i / whole.channels;
+                    if is_hit(half.values[texel]) && !unseen {
+                        assert!((a - b).abs() < 2e-3, "{pass} under {light}: {b} beside the cliff, {a} without it");
+                    }
+                    assert!(b.is_finite() && *b >= 0.0, "{pass} under {light}: {b}");
+                }
+            }
+        }
+    }
+}
+
+/// Row: light on the surface: it stands on a point that was hit, and on the middle of a hollow.
+#[test]
+fn a_light_on_the_surface_itself_gives_finite_colours() {
+    let device = Device::new();
+    // The plate's target lies 30 mm deep and its rays start in front of the box: the surface goes through the light.
+    for light in ["position = [0.0, 0.0, 0.0]", "position = [0.125, 0.125, 0.0]", "position = [0.0, 0.0, 1e-6]"] {
+        for shininess in ["0.0", "16.0", "1e6"] {
+            let scene =
+                plate(&format!("light = {{ {light}, shininess = {shininess}, shadow = {{}}, occlusion = {{}} }}"));
+            let place = scene.light_place().expect("a near light");
+            let (origin, direction) = scene.rays.at(122.5, 122.5);
+            let through = (place - origin).dot(direction);
+            for hollow in [0.0, 0.002] {
+                let surface =
+                    map(&scene, |x, y| through - hollow * ((x as f64 - 122.0).powi(2) + (y as f64 - 122.0).powi(2)));
+                for pass in ["shadow", "occlusion", "light"] {
+                    let result = run(&device, &scene, pass, &surface);
+                    let wrong = result.values.iter().find(|v| !v.is_finite() || **v < 0.0 || **v > 20.0);
+                    assert!(wrong.is_none(), "{pass} under {light}, shininess {shininess}: {wrong:?}");
+                }
+            }
+        }
+    }
+}
+
+/// A context whose queue is said to have other time stamps than it has, and the times of one picture.
+fn timed(
+    valid_bits: Option<u32>,
+    period: Option<f32>,
+) -> (String, Vec<echolume::passes::PassTime>, echolume::picture::Picture) {
+    let device = std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().expect("a device"));
+    let mut context = Context::new(&ContextOptions { device, validation: true }).expect("a Vulkan device");
+    let own = Arc::get_mut(&mut context).expect("nobody else has it yet");
+    own.candidate.valid_bits = valid_bits.unwrap_or(own.candidate.valid_bits);
+    own.limits.timestamp_period *= period.unwrap_or(1.0);
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\npicture = { size = [96, 96] }");
+    let frames = body_frames(&scene, |p| 0.5 + 0.4 * (0.3 * p.y).sin());
+    let mut renderer = Renderer::new(&context, scene.clone(), &Options::default()).expect("renderer");
+    send(&mut renderer, &frames, 0);
+    let picture = renderer.picture().expect("picture");
+    let times = renderer.take_times().expect("times");
+    drop(renderer);
+    assert!(context.messages().is_empty(), "{:?}", context.messages());
+    (times::table(&times, &scene), times, picture)
+}
+
+/// Row: time stamps of 0 valid bits, 36 valid bits, a period other than 1 ns. (Wrapping itself: `gpu::timing`.)
+#[test]
+fn a_device_without_time_stamps_says_so_and_draws_the_same() {
+    let (table, times, picture) = timed(None, None);
+    let (none_table, none, same) = timed(Some(0), None);
+    assert!(
+        none.is_empty() && none_table.contains("no time stamps") && !none_table.contains("raycast"),
+        "{none_table}"
+    );
+    assert!(picture == same, "time stamps change the picture");
+    if times.is_empty() {
+        return assert!(table.contains("no time stamps"), "this device has none itself: {table}");
+    }
+    let sum = |times: &[echolume::passes::PassTime]| times.iter().map(|t| t.total).sum::<f64>();
+    // 2^36 ns are a minute: masked or not, the same picture takes about as long, and nothing runs backwards.
+    let (_, masked, _) = timed(Some(36), None);
+    assert!(masked.iter().all(|t| t.total >= 0.0 && t.total < 6.8e10), "{masked:?}");
+    // A thousandfold period is a thousandfold time, whatever the noise of one run.
+    let (_, slow, _) = timed(None, Some(1000.0));
+    let ratio = sum(&slow) / sum(&times);
+    assert!((30.0..30_000.0).contains(&ratio), "a period of a thousand ns makes times {ratio:.1} as long");
+    assert_eq!(masked.iter().map(|t| t.name).collect::<Vec<_>>(), times.iter().map(|t| t.name).collect::<Vec<_>>());
+}
+
+/// One hit among misses has no neighbour to make a normal from: it is lit, not black, by every light that shines on it.
+#[test]
+fn one_hit_among_misses_is_lit() {
+    let device = Device::new();
+    let scene = plate("light = { direction = [0.2, 0.1, 0.9], shadow = {}, occlusion = {} }");
+    let one = map(&scene, |x, y| if (x, y) == (120, 77) { 31.5 } else { MISS });
+    let picture: Texels = run(&device, &scene, "light", &one);
+    let lit: Vec<usize> =
+        picture.values.chunks_exact(4).enumerate().filter(|(_, c)| c[3] > 0.0).map(|(i, _)| i).collect();
+    assert_eq!(lit, [77 * 244 + 120]);
+    assert!(picture.get([120, 77, 0])[..3].iter().all(|c| *c > 0.05), "{:?}", picture.get([120, 77, 0]));
+}
