@@ -2,6 +2,7 @@
 
 pub mod dump;
 pub mod growth;
+pub mod profile;
 pub mod regions;
 pub mod times;
 pub mod whole;

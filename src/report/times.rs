@@ -21,12 +21,13 @@ pub fn table(measured: &[PassTime], scene: &Scene) -> String {
         let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {sum:>10.3}", "", "sum", "", "");
     }
     if let Some(probe) = scene.probe() {
-        let floor = probe.acquisition_time() * 1e3;
-        let _ = writeln!(
-            text,
-            "sound itself needs {floor:.1} ms for this volume ({} m/s): no display is faster",
-            probe.sound_speed
-        );
+        let _ = writeln!(text, "{}", floor(probe.acquisition_time(), probe.sound_speed));
     }
     text
+}
+
+/// The floor in words: `seconds` that sound travels for a volume, at `sound_speed` in m/s.
+pub fn floor(seconds: f64, sound_speed: f64) -> String {
+    let ms = seconds * 1e3;
+    format!("sound itself needs {ms:.1} ms for this volume ({sound_speed} m/s): no display is faster")
 }
