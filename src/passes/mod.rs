@@ -19,6 +19,7 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    pub mod composite;
     pub mod projection;
     pub mod ray;
     pub mod surface;
