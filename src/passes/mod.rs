@@ -25,6 +25,7 @@ pub mod filter {
     pub mod sigma;
 }
 pub mod raycast {
+    pub mod composite;
     pub mod cube;
     mod detector;
     mod noise;

@@ -1,5 +1,6 @@
 //! What came of a run, in words and pictures.
 
+pub mod curves;
 pub mod dump;
 pub mod growth;
 pub mod profile;

@@ -1,5 +1,6 @@
 //! VR: emission and absorption along each ray, front to back (thesis 4-1, 4-2), with opacity corrected for the step.
 
+use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
@@ -114,46 +115,51 @@ fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 
-/// Red, green, blue and opacity of one ray, and where it has become as opaque as a hit is. The midpoint rule over its steps,
-/// the last as long as what is left; pre-integrated: the values at each step's two ends.
-fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
-    let settings = &scene.settings.volume;
-    let (axis, near) = depth_axis(scene);
-    let mut light = [0.0; 3];
-    let mut opacity = 0.0;
-    let mut hit = MISS;
-    let steps = ray.steps_to(ray.path().max(0.0)).ceil() as u64;
-    for i in (0..steps).map(|i| i as f64) {
-        let from = ray.offset(i);
-        let length = ray.length(i).min(ray.path() - from);
-        let (seen, rgba) = match settings.compositing {
-            Compositing::PreIntegrated => {
-                let (front, back) = (ray.sample(from, i), ray.sample(from + length, i + 1.0));
-                (from + length, front.zip(back).map(|(front, back)| looked_up_between(table, front, back)))
-            }
-            _ => (from + length / 2.0, ray.sample(from + length / 2.0, i + 0.5).map(|v| looked_up(table, v))),
-        };
-        let Some([r, g, b, kappa]) = rgba.filter(|_| length > 0.0) else { continue };
-        let y = kappa * length / reference_length(scene);
-        let a = if settings.compositing == Compositing::Riemann { y.min(1.0) } else { transfer::opacity(y) };
-        let depth = (ray.place(seen).dot(axis) - near).clamp(0.0, 1.0);
-        for (c, (light, colour)) in light.iter_mut().zip([r, g, b]).enumerate() {
-            let tint = match settings.shading {
-                Shading::DepthCoded => settings.near_tint[c] + (settings.far_tint[c] - settings.near_tint[c]) * depth,
-                _ => 1.0,
-            };
-            *light += (1.0 - opacity) * a * colour * tint;
+/// What a ray sees of the volume through the transfer function, and through the tints of its depth.
+struct Seen<'a> {
+    scene: &'a Scene,
+    ray: &'a ray::Ray<'a>,
+    table: &'a Texels,
+    depth_axis: (DVec3, f64),
+}
+
+impl Seen<'_> {
+    fn tinted(&self, rgba: [f64; 4], offset: f64) -> [f64; 4] {
+        let settings = &self.scene.settings.volume;
+        if settings.shading != Shading::DepthCoded {
+            return rgba;
         }
-        let before = opacity;
-        opacity += (1.0 - opacity) * a;
-        if !is_hit(hit) && opacity >= settings.hit {
-            hit = ray.enter + from + length * (settings.hit - before) / (opacity - before);
-        }
-        if scene.settings.ray.early_end > 0.0 && opacity >= 1.0 - scene.settings.ray.early_end {
-            break;
-        }
+        let (axis, near) = self.depth_axis;
+        let depth = (self.ray.place(offset).dot(axis) - near).clamp(0.0, 1.0);
+        let tint = |c: usize| settings.near_tint[c] + (settings.far_tint[c] - settings.near_tint[c]) * depth;
+        std::array::from_fn(|c| if c < 3 { rgba[c] * tint(c) } else { rgba[c] })
     }
-    ([light[0], light[1], light[2], opacity], hit)
+}
+
+impl Medium for Seen<'_> {
+    fn at(&self, place: Place) -> Option<[f64; 4]> {
+        let value = self.ray.sample(place.offset, place.n)?;
+        Some(self.tinted(looked_up(self.table, value), place.offset))
+    }
+
+    fn between(&self, from: Place, to: Place) -> Option<[f64; 4]> {
+        let (front, back) = (self.ray.sample(from.offset, from.n)?, self.ray.sample(to.offset, to.n)?);
+        Some(self.tinted(looked_up_between(self.table, front, back), to.offset))
+    }
+}
+
+/// Red, green, blue and opacity of one ray, and the distance at which it has become as opaque as a hit is.
+fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
+    let march = March {
+        rule: scene.settings.volume.compositing.into(),
+        path: ray.path(),
+        reference_length: reference_length(scene),
+        early_end: scene.settings.ray.early_end,
+        hit: scene.settings.volume.hit,
+    };
+    let seen = Seen { scene, ray, table, depth_axis: depth_axis(scene) };
+    let (colour, hit) = march.through(&seen, |n| ray.offset(n));
+    (colour, hit.map_or(MISS, |offset| ray.enter + offset))
 }
 
 fn entry(table: &Texels, n: usize) -> [f64; 4] {
