@@ -215,6 +215,7 @@ fn every_filter_by_its_name_is_the_one_of_the_settings() {
         ("enhanced-sigma:edge=0.04", "enhanced_sigma = { centre = 'perona-malik', edge = 0.04 }"),
         ("perona-malik:repeat=3", "perona_malik = { repeat = 3 }"),
         ("perona-malik:scheme=aos,step=10", "perona_malik = { scheme = 'aos', step = 10.0 }"),
+        ("blur", "blur = true"),
         ("gaussian:lateral=1.1,depth=0.7", "smooth = { lateral = 1.1, depth = 0.7 }"),
     ] {
         let got = filtered(&file, &folder.path("out.png"), &[filter]);
@@ -361,7 +362,10 @@ fn no_wrong_flag_is_taken_for_a_default() {
     let folder = Folder::new("flags");
     let (input, output) = (folder.write("in.pgm", pgm(30, 20, false, |x, _| x as u16)), folder.path("out.png"));
     for (filters, named) in [
-        (&["nonsense"][..], &["nonsense", "median, estimator, sigma, enhanced-sigma, perona-malik, gaussian"][..]),
+        (
+            &["nonsense"][..],
+            &["nonsense", "median, estimator, sigma, enhanced-sigma, perona-malik, blur, gaussian"][..],
+        ),
         (&["sigma:window=8"], &["slices.sigma", "odd"]),
         (&["sigma:width=9"], &["--filter sigma:width=9", "width"]),
         (&["sigma:window"], &["--filter sigma:window", "KEY=VALUE"]),
@@ -374,7 +378,9 @@ fn no_wrong_flag_is_taken_for_a_default() {
         (&["enhanced-sigma:largest=3"], &["slices.enhanced_sigma", "less than window"]),
         (&["median", "median"], &["median is given twice"]),
         (&["gaussian"], &["give lateral, depth or both"]),
-        (&["gaussian:elevation=1"], &["no neighbouring slices"]),
+        (&["gaussian:elevation=1"], &["reach across slices"]),
+        (&["gaussian:kernel=3"], &["reach across slices"]),
+        (&["gaussian:depth=1", "blur"], &["a gaussian blurs already"]),
         (&["gaussian:lateral=900"], &["slices.smooth.lateral", "at most 32"]),
     ] {
         let flags: Vec<&str> = filters.iter().flat_map(|f| ["--filter", f]).collect();
