@@ -36,6 +36,7 @@ const FILTERS: &[Known] = &[
     Known { name: "sigma", on: "slices.sigma={}", keys: &[] },
     Known { name: ENHANCED, on: "slices.enhanced_sigma={}", keys: &[] },
     Known { name: "perona-malik", on: "slices.perona_malik={}", keys: &[] },
+    Known { name: "blur", on: "slices.blur=true", keys: &[] },
     Known { name: "gaussian", on: "slices.smooth={}", keys: &[] },
 ];
 const ENHANCED: &str = "enhanced-sigma";
@@ -60,7 +61,7 @@ impl Known {
 #[command(
     after_help = "Filters: median (3x3); estimator (kind: median, perona-malik, gradient-inverse, nagao-matsuyama; edge); sigma \
                         (window, sigma, noise); enhanced-sigma (window, largest, sigma, noise, centre, edge); perona-malik \
-                        (scheme: explicit, aos; edge, conductance, step, repeat); gaussian (lateral, depth: standard deviations, \
+                        (scheme: explicit, aos; edge, conductance, step, repeat); blur (3x3); gaussian (lateral, depth: standard deviations, \
                         pixels). Keys and defaults are those of `slices` in a scene file. One of each kind; they run in the order \
                         of stage 1, which is the order given here, whatever the order of the flags.\n\nExamples:\n  \
                         echolume filter scan.png -o smooth.png --filter sigma:window=9,sigma=0.1\n  \
@@ -179,12 +180,13 @@ impl Filter {
         }
         let settings = layers.finish().map_err(input)?;
         match settings.slices.smooth {
-            Some(smooth) if smooth.elevation > 0.0 => {
-                Err(input("--filter gaussian: elevation: a picture has no neighbouring slices"))
-            }
+            Some(smooth) if smooth.elevation > 0.0 || smooth.kernel.is_some() => Err(input(
+                "--filter gaussian: elevation and kernel reach across slices, and a picture is one; give lateral and depth",
+            )),
             Some(smooth) if smooth.lateral == 0.0 && smooth.depth == 0.0 => {
                 Err(input("--filter gaussian: give lateral, depth or both, standard deviations in pixels"))
             }
+            Some(_) if settings.slices.blur => Err(input("--filter blur: a gaussian blurs already; leave one out")),
             _ => Ok(settings),
         }
     }

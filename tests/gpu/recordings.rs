@@ -82,11 +82,13 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
     assert!(differ > 820 * 616 / 8, "half a pixel went unnoticed: {differ}");
 }
 
-fn wobbler_volume(device: &Device, file: &str) -> (Probe, Scene, Texels) {
+/// Probe, scene and volume of a recorded sweep, 700 pixels a slice.
+pub fn wobbler_volume(device: &Device, file: &str, more: &str) -> (Probe, Scene, Texels) {
     let mut recording = Recording::open(&data(file), None).expect("recording");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
+    let slices = "slices = { format = 'r32f', pixels = 700 }";
     let settings: Settings =
-        toml::from_str("mode = 'vr'\nslices = { format = 'r32f', pixels = 700 }\npicture = { size = [8, 8] }").unwrap();
+        toml::from_str(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}")).unwrap();
     let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
     let mut renderer = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
     while let Some(frame) = recording.next_frame().expect("frame") {
@@ -103,7 +105,7 @@ fn wobbler_volume(device: &Device, file: &str) -> (Probe, Scene, Texels) {
 #[test]
 fn the_wobblers_wires_lie_within_a_tenth_of_a_millimetre() {
     let device = Device::new();
-    let (probe, scene, volume) = wobbler_volume(&device, "wobbler-4dc7/sweep.mha");
+    let (probe, scene, volume) = wobbler_volume(&device, "wobbler-4dc7/sweep.mha", "");
     // Lateral, elevation, depth from the wobble axis: as sweep.json has them.
     let wires = [[0.0, 0.0, 60.0], [20.0, 0.0, 60.0], [-20.0, 0.0, 60.0], [0.0, 12.0, 65.0], [0.0, -12.0, 65.0]];
     for mirrored in [false, true] {
@@ -125,7 +127,7 @@ fn the_wobblers_wires_lie_within_a_tenth_of_a_millimetre() {
     }
 }
 
-fn centroid(probe: &Probe, scene: &Scene, volume: &Texels, truth: DVec3) -> DVec3 {
+pub fn centroid(probe: &Probe, scene: &Scene, volume: &Texels, truth: DVec3) -> DVec3 {
     let mut near = Vec::new();
     for k in 0..volume.size[2] {
         for row in 0..volume.size[1] {
@@ -152,8 +154,8 @@ fn centroid(probe: &Probe, scene: &Scene, volume: &Texels, truth: DVec3) -> DVec
 #[test]
 fn the_kretz_file_gives_the_same_volume_as_the_metaimage() {
     let device = Device::new();
-    let (a_probe, a_scene, a) = wobbler_volume(&device, "wobbler-4dc7/sweep.mha");
-    let (b_probe, b_scene, b) = wobbler_volume(&device, "wobbler-4dc7/sweep.vol");
+    let (a_probe, a_scene, a) = wobbler_volume(&device, "wobbler-4dc7/sweep.mha", "");
+    let (b_probe, b_scene, b) = wobbler_volume(&device, "wobbler-4dc7/sweep.vol", "");
     assert_eq!(a_scene.grid.size, b_scene.grid.size);
     assert!((a_probe.first_range() - b_probe.first_range()).abs() < 1e-6);
     let largest = a.values.iter().zip(&b.values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
