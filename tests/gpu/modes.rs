@@ -43,6 +43,23 @@ const MODES: &[(&str, &str, &str)] = &[
         "scan_convert raycast_projection assemble tone",
         "frames scan_lut volume sweep_lut rendered picture screen",
     ),
+    ("mode = 'plane'", "scan_convert raycast_planes tone", "frames scan_lut volume sweep_lut tiles picture screen"),
+    (
+        "mode = 'orthogonal'",
+        "scan_convert raycast_planes tone",
+        "frames scan_lut volume sweep_lut tiles picture screen",
+    ),
+    (
+        "mode = 'tomography'",
+        "scan_convert raycast_planes tone",
+        "frames scan_lut volume sweep_lut tiles picture screen",
+    ),
+    ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
+    (
+        "mode = 'sr'\nlayout = '4up'",
+        "scan_convert raycast_surface raycast_planes light assemble tone",
+        "frames scan_lut volume sweep_lut tiles distance_map surface rendered planes picture screen",
+    ),
 ];
 
 #[test]
@@ -71,8 +88,14 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
         let from = |first: &[&str]| -> Vec<&str> {
             all.iter().position(|p| first.contains(p)).map_or(Vec::new(), |i| all[i..].to_vec())
         };
+        // Planes lie where they lie, wherever the camera stands.
+        let moved = |p: &&str| *p != "raycast_planes";
+        let seen_from_elsewhere = match base.is_flat() {
+            true => Vec::new(),
+            false => all[1..].iter().copied().filter(moved).collect(),
+        };
         let changes: [(&str, Change, Vec<&str>); 5] = [
-            ("camera", |s| s.settings.camera.azimuth = 20.0, all[1..].to_vec()),
+            ("camera", |s| s.settings.camera.azimuth = 20.0, seen_from_elsewhere),
             (
                 "transfer function",
                 |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
