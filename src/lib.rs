@@ -8,13 +8,15 @@
 //!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
 //!   order between them; [`spirv`] reflects the shaders. All of these are pure and tested without a GPU.
-//! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it.
+//! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
+//!   one to fill the other.
 
 #![deny(unsafe_code)]
 
 pub mod barriers;
 #[allow(unsafe_code)]
 pub mod gpu;
+pub mod measuring;
 pub mod passes;
 pub mod picture;
 pub mod plan;

@@ -1,7 +1,7 @@
 //! `echolume filter`: the 2D filters of slices on an ordinary picture.
 
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::gpu::{Choice, Context, Options, Renderer};
 use echolume::passes::{Slot, Texels};
 use echolume::picture::{self, grey::Grey};
 use echolume::report::growth::{self, Growth};
@@ -112,13 +112,7 @@ impl Filter {
         let scene = scene(&grey, settings)?;
         self.check_targets()?;
 
-        let device = self.device.clone().unwrap_or(Choice::Best);
-        let context = Context::new(&ContextOptions { device, validation: self.validate }).map_err(|e| match e {
-            GpuError::NoSuchDevice { .. } => input(e),
-            e => failed(e),
-        })?;
-        let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
-        say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
+        let context = super::asked::open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
         let colour = if grey.from_colour { ", colour became grey by the weights of Rec. 709" } else { "" };
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);

@@ -1,9 +1,11 @@
 //! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage.
 
+mod asked;
 mod devices;
 mod filter;
 mod info;
 mod phantom;
+mod profile;
 mod render;
 
 use clap::{Parser, Subcommand};
@@ -55,6 +57,8 @@ enum Command {
     Render(Box<render::Render>),
     /// Run the 2D filters on an ordinary picture, and measure what they do
     Filter(Box<filter::Filter>),
+    /// Say where the time goes, pass by pass, and compare two such runs
+    Profile(Box<profile::Profile>),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(phantom::MakePhantom),
     /// Say what is in a recording (never who)
@@ -93,6 +97,7 @@ pub fn run() -> ExitCode {
     let done = start_log(arguments.verbose, arguments.log_file.as_deref()).and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
         Command::Filter(filter) => filter.run(),
+        Command::Profile(profile) => profile.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),

@@ -1,0 +1,129 @@
+//! `echolume profile`.
+
+use super::asked::Asked;
+use super::{Failure, failed, input, say};
+use echolume::measuring::profile;
+use echolume::picture::{check_target, replace};
+use echolume::report::profile as model;
+use echolume::report::profile::{compare, formats, table, trace};
+use std::path::{Path, PathBuf};
+
+/// Longest profile that is read, bytes.
+const LONGEST: u64 = 256 << 20;
+
+#[derive(clap::Args)]
+#[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
+                        echolume profile sweep.mha --preset fetal --json before.json\n  \
+                        echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
+                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)")]
+pub struct Profile {
+    #[command(flatten)]
+    asked: Asked,
+    /// Volumes measured
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10000))]
+    repeat: u32,
+    /// Volumes rendered before that: they compile shaders and wake clocks
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    warm_up: u32,
+    /// Send the frames once and measure the picture alone
+    #[arg(long)]
+    still: bool,
+    /// Leave out measuring what bounds the device (copies, samples, fetches)
+    #[arg(long)]
+    no_ceilings: bool,
+    /// Write everything measured, to be compared later
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write one line a pass
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write one line a pass and repeat
+    #[arg(long, value_name = "FILE")]
+    csv_samples: Option<PathBuf>,
+    /// Write a trace for Perfetto or Chrome
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Compare two profiles pass by pass instead of measuring; exit code 1 on a regression
+    #[arg(long, num_args = 2, value_names = ["OLD", "NEW"])]
+    compare: Option<Vec<PathBuf>>,
+    /// Ratio that a pass must exceed to be a regression
+    #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
+    threshold: f64,
+    /// Compare also what was measured on other scenes or sizes
+    #[arg(long)]
+    force: bool,
+}
+
+impl Profile {
+    pub fn run(&self) -> Result<(), Failure> {
+        match self.compare.as_deref() {
+            Some([old, new]) => self.compare(old, new),
+            _ => self.measure(),
+        }
+    }
+
+    fn measure(&self) -> Result<(), Failure> {
+        let (mut source, scene) = self.asked.open()?;
+        let files = [&self.json, &self.csv, &self.csv_samples, &self.trace];
+        for file in files.into_iter().flatten() {
+            self.asked.keep_inputs("output", file)?;
+            check_target(file).map_err(failed)?;
+        }
+        let context = self.asked.device(false)?;
+        // One volume, kept for all repeats.
+        let mut frames = Vec::new();
+        self.asked.frames(&mut *source, |frame| {
+            frames.push(frame);
+            Ok(())
+        })?;
+        let asked = profile::Asked {
+            repeats: self.repeat as usize,
+            warm_up: self.warm_up as usize,
+            still: self.still,
+            input: self.asked.shown(),
+            ceilings: !self.no_ceilings,
+        };
+        let (profile, spans) = profile::run(&context, &scene, &frames, &asked).map_err(failed)?;
+        say!("{}", table::profile(&profile).trim_end());
+        self.write(&self.json, || formats::to_json(&profile).map_err(failed))?;
+        self.write(&self.csv, || Ok(formats::csv(&profile)))?;
+        self.write(&self.csv_samples, || Ok(formats::csv_samples(&profile)))?;
+        self.write(&self.trace, || trace::chrome(&profile, &spans).map_err(failed))
+    }
+
+    fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
+        let Some(file) = file else { return Ok(()) };
+        replace(file, text()?.as_bytes()).map_err(failed)?;
+        say!("written: {}", file.display());
+        Ok(())
+    }
+
+    fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
+        if !(self.threshold >= 1.0 && self.threshold.is_finite()) {
+            return Err(input(format!("--threshold {}: must be a ratio of at least 1", self.threshold)));
+        }
+        let options = compare::Options { threshold: self.threshold, force: self.force, ..compare::Options::default() };
+        let compared = compare::compare(&read(old)?, &read(new)?, &options)
+            .map_err(|e| input(format!("{} and {}: {e}", old.display(), new.display())))?;
+        say!("{}", table::comparison(&compared).trim_end());
+        if let Some(file) = &self.json {
+            let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
+            replace(file, text.as_bytes()).map_err(failed)?;
+        }
+        let slower: Vec<&str> = compared.regressions().map(|l| l.name.as_str()).collect();
+        match slower.is_empty() {
+            true => Ok(()),
+            false => Err(failed(format!("slower by more than the threshold: {}", slower.join(", ")))),
+        }
+    }
+}
+
+fn read(file: &Path) -> Result<model::Profile, Failure> {
+    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
+    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    if !about.is_file() || about.len() > LONGEST {
+        return Err(fault(&"is not a file of at most 256 MiB, so no profile"));
+    }
+    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    formats::from_json(&text).map_err(|e| fault(&e))
+}

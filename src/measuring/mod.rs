@@ -1,0 +1,5 @@
+//! Runs the renderer again and again, and writes down what [`crate::report`] makes tables, comparisons and curves of.
+
+pub mod ceilings;
+pub mod machine;
+pub mod profile;

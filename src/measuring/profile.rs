@@ -1,0 +1,220 @@
+//! One scene rendered again and again: where the time goes.
+
+use super::{ceilings, machine};
+use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::passes::{Bind, Part, Pass, Span, When};
+use crate::plan::{Plan, Step};
+use crate::report::profile::trace::{self, Track};
+use crate::report::profile::{Acquisition, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use crate::scene::Scene;
+use crate::source::Frame;
+use std::sync::Arc;
+use std::time::Instant;
+
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// Pictures measured, and rendered before that.
+    pub repeats: usize,
+    pub warm_up: usize,
+    /// The frames go through stage 1 once: only what follows is measured.
+    pub still: bool,
+    /// What the frames came from, in words.
+    pub input: String,
+    /// Measure what bounds the device, too.
+    pub ceilings: bool,
+}
+
+/// The profile, and every span of its repeats on one clock.
+///
+/// # Errors
+/// What the device cannot hold or do.
+pub fn run(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Frame],
+    asked: &Asked,
+) -> Result<(Profile, Vec<trace::Span>), GpuError> {
+    let device = machine::device(context);
+    let ceilings = if asked.ceilings { ceilings::measure(context)? } else { None };
+    let options = Options { spans: true, ..Options::default() };
+    let mut renderer = Renderer::new(context, scene.clone(), &options)?;
+    let began = Instant::now();
+    let mut repeats = Vec::new();
+    for n in 0..asked.warm_up + asked.repeats {
+        let start = began.elapsed();
+        if n == 0 || !asked.still {
+            for frame in frames {
+                renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
+            }
+        }
+        renderer.show(0)?;
+        renderer.picture()?;
+        let wall = (began.elapsed() - start).as_nanos() as f64;
+        let spans = renderer.take_spans()?;
+        if n >= asked.warm_up {
+            repeats.push(Repeat { wall, spans });
+        }
+    }
+    let plan = renderer.plan();
+    let profile = Profile {
+        format: FORMAT.into(),
+        program: machine::program(),
+        date: machine::date(),
+        scene: settings(scene),
+        settings_hash: settings_hash(&settings(scene)),
+        input: asked.input.clone(),
+        sizes: Sizes {
+            frame: scene.frame_size(),
+            slices: scene.slices(),
+            volume: scene.volume_size(),
+            picture: scene.picture_size(),
+        },
+        acquisition: scene.probe().map(|p| Acquisition { seconds: p.acquisition_time(), sound_speed: p.sound_speed }),
+        repeats: asked.repeats,
+        warm_up: asked.warm_up,
+        passes: passes(plan, scene, &repeats, device.valid_bits > 0),
+        host: hosts(&repeats),
+        wall_ns: repeats.iter().map(|r| r.wall).collect(),
+        device_ns: if device.valid_bits > 0 { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
+        device,
+        ceilings,
+    };
+    let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
+    Ok((profile, spans.collect()))
+}
+
+struct Repeat {
+    /// From the first frame's arrival to the picture, ns.
+    wall: f64,
+    spans: Vec<Span>,
+}
+
+impl Repeat {
+    fn of<'a>(&'a self, name: &'a str, on_device: bool) -> impl Iterator<Item = &'a Span> {
+        self.spans.iter().filter(move |s| s.name == name && s.on_device == on_device)
+    }
+
+    fn sum(&self, name: &str, on_device: bool) -> f64 {
+        self.of(name, on_device).map(|s| s.end - s.begin).sum()
+    }
+
+    /// From the first pass' begin to the last one's end.
+    fn on_device(&self) -> f64 {
+        let spans = || self.spans.iter().filter(|s| s.on_device);
+        let begin = spans().map(|s| s.begin).fold(f64::MAX, f64::min);
+        let end = spans().map(|s| s.end).fold(begin, f64::max);
+        if end > begin { end - begin } else { 0.0 }
+    }
+}
+
+fn settings(scene: &Scene) -> String {
+    // Settings come from TOML, so they go back into it; a failure would only lose the words.
+    toml::to_string(&scene.settings).unwrap_or_default()
+}
+
+fn traced(repeat: usize, span: Span) -> trace::Span {
+    trace::Span {
+        name: span.name.into(),
+        track: if span.on_device { Track::Device } else { Track::Host },
+        repeat,
+        begin_ns: span.begin,
+        end_ns: span.end,
+    }
+}
+
+/// Names in the order in which they first appear.
+fn names(repeats: &[Repeat], on_device: bool) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    for span in repeats.iter().flat_map(|r| &r.spans).filter(|s| s.on_device == on_device) {
+        if !names.contains(&span.name) {
+            names.push(span.name);
+        }
+    }
+    names
+}
+
+fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<PassProfile> {
+    if !stamped {
+        return Vec::new();
+    }
+    let measured = |name: &'static str| {
+        let steps: Vec<&Step> = plan.steps.iter().filter(|s| s.pass.name == name).collect();
+        let first = repeats.first();
+        let runs = first.map_or(0, |r| r.of(name, true).count() as u32);
+        // Frames that were not sent again ran no step of theirs.
+        let times = if steps.is_empty() { 0 } else { u64::from(runs) / steps.len() as u64 };
+        let bytes = |binds: fn(&Step, &Scene) -> Vec<Bind>| -> u64 {
+            times * steps.iter().flat_map(|s| binds(s, scene)).map(|b| touched(&b, scene)).sum::<u64>()
+        };
+        let copied = copied_bytes(name, scene) * u64::from(runs);
+        PassProfile {
+            name: name.into(),
+            stage: steps.first().map_or("copies".into(), |s| s.pass.stage.name().into()),
+            runs_per_picture: runs,
+            samples_ns: repeats.iter().map(|r| r.sum(name, true)).collect(),
+            bytes_read: bytes(|s, scene| (s.pass.reads)(scene, &s.turn())) + copied,
+            bytes_written: bytes(|s, scene| (s.pass.writes)(scene, &s.turn())) + copied,
+            fetches: steps.iter().map(|s| fetches(s.pass, scene, s)).sum::<Option<u64>>().map(|n| n * times),
+            filtered: None,
+            invocations: first.and_then(|r| r.of(name, true).map(|s| s.invocations).sum()),
+        }
+    };
+    // In running order: the plan's, and what is copied where it happens.
+    let mut order = names(repeats, true);
+    order.sort_by_key(|name| match *name {
+        "upload" => -1,
+        name => plan.steps.iter().position(|s| s.pass.name == name).map_or(i64::MAX, |n| n as i64),
+    });
+    order.into_iter().map(measured).collect()
+}
+
+fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
+    let host = |name: &'static str| PassProfile {
+        name: name.into(),
+        stage: "host".into(),
+        runs_per_picture: repeats.first().map_or(0, |r| r.of(name, false).count() as u32),
+        samples_ns: repeats.iter().map(|r| r.sum(name, false)).collect(),
+        bytes_read: 0,
+        bytes_written: 0,
+        fetches: None,
+        filtered: None,
+        invocations: None,
+    };
+    names(repeats, false).into_iter().map(host).collect()
+}
+
+/// Bytes of what a dispatch binds, each texel once.
+fn touched(bind: &Bind, scene: &Scene) -> u64 {
+    let all = bind.slot.bytes(scene);
+    match bind.part {
+        Part::Slice | Part::Layer => all / u64::from(bind.slot.shape(scene).parts()),
+        Part::Whole | Part::Around(_) => all,
+    }
+}
+
+/// What an upload or a readback moves each way.
+fn copied_bytes(name: &str, scene: &Scene) -> u64 {
+    use crate::passes::Slot;
+    match name {
+        "upload" => touched(&Bind { name: "frames", slot: Slot::Frames, part: Part::Layer }, scene),
+        "readback" => Slot::Screen.bytes(scene),
+        _ => 0,
+    }
+}
+
+/// Texels that one step fetches: known of filters whose window does not depend on the data.
+fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
+    let turn = crate::passes::Turn { slices: scene.slices(), ..step.turn() };
+    let constants = (pass.constants)(scene, &turn);
+    let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
+    let edge = 2 * radius + 1;
+    let texels: u64 = (pass.extent)(scene, &turn).iter().map(|n| u64::from(*n)).product();
+    let window = match pass.name.split('_').next()? {
+        "gaussian" => edge,
+        "sigma" => edge * edge,
+        _ => return None,
+    };
+    // A slice's filter runs once a frame; the caller counts those.
+    debug_assert!(pass.when != When::Frame || turn.slice == 0);
+    Some(texels * window)
+}
