@@ -1,0 +1,4 @@
+//! What `echolume profile` and `echolume report` measure, on a device. A binary of its own: cargo runs it when nothing else runs.
+
+mod profile;
+mod scenes;
