@@ -1,7 +1,8 @@
 //! `echolume profile`.
 
-use super::asked::Asked;
+use super::asked::{Asked, open_device};
 use super::{Failure, failed, input, say};
+use echolume::gpu::Choice;
 use echolume::measuring::profile;
 use echolume::picture::{check_target, replace};
 use echolume::report::profile as model;
@@ -46,6 +47,9 @@ pub struct Profile {
     /// Compare two profiles pass by pass instead of measuring; exit code 1 on a regression
     #[arg(long, num_args = 2, value_names = ["OLD", "NEW"])]
     compare: Option<Vec<PathBuf>>,
+    /// Measure on this device too, in turns with the other, and compare them
+    #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
+    against: Option<Choice>,
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,
@@ -83,12 +87,26 @@ impl Profile {
             input: self.asked.shown(),
             ceilings: !self.no_ceilings,
         };
-        let (profile, spans) = profile::run(&context, &scene, &frames, &asked).map_err(failed)?;
+        let against = match &self.against {
+            Some(choice) => Some(open_device(Some(choice.clone()), false)?),
+            None => None,
+        };
+        let run = |context| profile::Run::new(context, &scene, &asked).map_err(failed);
+        let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
+        while first.wants_more() {
+            first.repeat(&frames).map_err(failed)?;
+            second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failed)?;
+        }
+        let (profile, spans) = first.finish();
         say!("{}", table::profile(&profile).trim_end());
         self.write(&self.json, || formats::to_json(&profile).map_err(failed))?;
         self.write(&self.csv, || Ok(formats::csv(&profile)))?;
         self.write(&self.csv_samples, || Ok(formats::csv_samples(&profile)))?;
-        self.write(&self.trace, || trace::chrome(&profile, &spans).map_err(failed))
+        self.write(&self.trace, || trace::chrome(&profile, &spans).map_err(failed))?;
+        match second {
+            Some(second) => self.judge(&profile, &second.finish().0),
+            None => Ok(()),
+        }
     }
 
     fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
@@ -99,14 +117,16 @@ impl Profile {
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
-        if !(self.threshold >= 1.0 && self.threshold.is_finite()) {
-            return Err(input(format!("--threshold {}: must be a ratio of at least 1", self.threshold)));
-        }
+        let (old, new) = (read(old)?, read(new)?);
+        self.judge(&old, &new)
+    }
+
+    /// Prints what differs; fails on a regression.
+    fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
         let options = compare::Options { threshold: self.threshold, force: self.force, ..compare::Options::default() };
-        let compared = compare::compare(&read(old)?, &read(new)?, &options)
-            .map_err(|e| input(format!("{} and {}: {e}", old.display(), new.display())))?;
+        let compared = compare::compare(old, new, &options).map_err(input)?;
         say!("{}", table::comparison(&compared).trim_end());
-        if let Some(file) = &self.json {
+        if let (Some(file), true) = (&self.json, self.compare.is_some()) {
             let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
             replace(file, text.as_bytes()).map_err(failed)?;
         }

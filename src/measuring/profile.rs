@@ -5,7 +5,7 @@ use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Bind, Part, Pass, Span, When};
 use crate::plan::{Plan, Step};
 use crate::report::profile::trace::{self, Track};
-use crate::report::profile::{Acquisition, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use crate::report::profile::{Acquisition, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
 use crate::source::Frame;
 use std::sync::Arc;
@@ -24,6 +24,18 @@ pub struct Asked {
     pub ceilings: bool,
 }
 
+/// A scene on a device, rendered once with every call of [`Run::repeat`]. Two of them may take turns, so that whatever else the
+/// machine does falls on both.
+pub struct Run {
+    context: Arc<Context>,
+    renderer: Renderer,
+    asked: Asked,
+    began: Instant,
+    done: usize,
+    repeats: Vec<Repeat>,
+    ceilings: Option<Ceilings>,
+}
+
 /// The profile, and every span of its repeats on one clock.
 ///
 /// # Errors
@@ -34,53 +46,83 @@ pub fn run(
     frames: &[Frame],
     asked: &Asked,
 ) -> Result<(Profile, Vec<trace::Span>), GpuError> {
-    let device = machine::device(context);
-    let ceilings = if asked.ceilings { ceilings::measure(context)? } else { None };
-    let options = Options { spans: true, ..Options::default() };
-    let mut renderer = Renderer::new(context, scene.clone(), &options)?;
-    let began = Instant::now();
-    let mut repeats = Vec::new();
-    for n in 0..asked.warm_up + asked.repeats {
-        let start = began.elapsed();
-        if n == 0 || !asked.still {
+    let mut run = Run::new(context, scene, asked)?;
+    while run.wants_more() {
+        run.repeat(frames)?;
+    }
+    Ok(run.finish())
+}
+
+impl Run {
+    pub fn new(context: &Arc<Context>, scene: &Scene, asked: &Asked) -> Result<Run, GpuError> {
+        let ceilings = if asked.ceilings { ceilings::measure(context)? } else { None };
+        let options = Options { spans: true, ..Options::default() };
+        Ok(Run {
+            context: context.clone(),
+            renderer: Renderer::new(context, scene.clone(), &options)?,
+            asked: asked.clone(),
+            began: Instant::now(),
+            done: 0,
+            repeats: Vec::new(),
+            ceilings,
+        })
+    }
+
+    pub fn wants_more(&self) -> bool {
+        self.done < self.asked.warm_up + self.asked.repeats
+    }
+
+    /// The volume once more.
+    pub fn repeat(&mut self, frames: &[Frame]) -> Result<(), GpuError> {
+        let start = self.began.elapsed();
+        if self.done == 0 || !self.asked.still {
             for frame in frames {
-                renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
+                self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
             }
         }
-        renderer.show(0)?;
-        renderer.picture()?;
-        let wall = (began.elapsed() - start).as_nanos() as f64;
-        let spans = renderer.take_spans()?;
-        if n >= asked.warm_up {
-            repeats.push(Repeat { wall, spans });
+        self.renderer.show(0)?;
+        self.renderer.picture()?;
+        let wall = (self.began.elapsed() - start).as_nanos() as f64;
+        let spans = self.renderer.take_spans()?;
+        self.done += 1;
+        if self.done > self.asked.warm_up {
+            self.repeats.push(Repeat { wall, spans });
         }
+        Ok(())
     }
-    let plan = renderer.plan();
-    let profile = Profile {
-        format: FORMAT.into(),
-        program: machine::program(),
-        date: machine::date(),
-        scene: settings(scene),
-        settings_hash: settings_hash(&settings(scene)),
-        input: asked.input.clone(),
-        sizes: Sizes {
-            frame: scene.frame_size(),
-            slices: scene.slices(),
-            volume: scene.volume_size(),
-            picture: scene.picture_size(),
-        },
-        acquisition: scene.probe().map(|p| Acquisition { seconds: p.acquisition_time(), sound_speed: p.sound_speed }),
-        repeats: asked.repeats,
-        warm_up: asked.warm_up,
-        passes: passes(plan, scene, &repeats, device.valid_bits > 0),
-        host: hosts(&repeats),
-        wall_ns: repeats.iter().map(|r| r.wall).collect(),
-        device_ns: if device.valid_bits > 0 { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
-        device,
-        ceilings,
-    };
-    let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
-    Ok((profile, spans.collect()))
+
+    pub fn finish(self) -> (Profile, Vec<trace::Span>) {
+        let device = machine::device(&self.context);
+        let (scene, plan, repeats) = (self.renderer.scene(), self.renderer.plan(), self.repeats);
+        let stamped = device.valid_bits > 0;
+        let profile = Profile {
+            format: FORMAT.into(),
+            program: machine::program(),
+            date: machine::date(),
+            scene: settings(scene),
+            settings_hash: settings_hash(&settings(scene)),
+            input: self.asked.input,
+            sizes: Sizes {
+                frame: scene.frame_size(),
+                slices: scene.slices(),
+                volume: scene.volume_size(),
+                picture: scene.picture_size(),
+            },
+            acquisition: scene
+                .probe()
+                .map(|p| Acquisition { seconds: p.acquisition_time(), sound_speed: p.sound_speed }),
+            repeats: repeats.len(),
+            warm_up: self.asked.warm_up,
+            passes: passes(plan, scene, &repeats, stamped),
+            host: hosts(&repeats),
+            wall_ns: repeats.iter().map(|r| r.wall).collect(),
+            device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
+            device,
+            ceilings: self.ceilings,
+        };
+        let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
+        (profile, spans.collect())
+    }
 }
 
 struct Repeat {

@@ -1,0 +1,102 @@
+//! The profile's numbers on a device: an injected slow pass is found, and runs that are alike are not called different.
+
+use crate::scenes::*;
+use echolume::measuring::profile::{Asked, Run, run};
+use echolume::report::profile::compare::{Options, Verdict, compare};
+use echolume::report::profile::{formats, trace};
+
+const SETTINGS: &str = "mode = 'sr'
+    picture = { size = [96, 96] }
+    slices = { pixels = 64, format = 'r16f', sigma = { window = 3, sigma = 0.1 } }
+    distance = { median = 5 }
+    post = { sigma = { window = 3, sigma = 0.1 } }";
+
+fn asked(repeats: usize) -> Asked {
+    Asked { repeats, warm_up: 2, still: false, input: "a bumpy wall".into(), ceilings: false }
+}
+
+#[test]
+fn a_slow_pass_is_found_and_no_other() {
+    let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
+    slow.faults.slow_down("median_distance", 3);
+    let mut old = Run::new(&quick, &scene, &asked(18)).expect("run");
+    let mut new = Run::new(&slow, &scene, &asked(18)).expect("run");
+    while old.wants_more() {
+        old.repeat(&frames).expect("repeat");
+        new.repeat(&frames).expect("repeat");
+    }
+    let (old, new) = (old.finish().0, new.finish().0);
+    let compared = compare(&old, &new, &Options::default()).expect("comparison");
+    for line in &compared.lines {
+        println!("{:20} {:?} {:?}", line.name, line.verdict, line.ratio.as_ref().map(|r| r.estimate));
+    }
+    let slower: Vec<_> = compared.regressions().map(|l| l.name.as_str()).filter(|n| *n != "wall").collect();
+    assert_eq!(slower, ["median_distance"]);
+    let back = compare(&new, &old, &Options::default()).expect("comparison");
+    let line = back.lines.iter().find(|l| l.name == "median_distance").expect("line");
+    assert_eq!(line.verdict, Verdict::Faster);
+}
+
+/// 40 pairs of runs of the same, in turns: at most 5 % of them may be called different in any line.
+#[test]
+fn identical_runs_are_hardly_ever_called_different() {
+    let (context, frames, scene) = (device(), frames(), scene(SETTINGS));
+    let mut different = Vec::new();
+    for pair in 0..40 {
+        let mut old = Run::new(&context, &scene, &asked(12)).expect("run");
+        let mut new = Run::new(&context, &scene, &asked(12)).expect("run");
+        while old.wants_more() {
+            old.repeat(&frames).expect("repeat");
+            new.repeat(&frames).expect("repeat");
+        }
+        let compared = compare(&old.finish().0, &new.finish().0, &Options::default()).expect("comparison");
+        let called = compared.lines.iter().filter(|l| matches!(l.verdict, Verdict::Faster | Verdict::Slower));
+        different.extend(called.map(|l| (pair, l.name.clone(), l.ratio.as_ref().map(|r| r.estimate))));
+    }
+    let mut pairs: Vec<_> = different.iter().map(|d| d.0).collect();
+    pairs.dedup();
+    println!("called different: {different:?}");
+    assert!(pairs.len() <= 2, "{} of 40 pairs: {different:?}", pairs.len());
+}
+
+/// What is written down is what was measured, whole and on one clock.
+#[test]
+fn a_profile_adds_up_and_survives_being_written() {
+    let context = device();
+    let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
+    profile.check().expect("consistent");
+    let names: Vec<_> = profile.passes.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "upload",
+            "scan_convert",
+            "sigma_slice",
+            "raycast_surface",
+            "median_distance",
+            "light",
+            "sigma_picture",
+            "tone",
+            "readback"
+        ]
+    );
+    let of = |name: &str| profile.passes.iter().find(|p| p.name == name).expect("pass");
+    assert_eq!((of("scan_convert").runs_per_picture, of("light").runs_per_picture), (15, 1));
+    // Every pixel of the sigma filter's slices, in groups of 8 x 8.
+    let [width, height] = scene(SETTINGS).grid.size.map(|n| u64::from(n.next_multiple_of(8)));
+    assert_eq!(of("sigma_slice").invocations, Some(15 * width * height));
+    let [width, height] = scene(SETTINGS).grid.size.map(u64::from);
+    assert_eq!(of("sigma_slice").fetches, Some(15 * width * height * 9));
+    assert_eq!(of("tone").bytes_written, 96 * 96 * 4);
+    assert_eq!(of("tone").bytes_read, 96 * 96 * 8);
+    assert_eq!(of("upload").bytes_read, 15 * 60 * 128 * 4);
+    for idle in profile.idle_ns() {
+        assert!(idle > -1e5, "passes overlap by {idle} ns");
+    }
+    let text = formats::to_json(&profile).expect("json");
+    assert_eq!(formats::from_json(&text).expect("read back"), profile);
+    let trace = trace::chrome(&profile, &spans).expect("trace");
+    let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
+    let events = trace["traceEvents"].as_array().expect("events");
+    assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), 6 * 15);
+}
