@@ -225,7 +225,7 @@ fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
         _ => {}
     }
     // The rest follow from the geometry, and their content is too long to compare.
-    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation());
+    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
     old.geometry != new.geometry || lattice(old) != lattice(new)
 }
 

@@ -23,7 +23,7 @@ fn point(label: &str, set: &[&str], value: f64, rmse: f64, ms: f64) -> Point {
 
 fn dial(name: &str, unit: &str, default: usize, mut points: Vec<Point>) -> Dial {
     points[default].is_default = true;
-    Dial { name: name.into(), unit: unit.into(), reference: Reference::F64, points, order: None }
+    Dial { name: name.into(), unit: unit.into(), reference: Reference::F64, points, order: None, floor: None }
 }
 
 fn report(dials: Vec<Dial>) -> Report {

@@ -112,6 +112,11 @@ impl Asked {
     }
 
     fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
+        self.layers()?.finish().map_err(input)
+    }
+
+    /// The settings before they are resolved.
+    pub fn layers(&self) -> Result<Layers, Failure> {
         let mut layers = Layers::default();
         if self.input.is_none() {
             layers.preset("phantom").map_err(input)?;
@@ -128,7 +133,7 @@ impl Asked {
         for assignment in &self.set {
             layers.set(assignment).map_err(input)?;
         }
-        layers.finish().map_err(input)
+        Ok(layers)
     }
 
     /// The flags as typed, and the assignments that they stand for.

@@ -7,6 +7,8 @@ mod info;
 mod phantom;
 mod profile;
 mod render;
+mod report;
+mod report_error;
 
 use clap::{Parser, Subcommand};
 use std::io::{ErrorKind, Write};
@@ -59,6 +61,8 @@ enum Command {
     Filter(Box<filter::Filter>),
     /// Say where the time goes, pass by pass, and compare two such runs
     Profile(Box<profile::Profile>),
+    /// Report error against run time, dial by dial
+    Report(report::Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(phantom::MakePhantom),
     /// Say what is in a recording (never who)
@@ -98,6 +102,7 @@ pub fn run() -> ExitCode {
         Command::Render(render) => render.run(),
         Command::Filter(filter) => filter.run(),
         Command::Profile(profile) => profile.run(),
+        Command::Report(report) => report.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),

@@ -1,5 +1,7 @@
 //! Runs the renderer again and again, and writes down what [`crate::report`] makes tables, comparisons and curves of.
 
 pub mod ceilings;
+pub mod dials;
+pub mod error;
 pub mod machine;
 pub mod profile;

@@ -1,7 +1,7 @@
 //! Slots: the GPU resources that passes read and write. A slot's shape and format follow from the scene; a slot that no pass
 //! of a plan names does not exist.
 
-use super::tables::{self, LUT_ENTRIES};
+use super::tables;
 use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
@@ -233,7 +233,7 @@ impl Slot {
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
             Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
             Slot::SharpVolume | Slot::Volume => Shape::Three(scene.volume_size()),
-            Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * LUT_ENTRIES as u32),
+            Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * scene.settings.ray.entries),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
             Slot::PreIntegrated => Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),

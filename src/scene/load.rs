@@ -29,7 +29,7 @@ pub enum LoadError {
 }
 
 /// Layers of TOML tables, merged key by key.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Layers(Table);
 
 impl Layers {
@@ -47,6 +47,21 @@ impl Layers {
     /// One `key.path=value` of `--set`; the value is TOML, or a plain word.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
         self.set_by(&format!("--set {assignment}"), assignment)
+    }
+
+    /// Whether the setting that an assignment names has been asked for.
+    pub fn has(&self, assignment: &str) -> bool {
+        let path = assignment.split_once('=').map_or(assignment, |(path, _)| path);
+        let mut at = Some(&self.0);
+        let mut keys = path.trim().split('.').peekable();
+        while let Some(key) = keys.next() {
+            match (at.and_then(|t| t.get(key)), keys.peek()) {
+                (Some(_), None) => return true,
+                (Some(Value::Table(inner)), _) => at = Some(inner),
+                _ => return false,
+            }
+        }
+        false
     }
 
     /// The same for a flag that stands for a setting: messages name the flag as it was typed.

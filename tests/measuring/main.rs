@@ -1,4 +1,5 @@
 //! What `echolume profile` and `echolume report` measure, on a device. A binary of its own: cargo runs it when nothing else runs.
 
+mod error;
 mod profile;
 mod scenes;

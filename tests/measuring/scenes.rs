@@ -2,7 +2,7 @@
 
 use echolume::gpu::{Choice, Context, ContextOptions};
 use echolume::probe::{Advance, Array, Axis, Geometry, Indices, Motion, Probe};
-use echolume::scene::{Input, Scene};
+use echolume::scene::{Input, Scene, Settings};
 use echolume::source::{Frame, StoredType};
 use std::sync::Arc;
 
@@ -25,7 +25,10 @@ pub fn probe() -> Probe {
 }
 
 pub fn scene(toml: &str) -> Scene {
-    let settings = toml::from_str(toml).expect("settings");
+    scene_of(toml::from_str(toml).expect("settings"))
+}
+
+pub fn scene_of(settings: Settings) -> Scene {
     let input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
     Scene::new(Geometry::Sweep(probe()), input, settings).expect("scene")
 }

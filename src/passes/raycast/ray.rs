@@ -1,6 +1,6 @@
 //! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
-use crate::passes::tables::{LUT_ENTRIES, is_uneven, line_parameter, sweep_span};
+use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Sampling, Scene};
@@ -116,7 +116,7 @@ pub(super) fn params(scene: &Scene, [window_low, window_high]: [f64; 2]) -> Para
             let low = line_parameter(probe.array, probe.lines.first());
             let high = line_parameter(probe.array, probe.lines.last());
             let (sweep_low, sweep_high) = sweep_span(probe);
-            let entries = (LUT_ENTRIES - 1) as f64;
+            let entries = f64::from(scene.settings.ray.entries - 1);
             let advance = match &probe.advance {
                 Advance::Same(a) => a / probe.slices.pitch(),
                 _ => 0.0,

@@ -8,6 +8,7 @@ pub mod front;
 pub mod metrics;
 pub mod orders;
 pub mod plot;
+pub mod table;
 
 use metrics::{PictureError, SurfaceError};
 use orders::Fit;
@@ -26,6 +27,7 @@ pub struct Report {
     pub driver: String,
     /// When it was measured, ISO 8601.
     pub date: String,
+    /// In words on its first line, then all settings, resolved, as TOML.
     pub scene: String,
     pub sizes: Sizes,
     /// Runs of which a time is the median.
@@ -53,6 +55,9 @@ pub struct Dial {
     pub points: Vec<Point>,
     /// Error against the value, where it has an order.
     pub order: Option<Fit>,
+    /// RMSE of the device against f64 where nothing but its arithmetic and formats differ.
+    #[serde(default)]
+    pub floor: Option<f64>,
 }
 
 /// What the errors of a dial are taken against.

@@ -172,7 +172,7 @@ fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report:
 
 fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, width: f64) -> Drawn {
     let Sizes { volume: [w, h, d], picture: [pw, ph] } = report.sizes;
-    let scene = format!("{}: volume {w}x{h}x{d}, picture {pw}x{ph}", report.scene);
+    let scene = format!("{}: volume {w}x{h}x{d}, picture {pw}x{ph}", report.scene.lines().next().unwrap_or_default());
     let repeats = format!("median and range of {} runs", report.repeats);
     let device = format!("{}, {}, {}; {repeats}", report.device, report.driver, report.date);
     canvas.text("Error against run time", [24.0, 14.0], 24, INK, [0, 0])?;

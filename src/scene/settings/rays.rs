@@ -40,13 +40,24 @@ pub struct Ray {
     /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each edge about every sample, made while the ray
     /// is cast; 0 for none.
     pub sliding: u32,
+    /// Entries of the sweep and line look-up tables, 2..=65536. The half tangent is smooth: linear interpolation between 1025 is
+    /// off by h^2/8 times its second derivative, under 1e-6 slices for a sweep of 142 frames over 85 deg.
+    pub entries: u32,
     /// Rays for each pixel along each edge, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
 }
 
 impl Default for Ray {
     fn default() -> Self {
-        Ray { step: None, early_end: 1.0 / 512.0, sampling: Sampling::Hardware, spread: 0.0, sliding: 0, rays: 1 }
+        Ray {
+            step: None,
+            early_end: 1.0 / 512.0,
+            sampling: Sampling::Hardware,
+            spread: 0.0,
+            sliding: 0,
+            entries: 1025,
+            rays: 1,
+        }
     }
 }
 

@@ -1,0 +1,161 @@
+//! `echolume report error`.
+
+use super::asked::Asked;
+use super::{Failure, failed, input, say};
+use echolume::measuring::{dials, error};
+use echolume::picture::replace;
+use echolume::report::curves::{self, Measure, choose, plot};
+use echolume::scene::Scene;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Each dial is turned alone, the rest as the scene has it. Errors are those of the picture before stage 4's tone.\n\n\
+                        Examples:\n  \
+                        echolume report error --dial step --dial format --size 96x96 -o report\n  \
+                        echolume report error sweep.mha --preset fetal --mode vr --under-error 0.01\n  \
+                        echolume report error --under-time 16ms"
+)]
+pub struct Error {
+    #[command(flatten)]
+    asked: Asked,
+    /// step, compositing, format, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, or all; may be
+    /// given again
+    #[arg(long, value_name = "NAME", default_value = "all")]
+    dial: Vec<String>,
+    /// Volumes timed at each place of a dial
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+    /// What places are held against: f64 on the CPU, converged (the device's best), or auto: f64 where it takes under a minute
+    #[arg(long, value_name = "WHAT", default_value = "auto")]
+    against: String,
+    /// Write error.json, error.csv, error.svg and error.png into this folder
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// What counts as error: rmse, mm (distance maps) or degrees (normals)
+    #[arg(long, value_name = "NAME", default_value = "rmse")]
+    measure: String,
+    /// Name the cheapest settings whose error stays under this
+    #[arg(long, value_name = "ERROR")]
+    under_error: Option<f64>,
+    /// Name the most accurate settings that take less, such as 16ms
+    #[arg(long, value_name = "TIME")]
+    under_time: Option<String>,
+    /// Take the measurements of an earlier report instead of measuring
+    #[arg(long, value_name = "FILE")]
+    from: Option<PathBuf>,
+}
+
+impl Error {
+    pub fn run(&self) -> Result<(), Failure> {
+        let measure = match self.measure.as_str() {
+            "rmse" => Measure::Rmse,
+            "mm" => Measure::Mm,
+            "degrees" => Measure::Degrees,
+            other => return Err(input(format!("--measure {other}: must be rmse, mm or degrees"))),
+        };
+        let time = self.under_time.as_deref().map(nanoseconds).transpose()?;
+        let report = match &self.from {
+            Some(file) => read(file)?,
+            None => self.measured()?,
+        };
+        say!("{}", curves::table::table(&report, measure).trim_end());
+        if let Some(folder) = &self.output {
+            write(&report, measure, folder)?;
+        }
+        if let Some(error) = self.under_error {
+            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.say(measure));
+        }
+        if let Some(time) = time {
+            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.say(measure));
+        }
+        Ok(())
+    }
+
+    fn measured(&self) -> Result<curves::Report, Failure> {
+        let held = match self.against.as_str() {
+            "auto" => error::Held::Auto,
+            "f64" => error::Held::F64,
+            "converged" => error::Held::Converged,
+            other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
+        };
+        let (mut source, scene) = self.asked.open()?;
+        if let Some(folder) = &self.output {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+        }
+        let dials = self.dials(&scene)?;
+        let context = self.asked.device(false)?;
+        let mut frames = Vec::new();
+        self.asked.frames(&mut *source, |frame| {
+            frames.push(frame);
+            Ok(())
+        })?;
+        let layers = self.asked.layers()?;
+        let (repeats, frames, shown) = (self.repeat, &frames[..], self.asked.shown());
+        let asked =
+            error::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
+        let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
+        let bar = indicatif::ProgressBar::new(places as u64);
+        bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
+        let report = asked.report(&dials, |dial, place| {
+            bar.set_message(format!("{dial}: {place}"));
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        report.map_err(failed)
+    }
+
+    /// The dials asked for. Of all, those that the scene has.
+    fn dials(&self, scene: &Scene) -> Result<Vec<dials::Dial>, Failure> {
+        let mut turned = Vec::new();
+        if self.dial.iter().any(|d| d == "all") {
+            for name in dials::NAMES {
+                match dials::dial(name, scene) {
+                    Ok(dial) => turned.push(dial),
+                    Err(why) => say!("without {name}: this scene {why}"),
+                }
+            }
+            return Ok(turned);
+        }
+        for name in &self.dial {
+            turned.push(dials::dial(name, scene).map_err(|why| match dials::NAMES.contains(&name.as_str()) {
+                true => input(format!("--dial {name}: this scene {why}")),
+                false => input(format!("--dial {name}: {why}")),
+            })?);
+        }
+        Ok(turned)
+    }
+}
+
+fn write(report: &curves::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+    let size = [1200, 800];
+    replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.csv"), report.to_csv().as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.svg"), plot::svg(report, measure, size).map_err(failed)?.as_bytes()).map_err(failed)?;
+    plot::picture(report, measure, size).map_err(failed)?.save(&folder.join("error.png")).map_err(failed)?;
+    say!("written: error.json, error.csv, error.svg, error.png in {}", folder.display());
+    Ok(())
+}
+
+fn read(file: &Path) -> Result<curves::Report, Failure> {
+    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
+    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    if !about.is_file() || about.len() > 64 << 20 {
+        return Err(fault(&"is not a file of at most 64 MiB, so no report"));
+    }
+    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    curves::Report::from_json(&text).map_err(|e| fault(&e))
+}
+
+/// A time such as 16ms, 0.25s or 250us.
+fn nanoseconds(text: &str) -> Result<f64, Failure> {
+    let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
+    let parsed =
+        units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));
+    match parsed {
+        Some(ns) if ns > 0.0 && ns.is_finite() => Ok(ns),
+        _ => Err(input(format!("--under-time {text}: must be a time such as 16ms or 0.25s"))),
+    }
+}

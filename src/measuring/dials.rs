@@ -1,0 +1,238 @@
+//! The dials of a scene: settings that trade error for time, each with the places it is turned to and the place that every
+//! other is held against.
+
+use crate::scene::{Mode, Scene, Scheme, VolumeFormat};
+
+/// One place of a dial.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// For plots.
+    pub label: String,
+    /// `key=value` of `--set`; empty for the scene as it is.
+    pub set: Vec<String>,
+    /// On the dial's axis, in its unit.
+    pub value: f64,
+}
+
+#[derive(Clone, Debug)]
+pub struct Dial {
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// The first is the scene as it is.
+    pub places: Vec<Place>,
+    /// What the places are held against: the scene with these settings.
+    pub best: Vec<String>,
+    /// A step from there: how much that would still change is the reference's own error where it is a picture of the device's.
+    pub nearly: Vec<String>,
+}
+
+pub const NAMES: &[&str] = &[
+    "step",
+    "compositing",
+    "format",
+    "filter3d",
+    "termination",
+    "sigma",
+    "perona-malik",
+    "adaptive",
+    "resolution",
+    "rays",
+    "lut",
+];
+
+/// The dial of that name, or why this scene has none.
+pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
+    let s = &scene.settings;
+    let step = scene.step;
+    let marches = !scene.is_flat() && s.mode != Mode::Cube;
+    let composites = scene.composites();
+    let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
+    let made = |name, unit, as_it_is: Place, others: Vec<Place>, best: &[String], nearly: &[String]| Dial {
+        name,
+        unit,
+        places: std::iter::once(as_it_is).chain(others).collect(),
+        best: best.to_vec(),
+        nearly: nearly.to_vec(),
+    };
+    let is = |label: String, value: f64| Place { label, set: Vec::new(), value };
+    let at = |label: String, set: &[String], value: f64| Place { label, set: set.to_vec(), value };
+    let dial = match name {
+        "step" => {
+            need(marches, "casts no ray")?;
+            // Down to an eighth, up to four times; the reference is four times finer than the finest.
+            let places = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
+            let others =
+                places.map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step));
+            let fine = |f: f64| [format!("ray.step={}", step * f)];
+            made("step", "mm", is(format!("{step:.3} mm"), step), others.into(), &fine(1.0 / 32.0), &fine(1.0 / 16.0))
+        }
+        "compositing" => {
+            need(composites, "composites nothing")?;
+            let kinds = ["riemann", "corrected", "pre-integrated"];
+            let now = serde_word(&s.volume.compositing);
+            let others = kinds.iter().enumerate().filter(|(_, k)| **k != now);
+            let others = others.map(|(n, k)| at(k.to_string(), &[format!("volume.compositing={k}")], n as f64));
+            let best = |f: f64| ["volume.compositing=pre-integrated".to_string(), format!("ray.step={}", step * f)];
+            let value = kinds.iter().position(|k| *k == now).unwrap_or(0) as f64;
+            made("compositing", "", is(now.clone(), value), others.collect(), &best(1.0 / 32.0), &best(1.0 / 16.0))
+        }
+        "format" => {
+            let bits = |f: VolumeFormat| match f {
+                VolumeFormat::R8 => 8.0,
+                VolumeFormat::R16 | VolumeFormat::R16f => 16.0,
+                VolumeFormat::R32f => 32.0,
+            };
+            let now = s.slices.format;
+            let all = [VolumeFormat::R8, VolumeFormat::R16, VolumeFormat::R16f, VolumeFormat::R32f];
+            let others = all.into_iter().filter(|f| *f != now);
+            let others = others.map(|f| at(serde_word(&f), &[format!("slices.format={}", serde_word(&f))], bits(f)));
+            let best = ["slices.format=r32f".to_string(), "ray.sampling=exact".into()];
+            let nearly = ["slices.format=r16".to_string(), "ray.sampling=exact".into()];
+            made("format", "bits", is(serde_word(&now), bits(now)), others.collect(), &best, &nearly)
+        }
+        "filter3d" => {
+            need(marches, "casts no ray")?;
+            // Held against the separable filter of the larger window: ahead of time and on the way are to agree.
+            let ahead = |n: u32| ["slices.smooth=none".to_string(), format!("slices.smooth={{kernel={n}}}")];
+            let sliding = |n: u32| ["slices.smooth=none".to_string(), format!("ray.sliding={n}")];
+            let others = vec![
+                at("none".into(), &["slices.smooth=none".into(), "ray.sliding=0".into()], 1.0),
+                at("ahead 3".into(), &ahead(3), 3.0),
+                at("ahead 5".into(), &ahead(5), 5.0),
+                at("sliding 3".into(), &sliding(3), 3.0),
+                at("sliding 5".into(), &sliding(5), 5.0),
+            ];
+            made("filter3d", "samples", is("as it is".into(), 0.0), others, &ahead(3), &ahead(3))
+        }
+        "termination" => {
+            need(composites, "composites nothing")?;
+            let now = s.ray.early_end;
+            let others =
+                [0.0, 1e-4, 1.0 / 2048.0, 1.0 / 512.0, 1.0 / 128.0, 0.03, 0.1].into_iter().filter(|v| *v != now);
+            let others = others.map(|v| at(format!("{v:.4}"), &[format!("ray.early_end={v:.9}")], v));
+            let best = ["ray.early_end=0.0".to_string()];
+            made(
+                "termination",
+                "light left",
+                is(format!("{now:.4}"), now),
+                others.collect(),
+                &best,
+                &["ray.early_end=0.0001".into()],
+            )
+        }
+        "sigma" => {
+            let fixed = |n: u32| {
+                at(
+                    format!("fixed {n}"),
+                    &["slices.enhanced_sigma=none".into(), format!("slices.sigma={{window={n},sigma=0.1}}")],
+                    f64::from(n),
+                )
+            };
+            let grown = |n: u32, most: u32| {
+                at(
+                    format!("growing {n}"),
+                    &[
+                        "slices.sigma=none".into(),
+                        format!("slices.enhanced_sigma={{window={n},largest={most},sigma=0.1}}"),
+                    ],
+                    f64::from(n),
+                )
+            };
+            let others = vec![
+                at("none".into(), &["slices.sigma=none".into(), "slices.enhanced_sigma=none".into()], 1.0),
+                fixed(3),
+                fixed(5),
+                fixed(7),
+                fixed(9),
+                fixed(11),
+                grown(3, 17),
+                grown(5, 19),
+                grown(7, 19),
+            ];
+            let best =
+                ["slices.sigma=none".to_string(), "slices.enhanced_sigma={window=9,largest=21,sigma=0.1}".into()];
+            let nearly =
+                ["slices.sigma=none".to_string(), "slices.enhanced_sigma={window=7,largest=19,sigma=0.1}".into()];
+            made("sigma", "pixels", is("as it is".into(), 0.0), others, &best, &nearly)
+        }
+        "perona-malik" => {
+            // The same time of diffusion, T = 2, in ever fewer and longer steps.
+            let diffused = |scheme: Scheme, n: u32| {
+                let (word, step) = (serde_word(&scheme), 2.0 / f64::from(n));
+                vec![format!("slices.perona_malik={{scheme='{word}',edge=0.1,step={step},repeat={n}}}")]
+            };
+            let place = |scheme: Scheme, n: u32| {
+                at(format!("{} {n}", serde_word(&scheme)), &diffused(scheme, n), 2.0 / f64::from(n))
+            };
+            let mut others: Vec<Place> = [8, 10, 20, 40].into_iter().map(|n| place(Scheme::Explicit, n)).collect();
+            others.extend([1, 2, 4, 8, 16].into_iter().map(|n| place(Scheme::Aos, n)));
+            let (best, nearly) = (diffused(Scheme::Explicit, 80), diffused(Scheme::Explicit, 40));
+            made("perona-malik", "step", is("as it is".into(), 0.0), others, &best, &nearly)
+        }
+        "adaptive" => {
+            need(marches, "casts no ray")?;
+            need(
+                scene.probe().is_some_and(|p| matches!(p.array, crate::probe::Array::Curved { .. })),
+                "has no convex sweep",
+            )?;
+            let now = s.ray.spread;
+            let others = [0.0, 0.25, 0.5, 0.75, 1.0].into_iter().filter(|v| *v != now);
+            let others = others.map(|v| at(format!("{v:.2}"), &[format!("ray.spread={v:.2}")], v));
+            let best = |f: f64| ["ray.spread=0.0".to_string(), format!("ray.step={}", step * f)];
+            made(
+                "adaptive",
+                "share",
+                is(format!("{now:.2}"), now),
+                others.collect(),
+                &best(1.0 / 32.0),
+                &best(1.0 / 16.0),
+            )
+        }
+        "resolution" => {
+            let [w, h] = scene.picture_size();
+            need(w >= 16 && h >= 16, "is smaller than 16 pixels")?;
+            let sized = |share: f64| [w, h].map(|n| ((f64::from(n) * share).round() as u32).max(1));
+            let others = [0.75, 0.5, 0.35, 0.25];
+            let others = others.map(|f| {
+                let [x, y] = sized(f);
+                at(format!("{x} x {y}"), &[format!("picture.size=[{x},{y}]")], f)
+            });
+            let best = ["ray.rays=3".to_string()];
+            made("resolution", "share", is(format!("{w} x {h}"), 1.0), others.into(), &best, &["ray.rays=2".into()])
+        }
+        "rays" => {
+            let now = s.ray.rays;
+            let others = [1, 2, 3].into_iter().filter(|n| *n != now);
+            let others = others.map(|n| at(format!("{n} x {n}"), &[format!("ray.rays={n}")], f64::from(n)));
+            made(
+                "rays",
+                "along an edge",
+                is(format!("{now} x {now}"), f64::from(now)),
+                others.collect(),
+                &["ray.rays=4".into()],
+                &["ray.rays=3".into()],
+            )
+        }
+        "lut" => {
+            need(scene.probe().is_some(), "has no sweep")?;
+            let now = s.ray.entries;
+            let others = [3, 5, 9, 17, 33, 65, 129, 257, 1025, 4097].into_iter().filter(|n| *n != now);
+            let others = others.map(|n| at(n.to_string(), &[format!("ray.entries={n}")], f64::from(n)));
+            made(
+                "lut",
+                "entries",
+                is(now.to_string(), f64::from(now)),
+                others.collect(),
+                &["ray.entries=65536".into()],
+                &["ray.entries=16385".into()],
+            )
+        }
+        _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
+    };
+    Ok(dial)
+}
+
+/// A setting's word as a scene file has it.
+fn serde_word(value: &impl serde::Serialize) -> String {
+    toml::Value::try_from(value).ok().and_then(|v| v.as_str().map(str::to_string)).unwrap_or_default()
+}
