@@ -1,17 +1,17 @@
-//! One pass alone on inputs of the caller's: what the tests hold against its reference.
+//! One pass alone on inputs of the caller's: what the tests hold against its reference, and what benches time.
 
 use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipelines, embedded};
+use super::pipelines::{Pipeline, Pipelines, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timeline;
 use crate::passes::slots::{Filled, Shape};
-use crate::passes::{Arrays, Bind, Part, Pass, Texels, Turn};
+use crate::passes::{Arrays, Bind, Part, Pass, Slot, Texels, Turn, When};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -100,33 +100,132 @@ impl Single {
     }
 }
 
-/// Times of `count` dispatches of one pass in a row, ns, over slots that hold zeros; empty where the device has no time stamps.
-/// The first, which compiles, is left out.
-pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
-    let turn = Turn::default();
-    let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
-    let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
-    let mut slots = Slots::new(context, 1);
-    let mut timeline = Timeline::new(context)?;
-    let mut recorder = Recorder::new(context, pass.name, false)?;
-    let mut order = Order::default();
-    let mut pipelines = Pipelines::new(context, embedded())?;
-    let pipeline = pipelines.get(pass, scene, &turn)?;
-    let new = slots.fit(&plan, scene)?;
-    let mut times = Vec::new();
-    for n in 0..=count {
-        recorder.begin(&mut order, &timeline)?;
-        if n == 0 {
-            recorder.clear_new(&mut order, &slots, &new);
+/// One pass of a scene, with slots and pipelines of its own, to be run and timed as often as wanted.
+pub struct Timed {
+    // Dropped in this order, after `drop` has waited for the device.
+    recorder: Recorder,
+    /// Every iteration of the pass.
+    dispatches: Vec<(Turn, Arc<Pipeline>)>,
+    _pipelines: Pipelines,
+    slots: Slots,
+    timeline: Timeline,
+    order: Order,
+    context: Arc<Context>,
+    scene: Scene,
+    pass: &'static Pass,
+}
+
+impl Timed {
+    /// `contents` is what images hold before the first run; those left out hold zeros. What the scene makes itself is there in
+    /// any case. A pass of frames works on layer 0 and the middle slice, one of volumes on all slices. Runs once, because
+    /// drivers compile then.
+    ///
+    /// # Errors
+    /// What the device cannot hold or compile, named.
+    pub fn new(
+        context: &Arc<Context>,
+        scene: &Scene,
+        pass: &'static Pass,
+        contents: &[(Slot, Texels)],
+    ) -> Result<Timed, GpuError> {
+        let first = Turn { slice: scene.slices() / 2, ..Turn::default() };
+        let first = if pass.when == When::Frame { first } else { Turn { slice: 0, slices: scene.slices(), ..first } };
+        let turns: Vec<Turn> = (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..first }).collect();
+        let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
+        let mut pipelines = Pipelines::new(context, embedded())?;
+        let mut dispatches = Vec::new();
+        for turn in turns {
+            let binds = [(pass.reads)(scene, &turn), (pass.writes)(scene, &turn)].concat();
+            plan.slots.extend(binds.iter().map(|b| b.slot));
+            dispatches.push((turn, pipelines.get(pass, scene, &turn)?));
         }
-        let work = Work { slots: &slots, pipeline: &pipeline, scene, pass, turn: &turn };
-        let done = recorder.dispatch(&mut order, &work).and_then(|()| recorder.submit(&mut timeline));
-        timeline.drain();
-        done?;
-        let mut measured = Measured::new(context, false);
-        recorder.collect(&timeline, &mut measured)?;
-        let taken = measured.take_times();
-        times.extend(taken.iter().filter(|t| n > 0 && t.name == pass.name).map(|t| t.total));
+        plan.slots.sort();
+        plan.slots.dedup();
+        let mut timed = Timed {
+            recorder: Recorder::new(context, pass.name, false)?,
+            dispatches,
+            _pipelines: pipelines,
+            slots: Slots::new(context, 1),
+            timeline: Timeline::new(context)?,
+            order: Order::default(),
+            context: context.clone(),
+            scene: scene.clone(),
+            pass,
+        };
+        timed.fill(&plan, contents)?;
+        timed.run()?;
+        Ok(timed)
+    }
+
+    fn fill(&mut self, plan: &Plan, contents: &[(Slot, Texels)]) -> Result<(), GpuError> {
+        let new = self.slots.fit(plan, &self.scene)?;
+        self.recorder.begin(&mut self.order, &self.timeline)?;
+        self.recorder.clear_new(&mut self.order, &self.slots, &new);
+        let mut keep = Vec::new();
+        for &(slot, copy) in &new {
+            let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, t)| t.encode(slot.format(&self.scene)));
+            let bytes = match (given, slot.filled()) {
+                (Some(bytes), _) => bytes,
+                (None, Filled::ByScene(make)) => bytemuck::cast_slice(&make(&self.scene)).to_vec(),
+                _ => continue,
+            };
+            let Some(image) = self.slots.image(slot, copy) else { continue };
+            // As large as the image, whatever was given.
+            let mut staging = Buffer::new(&self.context, "contents", slot.bytes(&self.scene), Purpose::Staging)?;
+            let length = bytes.len().min(staging.bytes().len());
+            staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
+            let place = Place { slot, copy, parts: 0..image.shape.parts() };
+            self.recorder.copy_in(&mut self.order, &staging, image, place);
+            keep.push(staging);
+        }
+        self.recorder.submit(&mut self.timeline)?;
+        let done = self.timeline.wait_all();
+        // The staging buffers are freed at the end, also when waiting failed.
+        self.timeline.drain();
+        done
+    }
+
+    /// Runs every iteration of the pass once, in one submission, and waits: the device's time for them all, ns; none where it
+    /// has no time stamps. A pass that repeats works on what it left there the last time.
+    pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
+        self.recorder.begin(&mut self.order, &self.timeline)?;
+        for (turn, pipeline) in &self.dispatches {
+            let work = Work { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, turn };
+            self.recorder.dispatch(&mut self.order, &work)?;
+        }
+        self.recorder.submit(&mut self.timeline)?;
+        let mut measured = Measured::new(&self.context, false);
+        self.recorder.collect(&self.timeline, &mut measured)?;
+        Ok(measured.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
+    }
+
+    /// What an image holds now; none for a slot that the pass does not touch, or that is a table.
+    pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
+        let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
+        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
+        self.recorder.begin(&mut self.order, &self.timeline)?;
+        self.recorder.copy_out(&mut self.order, image, slot, 0, &buffer);
+        self.recorder.submit(&mut self.timeline)?;
+        let done = self.timeline.wait_all();
+        // The buffer is freed at the end, also when waiting failed.
+        self.timeline.drain();
+        done.map(|()| Some(Texels::decode(size_of(image.shape), image.format, buffer.bytes())))
+    }
+}
+
+impl Drop for Timed {
+    fn drop(&mut self) {
+        self.timeline.drain();
+    }
+}
+
+/// Times of `count` runs of one pass in a row, ns, each of all its iterations, over slots that hold zeros; empty where the
+/// device has no time stamps. A run before them, which compiles, is left out.
+pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
+    let mut timed = Timed::new(context, scene, pass, &[])?;
+    let mut times = Vec::new();
+    for _ in 0..count {
+        times.extend(timed.run()?);
     }
     Ok(times)
 }

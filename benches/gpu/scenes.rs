@@ -1,0 +1,147 @@
+//! The scenes that passes are timed on: for each, what it sets beyond the phantom's preset and which passes it is for.
+
+use crate::common::scene;
+use echolume::passes::{PASSES, Pass};
+use echolume::probe::{Geometry, Grid};
+use echolume::scene::Scene;
+use echolume::source::phantom::Phantom;
+
+/// One sweep and its scenes: how large everything is.
+pub struct Sizes {
+    pub frames: usize,
+    pub lines: usize,
+    pub samples: usize,
+    /// Longer edge of a slice.
+    pub pixels: u32,
+    /// Edge of a picture.
+    pub picture: u32,
+}
+
+/// A volume of about 128^3 and a picture of 256^2.
+pub const FULL: Sizes = Sizes { frames: 128, lines: 128, samples: 256, pixels: 128, picture: 256 };
+/// The least that still shows a face with shadows on it: to see that each bench runs.
+pub const SMALL: Sizes = Sizes { frames: 40, lines: 64, samples: 160, pixels: 96, picture: 80 };
+
+pub struct Stated {
+    pub name: &'static str,
+    set: &'static [&'static str],
+    pub passes: &'static [&'static str],
+    /// The frames taken as slices of a Cartesian volume.
+    cartesian: bool,
+}
+
+const fn sweep(name: &'static str, set: &'static [&'static str], passes: &'static [&'static str]) -> Stated {
+    Stated { name, set, passes, cartesian: false }
+}
+
+pub const SCENES: &[Stated] = &[
+    sweep(
+        "preset",
+        &[],
+        &[
+            "scan_convert",
+            "median_slice",
+            "sigma_slice",
+            "gaussian_lateral",
+            "gaussian_depth",
+            "gaussian_elevation",
+            "raycast_surface",
+            "median_distance",
+            "bilateral_distance",
+            "shadow",
+            "occlusion",
+            "light",
+            "tone",
+        ],
+    ),
+    sweep(
+        "every other filter",
+        &[
+            "conditioning.tgc=[{ depth = 10, gain = -6 }, { depth = 90, gain = 4 }]",
+            "conditioning.low_pass=1.0",
+            "slices.enhanced_sigma={ growth = true }",
+            "slices.perona_malik={ repeat = 1 }",
+            "distance.sigma={ window = 7, sigma = 0.7 }",
+            "distance.enhanced_sigma={ sigma = 0.5 }",
+            "distance.perona_malik={ edge = 1.0, repeat = 1 }",
+            "post.sigma={ window = 5, sigma = 0.05 }",
+            "post.enhanced_sigma={ sigma = 0.05 }",
+            "post.perona_malik={ repeat = 1 }",
+        ],
+        &[
+            "condition",
+            "growth_slice",
+            "enhanced_sigma_slice",
+            "perona_malik_slice",
+            "sigma_distance",
+            "enhanced_sigma_distance",
+            "perona_malik_distance",
+            "sigma_picture",
+            "enhanced_sigma_picture",
+            "perona_malik_picture",
+        ],
+    ),
+    sweep(
+        "Nagao-Matsuyama, AOS",
+        &[
+            "slices.estimator=nagao-matsuyama",
+            "slices.perona_malik={ scheme = 'aos', step = 5.0, repeat = 1 }",
+            "post.perona_malik={ scheme = 'aos', step = 5.0, repeat = 1 }",
+        ],
+        &["estimator_slice", "aos_slice", "aos_picture"],
+    ),
+    sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
+    sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
+    sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
+    sweep("corrected", &["mode=vr"], &["raycast_volume"]),
+    sweep("pre-integrated", &["mode=vr", "volume.compositing=pre-integrated"], &["raycast_volume"]),
+    sweep("first hit", &["mode=vr", "volume.shading=first-hit"], &["raycast_volume", "light"]),
+    sweep("largest", &["mode=mip"], &["raycast_projection"]),
+    sweep("mean", &["mode=mean"], &["raycast_projection"]),
+    sweep("three planes", &["mode=orthogonal"], &["raycast_planes"]),
+    sweep("slabs of 3 mm", &["mode=tomography", "planes.thickness=3"], &["raycast_planes"]),
+    sweep("block", &["mode=cube", "cube.inset.near=5", "camera.azimuth=30", "camera.elevation=20"], &["raycast_cube"]),
+    sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),
+    Stated {
+        name: "Cartesian",
+        // The preset's region is the sweep's.
+        set: &["region.lateral=[-1e3, 1e3]", "region.depth=[-1e3, 1e3]", "region.elevation=[-1e3, 1e3]"],
+        passes: &["load_slice"],
+        cartesian: true,
+    },
+];
+
+impl Stated {
+    pub fn scene(&self, phantom: &Phantom, sizes: &Sizes) -> Result<Scene, String> {
+        let mut set =
+            vec![format!("slices.pixels={}", sizes.pixels), format!("picture.size=[{0}, {0}]", sizes.picture)];
+        set.extend(self.set.iter().map(|s| s.to_string()));
+        let grid =
+            Grid { size: [sizes.samples, sizes.lines, sizes.frames], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };
+        let geometry = if self.cartesian { Geometry::Cartesian(grid) } else { Geometry::Sweep(phantom.probe(0)) };
+        scene(geometry, &set).map_err(|e| format!("scene '{}': {e}", self.name))
+    }
+
+    /// The passes named, each needed by the scene.
+    pub fn passes(&self, scene: &Scene) -> Result<Vec<&'static Pass>, String> {
+        let find = |name: &&str| {
+            let pass = PASSES.iter().find(|p| p.name == *name);
+            let pass = pass.ok_or_else(|| format!("scene '{}': there is no pass '{name}'", self.name))?;
+            match (pass.needed)(scene) {
+                Ok(_) => Ok(pass),
+                Err(why) => Err(format!("scene '{}' does not need '{name}': {why}", self.name)),
+            }
+        };
+        self.passes.iter().map(find).collect()
+    }
+}
+
+/// Refuses a pass that no scene times.
+pub fn check_that_none_is_forgotten() -> Result<(), String> {
+    let timed = |pass: &Pass| SCENES.iter().any(|s| s.passes.contains(&pass.name));
+    let forgotten: Vec<_> = PASSES.iter().filter(|p| !timed(p)).map(|p| p.name).collect();
+    match forgotten.is_empty() {
+        true => Ok(()),
+        false => Err(format!("no bench for {}; add to SCENES in benches/gpu/scenes.rs", forgotten.join(", "))),
+    }
+}
