@@ -51,13 +51,22 @@ impl SliceGrid {
     }
 }
 
+/// What a pass of stage 2 looks at: start depth and grey window belong to the mode, since rays that start at the probe meet the
+/// wall first.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    pub window: [f64; 2],
+    /// Lower corner of the region from the start depth on, mm in space.
+    pub low: DVec3,
+}
+
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub geometry: Geometry,
     pub input: Input,
     pub settings: Settings,
     pub grid: SliceGrid,
-    /// Corners of what is rendered, mm in space: the insonified box within the region of interest and below the start depth.
+    /// Corners of what is rendered, mm in space: the insonified box within the region of interest.
     pub low: DVec3,
     pub high: DVec3,
     pub rays: Rays,
@@ -102,7 +111,8 @@ impl Scene {
         }
         let grid = slice_grid(&geometry, settings.slices.pixels);
         let (low, high) = visible_box(&geometry, &settings)?;
-        let rays = camera::rays(&settings, low, high, depth_offset(&geometry), is_still(&geometry));
+        let framed = framed_low(&geometry, &settings, low, high)?;
+        let rays = camera::rays(&settings, framed, high, depth_offset(&geometry), is_still(&geometry));
         let step = settings.ray.step.unwrap_or(grid.pitch[0].min(grid.pitch[1]));
         let longest = (high - low).length();
         if longest / step > 65536.0 {
@@ -196,6 +206,31 @@ impl Scene {
         curved && self.settings.ray.spread > 0.0
     }
 
+    /// What the surface detector looks at.
+    pub fn surface_view(&self) -> View {
+        self.view(self.settings.surface.window, self.settings.surface.start_depth)
+    }
+
+    /// What is composited.
+    pub fn volume_view(&self) -> View {
+        self.view(self.settings.volume.window, self.settings.volume.start_depth)
+    }
+
+    /// What is projected.
+    pub fn projection_view(&self) -> View {
+        self.view(self.settings.projection.window, self.settings.projection.start_depth)
+    }
+
+    /// All of the region through a window.
+    pub fn whole_view(&self, window: [f64; 2]) -> View {
+        self.view(window, None)
+    }
+
+    fn view(&self, window: [f64; 2], start: Option<f64>) -> View {
+        let start = start.map_or(self.low.y, |s| s + depth_offset(&self.geometry));
+        View { window, low: self.low.with_y(self.low.y.max(start)) }
+    }
+
     /// Clip planes in space: what lies beyond is cut away, dot(n, p) > w for (n, w).
     pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let offset = depth_offset(&self.geometry);
@@ -218,18 +253,6 @@ impl Scene {
     /// Whether the mode cuts planes and casts no ray.
     pub fn is_flat(&self) -> bool {
         self.settings.mode.is_flat()
-    }
-
-    /// The window of samples that a detector or a compositor of this scene uses.
-    pub fn window(&self) -> [f64; 2] {
-        let settings = &self.settings;
-        match settings.mode {
-            Mode::Volume => settings.volume.window,
-            Mode::Surface | Mode::Mixed => settings.surface.window,
-            Mode::Mip | Mode::MinIp | Mode::Mean => settings.projection.window,
-            Mode::Plane | Mode::Orthogonal | Mode::Tomography => settings.planes.window,
-            Mode::Cube => settings.cube.window,
-        }
     }
 
     /// Standard deviations of the 3D Gaussian in slice pixels, slice pixels and slices.
@@ -376,17 +399,26 @@ fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(DVec3, DVec3
             );
         }
     }
-    let (field, start) = match settings.mode {
-        Mode::Volume => ("volume.start_depth", settings.volume.start_depth),
-        Mode::Surface | Mode::Mixed => ("surface.start_depth", settings.surface.start_depth),
-        Mode::Mip | Mode::MinIp | Mode::Mean => ("projection.start_depth", settings.projection.start_depth),
-        Mode::Plane | Mode::Orthogonal | Mode::Tomography | Mode::Cube => ("region.depth", None),
+    Ok((low, high))
+}
+
+/// Upper end of what the camera frames: the shallowest start depth that the mode uses.
+fn framed_low(geometry: &Geometry, settings: &Settings, low: DVec3, high: DVec3) -> Result<DVec3, SceneError> {
+    let offset = depth_offset(geometry);
+    let volume = ("volume.start_depth", settings.volume.start_depth);
+    let surface = ("surface.start_depth", settings.surface.start_depth);
+    let starts = match settings.mode {
+        Mode::Volume => vec![volume],
+        Mode::Surface => vec![surface],
+        Mode::Mixed => vec![surface, volume],
+        Mode::Mip | Mode::MinIp | Mode::Mean => vec![("projection.start_depth", settings.projection.start_depth)],
+        Mode::Plane | Mode::Orthogonal | Mode::Tomography | Mode::Cube => vec![],
     };
-    if let Some(start) = start {
-        if !start.is_finite() || start + offset >= high.y {
+    for (field, start) in &starts {
+        if let Some(start) = start.filter(|s| !s.is_finite() || s + offset >= high.y) {
             return refuse(field, format!("{start} mm leaves nothing: the region ends at {:.2} mm", high.y - offset));
         }
-        low.y = low.y.max(start + offset);
     }
-    Ok((low, high))
+    let shallowest = starts.iter().map(|(_, start)| start.map_or(low.y, |s| low.y.max(s + offset))).reduce(f64::min);
+    Ok(low.with_y(shallowest.unwrap_or(low.y)))
 }

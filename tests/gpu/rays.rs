@@ -213,3 +213,32 @@ fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
     }
     assert!(partly >= 2);
 }
+
+/// Start depths belong to what they are said of: the surface's leaves the veil and the planes beside it whole.
+#[test]
+fn a_start_depth_cuts_only_what_it_belongs_to() {
+    let device = Device::new();
+    let body = |p: DVec3| if p.y < 3.0 { 0.8 } else { ((p.y - 7.0) / 0.8 + 0.5).clamp(0.1, 0.9) };
+    let toml = |more: &str| {
+        format!(
+            "picture = {{ size = [8, 8] }}\nray = {{ step = 0.2, early_end = 0.0 }}\nsurface = {{ threshold = 0.2, start_depth = 5.0 }}
+             volume = {{ {} }}\n{more}",
+            even(0.03)
+        )
+    };
+    let mixed = scene(block(20), FLOATS, &toml("mode = 'mixed'"));
+    let distance = slot(&device, &mixed, body, Slot::Distance).one(4, 4, 0);
+    let (origin, _) = mixed.rays.at(4.5, 4.5);
+    assert!(
+        (origin.y + distance - 7.0).abs() < 0.05,
+        "the wall above the start is no surface: {}",
+        origin.y + distance
+    );
+    let veil = slot(&device, &mixed, body, Slot::Veil).get([4, 4, 0])[3];
+    let expected = -(7.25 / 0.5 * (-0.03f64).ln_1p()).exp_m1();
+    assert!((veil - expected).abs() < 2e-3, "the veil begins at the region's top: {veil} for {expected}");
+    let four = scene(block(20), FLOATS, &toml("mode = 'sr'\nlayout = '4up'"));
+    // Upper left: lateral and depth. Its topmost row of the block shows the wall.
+    let planes = slot(&device, &four, body, Slot::Planes);
+    assert!(planes.get([1, 0, 0])[0] > 0.7, "{:?}", planes.get([1, 0, 0]));
+}

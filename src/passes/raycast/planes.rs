@@ -26,7 +26,7 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let [columns, rows] = s.tile_grid();
         // No ray is cast: a camera that moves leaves the planes as they are.
-        let params = ray::params(&unmoved(s), s.settings.planes.window);
+        let params = ray::params(&unmoved(s), s.whole_view(s.settings.planes.window));
         params.i32("columns", columns).i32("rows", rows)
     },
     constants: |s, _| {

@@ -18,7 +18,7 @@ pub const PASS: Pass = Pass {
     writes: |s, _| vec![whole("picture", chain::rendered(s))],
     extent: ray_extent,
     repeat: once,
-    params: |s, _| ray::params(s, s.settings.projection.window),
+    params: |s, _| ray::params(s, s.projection_view()),
     constants: |s, _| {
         let mut constants = ray::marching_constants(s);
         constants.push(("KEPT", kept(s)));
@@ -36,7 +36,7 @@ pub const PASS: Pass = Pass {
         let picture = writes.get_mut("picture");
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.settings.projection.window, x, y);
+                let ray = ray::Ray::cast(scene, volume, scene.projection_view(), x, y);
                 let value = projected(scene, &ray);
                 picture.set([x, y, 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
             }

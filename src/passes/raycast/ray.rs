@@ -3,7 +3,7 @@
 use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
-use crate::scene::{MAX_CLIPS, Sampling, Scene};
+use crate::scene::{MAX_CLIPS, Sampling, Scene, View};
 
 /// Picks the variant that has the tables this geometry needs, and no other.
 macro_rules! variant {
@@ -82,7 +82,8 @@ pub(super) fn marching_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     constants
 }
 
-pub(super) fn params(scene: &Scene, [window_low, window_high]: [f64; 2]) -> Params {
+pub(super) fn params(scene: &Scene, view: View) -> Params {
+    let [window_low, window_high] = view.window;
     let grid = &scene.grid;
     let mut clips = [[0.0; 4]; MAX_CLIPS];
     for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
@@ -96,7 +97,7 @@ pub(super) fn params(scene: &Scene, [window_low, window_high]: [f64; 2]) -> Para
         .vec4("clip_1", clip_1)
         .vec4("clip_2", clip_2)
         .vec4("clip_3", clip_3)
-        .vec3("box_low", scene.low)
+        .vec3("box_low", view.low)
         .vec3("box_high", scene.high)
         .f32("step_length", scene.step)
         .f32("window_low", window_low)
@@ -160,9 +161,9 @@ pub(super) struct Ray<'a> {
 }
 
 impl<'a> Ray<'a> {
-    pub fn cast(scene: &'a Scene, volume: &'a Texels, window: [f64; 2], x: usize, y: usize) -> Ray<'a> {
+    pub fn cast(scene: &'a Scene, volume: &'a Texels, view: View, x: usize, y: usize) -> Ray<'a> {
         let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-        let (enter, leave) = span(scene, origin, direction);
+        let (enter, leave) = span(scene, view, origin, direction);
         let sideways = scene.rays.origin_dx + scene.rays.direction_dx;
         let across = sideways.reject_from_normalized(direction).normalize();
         let (wider, widening) = match scene.spreads() && leave > enter {
@@ -173,7 +174,7 @@ impl<'a> Ray<'a> {
             false => (1.0, 0.0),
         };
         let across = [across, across.cross(direction)];
-        Ray { scene, volume, window, origin, direction, across, enter, leave, wider, widening }
+        Ray { scene, volume, window: view.window, origin, direction, across, enter, leave, wider, widening }
     }
 
     pub fn path(&self) -> f64 {
@@ -260,10 +261,10 @@ fn spread_range(probe: &Probe) -> f64 {
 }
 
 /// Where a ray enters and leaves what is rendered, mm; leave < enter is a miss.
-pub(super) fn span(scene: &Scene, origin: DVec3, direction: DVec3) -> (f64, f64) {
+fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
-        let (low, high) = (scene.low[axis] - origin[axis], scene.high[axis] - origin[axis]);
+        let (low, high) = (view.low[axis] - origin[axis], scene.high[axis] - origin[axis]);
         if direction[axis] == 0.0 {
             if low > 0.0 || high < 0.0 {
                 return (0.0, -1.0);

@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let surface = &s.settings.surface;
-        ray::params(s, surface.window)
+        ray::params(s, s.surface_view())
             .f32("threshold", surface.threshold)
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
@@ -49,7 +49,7 @@ pub const PASS: Pass = Pass {
         let size = writes.get("distance_map").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.settings.surface.window, x, y);
+                let ray = ray::Ray::cast(scene, volume, scene.surface_view(), x, y);
                 let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
                 // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
                 let half = i64::from(RING / 2 * scene.settings.surface.rough);

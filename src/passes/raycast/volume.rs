@@ -34,7 +34,7 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let volume = &s.settings.volume;
         let (axis, near) = depth_axis(s);
-        ray::params(s, volume.window)
+        ray::params(s, s.volume_view())
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
             .f32("hit_opacity", volume.hit)
@@ -69,7 +69,7 @@ pub const PASS: Pass = Pass {
         let size = writes.get("picture").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let mut ray = ray::Ray::cast(scene, volume, scene.settings.volume.window, x, y);
+                let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), x, y);
                 if kind(scene) == Kind::Veil {
                     ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
                 }
@@ -110,8 +110,9 @@ pub fn reference_length(scene: &Scene) -> f64 {
 /// its farthest.
 fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     let forward = scene.rays.forward;
-    let middle = (scene.low + scene.high) / 2.0;
-    let half = forward.abs().dot((scene.high - scene.low) / 2.0).max(1e-9);
+    let low = scene.volume_view().low;
+    let middle = (low + scene.high) / 2.0;
+    let half = forward.abs().dot((scene.high - low) / 2.0).max(1e-9);
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 
