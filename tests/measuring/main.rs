@@ -1,5 +1,6 @@
 //! What `echolume profile` and `echolume report` measure, on a device. A binary of its own: cargo runs it when nothing else runs.
 
+mod commands;
 mod error;
 mod profile;
 mod scenes;
