@@ -22,6 +22,7 @@ mod planes;
 mod rays;
 mod recordings;
 mod reruns;
+mod scenes;
 mod sector;
 mod shading;
 mod tiles;
