@@ -3,3 +3,4 @@
 pub mod ceilings;
 pub mod machine;
 pub mod profile;
+pub mod tables;

@@ -2,3 +2,4 @@
 
 mod profile;
 mod scenes;
+mod tables;
