@@ -9,6 +9,7 @@ mod profile;
 mod render;
 mod report;
 mod report_error;
+mod report_tables;
 
 use clap::{Parser, Subcommand};
 use std::io::{ErrorKind, Write};

@@ -5,3 +5,4 @@ pub mod dials;
 pub mod error;
 pub mod machine;
 pub mod profile;
+pub mod tables;

@@ -5,5 +5,6 @@ pub mod dump;
 pub mod growth;
 pub mod profile;
 pub mod regions;
+pub mod tables;
 pub mod times;
 pub mod whole;

@@ -4,3 +4,4 @@ mod commands;
 mod error;
 mod profile;
 mod scenes;
+mod tables;

@@ -1,0 +1,100 @@
+//! `echolume report tables`.
+
+use super::{Failure, failed, input, say};
+use echolume::gpu::Choice;
+use echolume::measuring::tables::{Asked, growth, run};
+use echolume::picture::grey::Grey;
+use echolume::picture::{check_target, replace};
+use echolume::report::tables::{csv, markdown};
+use std::path::{Path, PathBuf};
+
+/// Volumes rendered in each row before times count: they compile shaders and wake clocks.
+const WARM_UP: usize = 1;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Thesis Tables 3-6: time of a picture in surface mode over frames a volume, volume size, 3D filter and 2D \
+                        filter, each row under the thesis' conditions. Pictures add Tables 7-9: how far the windows of the \
+                        enhanced sigma filter grow on them.\n\nExamples:\n  \
+                        echolume report tables --markdown tables.md --csv tables.csv\n  \
+                        echolume report tables scan.png --quick --repeat 3"
+)]
+pub struct Tables {
+    /// PNG, JPEG, PNM or BMP for Tables 7-9
+    pictures: Vec<PathBuf>,
+    /// Volumes measured in each row
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+    /// Write the tables to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Write Tables 3-6 to this file, too, and Tables 7-9 to NAME.growth.csv beside it
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Volumes of a quarter of the edge and frames of 64 lines, to try
+    #[arg(long)]
+    quick: bool,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<Choice>,
+}
+
+impl Tables {
+    pub fn run(&self) -> Result<(), Failure> {
+        let growth_file =
+            self.csv.as_ref().filter(|_| !self.pictures.is_empty()).map(|f| f.with_extension("growth.csv"));
+        self.check_targets(growth_file.as_deref())?;
+        let greys: Vec<Grey> =
+            self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
+        let context = super::asked::open_device(self.device.clone(), false)?;
+
+        let asked = Asked { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
+        let bar = indicatif::ProgressBar::new(asked.volumes() as u64).with_message("volumes");
+        let report = run(&context, &asked, &mut || bar.inc(1));
+        bar.finish_and_clear();
+        let mut report = report.map_err(failed)?;
+        for (file, grey) in self.pictures.iter().zip(&greys) {
+            let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+            let fault = |e| failed(format!("{}: {e}", file.display()));
+            report.grown.push(growth(&context, &name, grey).map_err(fault)?);
+        }
+
+        let written = markdown::markdown(&report);
+        match &self.markdown {
+            None => say!("{}", written.trim_end()),
+            Some(file) => write(file, &written)?,
+        }
+        if let Some(file) = &self.csv {
+            write(file, &csv::tables(&report))?;
+        }
+        match growth_file {
+            Some(file) => write(&file, &csv::growth(&report.grown)),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses to write over what is read, or twice to one place, before any work is done.
+    fn check_targets(&self, growth_file: Option<&Path>) -> Result<(), Failure> {
+        let there = |file: &Path| file.canonicalize().ok();
+        let same = |a: &Path, b: &Path| a == b || there(a).is_some_and(|a| there(b) == Some(a));
+        let targets =
+            [("--markdown", self.markdown.as_deref()), ("--csv", self.csv.as_deref()), ("--csv", growth_file)];
+        let targets: Vec<(&str, &Path)> = targets.into_iter().filter_map(|(flag, file)| Some((flag, file?))).collect();
+        for (n, (flag, file)) in targets.iter().enumerate() {
+            check_target(file).map_err(failed)?;
+            if self.pictures.iter().any(|picture| same(picture, file)) {
+                return Err(input(format!("{flag} {}: would replace a picture that is read", file.display())));
+            }
+            if targets[..n].iter().any(|(_, before)| same(before, file)) {
+                return Err(input(format!("{flag} {}: is written by another flag", file.display())));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write(file: &Path, text: &str) -> Result<(), Failure> {
+    replace(file, text.as_bytes()).map_err(failed)?;
+    say!("written: {}", file.display());
+    Ok(())
+}
