@@ -1,5 +1,6 @@
 //! `echolume profile` and `echolume report error` as a user meets them.
 
+use crate::scenes::alone;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -40,6 +41,7 @@ fn at(folder: &Path, name: &str) -> String {
 
 #[test]
 fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
+    let _alone = alone();
     let folder = folder("profile");
     let (json, csv, trace) = (at(&folder, "a.json"), at(&folder, "a.csv"), at(&folder, "trace.json"));
     let files = ["--json", &json, "--csv", &csv, "--trace", &trace];
@@ -79,6 +81,7 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
 
 #[test]
 fn a_report_is_written_plotted_and_advises() {
+    let _alone = alone();
     let folder = folder("report");
     let (dir, json) = (at(&folder, "out"), at(&folder, "out/error.json"));
     let dials = ["--dial", "step", "--dial", "format", "--repeat", "2", "--mode", "vr", "--set=ray.step=0.5"];

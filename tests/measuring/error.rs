@@ -45,6 +45,7 @@ fn report(more: &[&str], names: &[&str], held: Held) -> Report {
 
 #[test]
 fn errors_fall_with_the_step_down_to_the_devices_floor() {
+    let _alone = alone();
     let report = report(&[], &["step"], Held::F64);
     let dial = &report.dials[0];
     let mut points: Vec<_> = dial.points.iter().map(|p| (p.value, p.errors.rmse)).collect();
@@ -61,6 +62,7 @@ fn errors_fall_with_the_step_down_to_the_devices_floor() {
 /// A picture of the device's own as reference says how far it is from where it would go.
 #[test]
 fn a_converged_reference_tells_its_own_error() {
+    let _alone = alone();
     let report = report(&[], &["rays", "lut", "adaptive"], Held::Converged);
     for dial in &report.dials {
         let Reference::Converged { set, rmse } = &dial.reference else { panic!("{} is held against f64", dial.name) };
@@ -76,6 +78,7 @@ fn a_converged_reference_tells_its_own_error() {
 /// Settings chosen from the sweep of one scene, tried on another camera and transfer function, against f64.
 #[test]
 fn the_chosen_settings_hold_on_a_scene_that_the_sweep_did_not_contain() {
+    let _alone = alone();
     let swept = report(&[], &["step", "format", "termination"], Held::F64);
     let limit = 0.01;
     let choice = choose::cheapest_under(&swept, Measure::Rmse, limit, 0.25).expect("a choice");

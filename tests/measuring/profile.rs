@@ -17,8 +17,9 @@ fn asked(repeats: usize) -> Asked {
 
 #[test]
 fn a_slow_pass_is_found_and_no_other() {
+    let _alone = alone();
     let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
-    slow.faults.slow_down("median_distance", 3);
+    slow.faults.slow_down("median_distance", 6);
     let mut old = Run::new(&quick, &scene, &asked(18)).expect("run");
     let mut new = Run::new(&slow, &scene, &asked(18)).expect("run");
     while old.wants_more() {
@@ -42,6 +43,7 @@ fn a_slow_pass_is_found_and_no_other() {
 /// 40 pairs of runs of the same, in turns: at most 5 % of them may be called different in any line.
 #[test]
 fn identical_runs_are_hardly_ever_called_different() {
+    let _alone = alone();
     let (context, frames, scene) = (device(), frames(), scene(SETTINGS));
     let mut different = Vec::new();
     for pair in 0..40 {
@@ -64,6 +66,7 @@ fn identical_runs_are_hardly_ever_called_different() {
 /// What is written down is what was measured, whole and on one clock.
 #[test]
 fn a_profile_adds_up_and_survives_being_written() {
+    let _alone = alone();
     let context = device();
     let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
     profile.check().expect("consistent");

@@ -4,7 +4,13 @@ use echolume::gpu::{Choice, Context, ContextOptions};
 use echolume::probe::{Advance, Array, Axis, Geometry, Indices, Motion, Probe};
 use echolume::scene::{Input, Scene, Settings};
 use echolume::source::{Frame, StoredType};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What is timed here shares the machine with nothing else of this binary: every test holds this while it runs.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 pub fn device() -> Arc<Context> {
     Context::new(&ContextOptions { device: Choice::Best, validation: false }).expect("a device")

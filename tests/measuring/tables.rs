@@ -1,5 +1,6 @@
 //! The thesis' tables: scenes of exactly the stated sizes and passes, a surface where the body has one, and all rows run.
 
+use crate::scenes::alone;
 use crate::scenes::device;
 use echolume::gpu::{Options, Renderer};
 use echolume::measuring::tables::sweep::{BALL_RADIUS, frames, surface_depth};
@@ -26,6 +27,7 @@ fn constant(plan: &Plan, scene: &Scene, pass: &str, name: &str) -> i32 {
 
 #[test]
 fn scenes_have_exactly_the_stated_sizes_and_passes() {
+    let _alone = alone();
     for quick in [false, true] {
         for row in tables(quick).into_iter().flat_map(|t| t.rows) {
             let c = row.conditions;
@@ -70,6 +72,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
 /// of the edge.
 #[test]
 fn rays_meet_the_surface_where_the_body_has_it() {
+    let _alone = alone();
     for filter_3d in [Filter3d::None, Filter3d::Sliding(3), Filter3d::Kept(3)] {
         let conditions = Conditions { filter_3d, ..Conditions::usual(true) };
         let scene = scene(&conditions).expect("scene");
@@ -103,6 +106,7 @@ fn rays_meet_the_surface_where_the_body_has_it() {
 
 #[test]
 fn a_quick_run_fills_every_row() {
+    let _alone = alone();
     let context = device();
     let asked = Asked { quick: true, repeats: 2, warm_up: 1 };
     let mut volumes = 0;
@@ -123,6 +127,7 @@ fn a_quick_run_fills_every_row() {
 
 #[test]
 fn growth_is_the_reference_s() {
+    let _alone = alone();
     // A noisy edge of 40 x 32.
     let value = |x: u32, y: u32| (if x + y / 4 < 22 { 70 } else { 150 }) + ((x * 7919 + y * 104_729) % 61) as u16;
     let values = (0..32).flat_map(|y| (0..40).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
