@@ -62,7 +62,7 @@ enum Command {
     Filter(Box<filter::Filter>),
     /// Say where the time goes, pass by pass, and compare two such runs
     Profile(Box<profile::Profile>),
-    /// Report error against run time, dial by dial
+    /// Report error against run time, dial by dial, or the thesis' tables of times
     Report(report::Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(phantom::MakePhantom),
