@@ -2,19 +2,16 @@
 
 use super::{Failure, failed, input, say};
 use echolume::gpu::{Choice, Context, Options, Renderer};
+use echolume::measuring::growth::{Row, measure, scene};
 use echolume::passes::{Slot, Texels};
 use echolume::picture::{self, grey::Grey};
-use echolume::report::growth::{self, Growth};
+use echolume::report::growth;
 use echolume::report::regions::{self, Region};
 use echolume::report::times;
+use echolume::scene::Settings;
 use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene, Settings};
-use echolume::source::{Geometry, Grid, StoredType};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// One row of the growth table: sigma, starting and largest window, and the settings that make it.
-type Row = (f64, [u32; 2], Settings);
 
 /// A filter of stage 1 under the name that the command line gives it.
 struct Known {
@@ -109,7 +106,7 @@ impl Filter {
         let grey = Grey::load(&self.image).map_err(input)?;
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
-        let scene = scene(&grey, settings)?;
+        let scene = scene(&grey, settings).map_err(input)?;
         self.check_targets()?;
 
         let context = super::asked::open_device(self.device.clone(), self.validate)?;
@@ -232,21 +229,8 @@ impl Filter {
         .collect()
     }
 
-    /// One picture through the filter for every row; only the filter changes in between.
     fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<Row>) -> Result<(), Failure> {
-        let (mut rows, mut renderer) = (Vec::new(), None);
-        for (sigma, windows, settings) in asked {
-            let scene = scene(grey, settings)?;
-            let renderer = match &mut renderer {
-                None => renderer.insert(Renderer::new(context, scene, &Options::default()).map_err(failed)?),
-                Some(there) => {
-                    there.change(scene).map_err(failed)?;
-                    there
-                }
-            };
-            renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
-            rows.push(Growth::new(sigma, windows, &read(renderer, Slot::Growth)?.values));
-        }
+        let rows = measure(context, grey, asked).map_err(failed)?;
         say!("{}", growth::table(&rows).trim_end());
         if let Some(csv) = &self.csv {
             picture::replace(csv, growth::csv(&rows).as_bytes()).map_err(failed)?;
@@ -254,13 +238,6 @@ impl Filter {
         }
         Ok(())
     }
-}
-
-/// The picture as a Cartesian volume of one slice.
-fn scene(grey: &Grey, settings: Settings) -> Result<Scene, Failure> {
-    let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
-    let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
-    Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings).map_err(input)
 }
 
 fn read(renderer: &mut Renderer, slot: Slot) -> Result<Texels, Failure> {

@@ -1,6 +1,9 @@
 //! The four stages on one device: frames in, pictures out. Each frame takes a lane of a ring (staging buffer, layer of the
 //! frame array, command buffer), so that several are on their way at once; a picture re-runs what changed and nothing else.
 
+mod change;
+mod inspect;
+
 use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
@@ -264,88 +267,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Takes a new scene. What it changes is run with the next picture; when it says `Everything` or `Frames`, frames have to
-    /// be sent again first.
-    ///
-    /// # Errors
-    /// A shader that does not compile or a slot that the device cannot hold at all leaves the old scene as it was. When memory
-    /// runs out half-way nothing can be drawn until another change succeeds; that one builds everything anew.
-    pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
-        let plan = Plan::new(&scene);
-        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&self.scene, &scene) };
-        super::formats::check(&self.context, &plan, &scene)?;
-        let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
-        self.collect()?;
-        let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
-        self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
-        (self.plan, self.steps, self.scene) = (plan, steps, scene);
-        self.broken = None;
-        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
-        Ok(rerun)
-    }
-
-    fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
-        let refilled = match rerun {
-            Rerun::Steps { steps, slots } => {
-                steps.iter().for_each(|i| self.stale[*i] = true);
-                if steps.iter().any(|i| self.plan.steps[*i].pass.when == When::Volume) {
-                    self.forget_volumes();
-                }
-                slots.clone()
-            }
-            Rerun::Frames | Rerun::Everything => {
-                self.stale.iter_mut().for_each(|stale| *stale = true);
-                self.forget_volumes();
-                if *rerun == Rerun::Everything {
-                    self.slots.clear();
-                    self.lanes = lanes(&self.context, &self.scene, self.spans)?;
-                    self.next_lane = 0;
-                }
-                self.plan.slots.clone()
-            }
-        };
-        self.fit()?;
-        for slot in refilled {
-            self.fill(slot)?;
-        }
-        if self.readback.size != Slot::Screen.bytes(&self.scene) {
-            self.readback = readback(&self.context, &self.scene)?;
-        }
-        Ok(())
-    }
-
-    /// A slot's content now; none for a slot that the plan does not have, or one made by the CPU as a table.
-    pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
-        self.check(self.shown)?;
-        let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
-        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
-        let (format, size) = (image.format, size_of(image.shape));
-        let copy = if slot.takes_turns() { self.shown } else { 0 };
-        self.picture.collect(&self.timeline, &mut self.measured)?;
-        self.picture.begin(&mut self.order, &self.timeline)?;
-        self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);
-        self.picture.submit(&mut self.timeline)?;
-        let done = self.timeline.wait_all();
-        if done.is_err() {
-            // The copy may still be running.
-            self.uploads.push(buffer);
-            return done.map(|()| None);
-        }
-        Ok(Some(Texels::decode(size, format, buffer.bytes())))
-    }
-
-    /// Times of every pass since the last call, and of what was copied. Empty where the device has no time stamps.
-    pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
-        self.collect()?;
-        Ok(self.measured.take_times())
-    }
-
-    /// Every span since the last call, if they are kept, on the host's clock.
-    pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
-        self.collect()?;
-        Ok(self.measured.take_spans())
-    }
-
     /// Waits until the device has done everything, and adds up what was measured.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.timeline.wait_all()?;
@@ -353,35 +274,6 @@ impl Renderer {
             lane.recorder.collect(&self.timeline, &mut self.measured)?;
         }
         self.picture.collect(&self.timeline, &mut self.measured)
-    }
-
-    /// Names of the passes that `work` dispatched, in order.
-    pub fn dispatched<T>(
-        &mut self,
-        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
-    ) -> Result<Vec<&'static str>, GpuError> {
-        Ok(self.recorded(work)?.into_iter().map(|(name, _)| name).collect())
-    }
-
-    /// The same, with how many invocations each had along each axis.
-    pub fn recorded<T>(
-        &mut self,
-        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
-    ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
-        self.order.dispatched = Some(Vec::new());
-        let done = work(self);
-        let dispatched = self.order.dispatched.take().unwrap_or_default();
-        done.map(|_| dispatched)
-    }
-
-    /// Barriers recorded so far.
-    pub fn barriers(&self) -> u32 {
-        self.order.barriers
-    }
-
-    /// Leaves out the n-th barrier from here on (1: the first ever recorded), to show that validation notices.
-    pub fn drop_barrier(&mut self, n: u32) {
-        self.order.drop_barrier = Some(n);
     }
 }
 

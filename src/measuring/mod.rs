@@ -3,6 +3,7 @@
 pub mod ceilings;
 pub mod dials;
 pub mod error;
+pub mod growth;
 pub mod machine;
 pub mod profile;
 pub mod tables;

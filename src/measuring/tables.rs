@@ -3,16 +3,17 @@
 
 pub mod sweep;
 
+use super::growth::Fault;
 use super::machine;
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
 use crate::picture::grey::Grey;
-use crate::report::growth::{self, Growth};
+use crate::report::growth;
 use crate::report::tables::{Conditions, DEPTH, Filter3d, Grown, Reached, Report, Row, Table, tables};
 use crate::scene::{
     EnhancedSigma, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth, VolumeFormat,
 };
-use crate::source::{Frame, Geometry, Grid, StoredType};
+use crate::source::{Frame, Geometry, StoredType};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -159,40 +160,19 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
 /// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).
 ///
 /// # Errors
-/// A picture that the device cannot hold.
-pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, GpuError> {
-    let mut rows = Vec::new();
-    let mut renderer: Option<Renderer> = None;
-    for sigma in growth::SIGMAS {
-        for windows in growth::WINDOWS {
-            let scene = growth_scene(grey, sigma, windows).map_err(|e| broken(&e))?;
-            let renderer = match &mut renderer {
-                None => renderer.insert(Renderer::new(context, scene, &Options::default())?),
-                Some(there) => {
-                    there.change(scene)?;
-                    there
-                }
-            };
-            renderer.frame(0, &grey.bytes(), 0)?;
-            let rings = renderer.read(Slot::Growth)?;
-            let rings = rings.ok_or_else(|| GpuError::Broken("slot 'growth' is not in the plan".into()))?;
-            rows.push(Growth::new(sigma, windows, &rings.values));
-        }
-    }
+/// Windows beyond what is filtered; a picture that the device cannot hold.
+pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, Fault> {
+    let windows = |sigma: f64| growth::WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
+    let rows = super::growth::measure(context, grey, growth::SIGMAS.into_iter().flat_map(windows).collect())?;
     Ok(Grown { picture: picture.into(), rows })
 }
 
-/// The picture as a Cartesian volume of one slice, filtered.
-///
-/// # Errors
-/// Windows beyond what is filtered.
-pub fn growth_scene(grey: &Grey, sigma: f64, [window, largest]: [u32; 2]) -> Result<Scene, SceneError> {
+/// A row of Tables 7-9.
+pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
     let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
     settings.picture.size = [1, 1];
     settings.slices.format = VolumeFormat::R32f;
     settings.slices.enhanced_sigma =
         Some(EnhancedSigma { window, largest, sigma, growth: true, ..EnhancedSigma::default() });
-    let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
-    let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
-    Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings)
+    settings
 }

@@ -4,7 +4,7 @@ use crate::scenes::alone;
 use crate::scenes::device;
 use echolume::gpu::{Options, Renderer};
 use echolume::measuring::tables::sweep::{BALL_RADIUS, frames, surface_depth};
-use echolume::measuring::tables::{Asked, growth, growth_scene, run, scene};
+use echolume::measuring::tables::{Asked, growth, growth_settings, run, scene};
 use echolume::passes::{Slot, Stage, Texels, Turn, is_hit};
 use echolume::picture::grey::Grey;
 use echolume::plan::Plan;
@@ -139,7 +139,7 @@ fn growth_is_the_reference_s() {
     assert!(WINDOWS.iter().flatten().all(|w| *w <= MAX_WINDOW));
     let frame = Texels { size: [40, 32, 1], channels: 1, values: grey.shares() };
     for row in &grown.rows {
-        let scene = growth_scene(&grey, row.sigma, row.windows).expect("scene");
+        let scene = echolume::measuring::growth::scene(&grey, growth_settings(row.sigma, row.windows)).expect("scene");
         let slots = whole::render(&scene, std::slice::from_ref(&frame));
         let reference = Growth::new(row.sigma, row.windows, &slots[&Slot::Growth].values);
         // A pixel whose count is decided by rounding may stop a ring earlier or later.

@@ -1,0 +1,55 @@
+//! Another scene: what differs is made anew, the rest stays.
+
+use super::*;
+
+impl Renderer {
+    /// Takes a new scene. What it changes is run with the next picture; when it says `Everything` or `Frames`, frames have to
+    /// be sent again first.
+    ///
+    /// # Errors
+    /// A shader that does not compile or a slot that the device cannot hold at all leaves the old scene as it was. When memory
+    /// runs out half-way nothing can be drawn until another change succeeds; that one builds everything anew.
+    pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
+        let plan = Plan::new(&scene);
+        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&self.scene, &scene) };
+        super::super::formats::check(&self.context, &plan, &scene)?;
+        let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
+        self.collect()?;
+        let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
+        self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
+        (self.plan, self.steps, self.scene) = (plan, steps, scene);
+        self.broken = None;
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
+    fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
+        let refilled = match rerun {
+            Rerun::Steps { steps, slots } => {
+                steps.iter().for_each(|i| self.stale[*i] = true);
+                if steps.iter().any(|i| self.plan.steps[*i].pass.when == When::Volume) {
+                    self.forget_volumes();
+                }
+                slots.clone()
+            }
+            Rerun::Frames | Rerun::Everything => {
+                self.stale.iter_mut().for_each(|stale| *stale = true);
+                self.forget_volumes();
+                if *rerun == Rerun::Everything {
+                    self.slots.clear();
+                    self.lanes = lanes(&self.context, &self.scene, self.spans)?;
+                    self.next_lane = 0;
+                }
+                self.plan.slots.clone()
+            }
+        };
+        self.fit()?;
+        for slot in refilled {
+            self.fill(slot)?;
+        }
+        if self.readback.size != Slot::Screen.bytes(&self.scene) {
+            self.readback = readback(&self.context, &self.scene)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,66 @@
+//! What a renderer holds, did, and how long it took.
+
+use super::*;
+
+impl Renderer {
+    /// A slot's content now; none for a slot that the plan does not have, or one made by the CPU as a table.
+    pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
+        self.check(self.shown)?;
+        let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
+        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
+        let (format, size) = (image.format, size_of(image.shape));
+        let copy = if slot.takes_turns() { self.shown } else { 0 };
+        self.picture.collect(&self.timeline, &mut self.measured)?;
+        self.picture.begin(&mut self.order, &self.timeline)?;
+        self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);
+        self.picture.submit(&mut self.timeline)?;
+        let done = self.timeline.wait_all();
+        if done.is_err() {
+            // The copy may still be running.
+            self.uploads.push(buffer);
+            return done.map(|()| None);
+        }
+        Ok(Some(Texels::decode(size, format, buffer.bytes())))
+    }
+
+    /// Times of every pass since the last call, and of what was copied. Empty where the device has no time stamps.
+    pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
+        self.collect()?;
+        Ok(self.measured.take_times())
+    }
+
+    /// Every span since the last call, if they are kept, on the host's clock.
+    pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
+        self.collect()?;
+        Ok(self.measured.take_spans())
+    }
+
+    /// Names of the passes that `work` dispatched, in order.
+    pub fn dispatched<T>(
+        &mut self,
+        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
+    ) -> Result<Vec<&'static str>, GpuError> {
+        Ok(self.recorded(work)?.into_iter().map(|(name, _)| name).collect())
+    }
+
+    /// The same, with how many invocations each had along each axis.
+    pub fn recorded<T>(
+        &mut self,
+        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
+    ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
+        self.order.dispatched = Some(Vec::new());
+        let done = work(self);
+        let dispatched = self.order.dispatched.take().unwrap_or_default();
+        done.map(|_| dispatched)
+    }
+
+    /// Barriers recorded so far.
+    pub fn barriers(&self) -> u32 {
+        self.order.barriers
+    }
+
+    /// Leaves out the n-th barrier from here on (1: the first ever recorded), to show that validation notices.
+    pub fn drop_barrier(&mut self, n: u32) {
+        self.order.drop_barrier = Some(n);
+    }
+}
