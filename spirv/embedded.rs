@@ -90,4 +90,9 @@
     ("shade/light.composited_shadowed_occluded", include_bytes!("shade/light.composited_shadowed_occluded.spv")),
     ("shade/occlusion", include_bytes!("shade/occlusion.spv")),
     ("shade/shadow", include_bytes!("shade/shadow.spv")),
+    ("skip/brick_ranges.plain", include_bytes!("skip/brick_ranges.plain.spv")),
+    ("skip/classify.plain", include_bytes!("skip/classify.plain.spv")),
+    ("skip/classify.transparent", include_bytes!("skip/classify.transparent.spv")),
+    ("skip/leap.plain", include_bytes!("skip/leap.plain.spv")),
+    ("skip/tile_ranges.plain", include_bytes!("skip/tile_ranges.plain.spv")),
 ]

@@ -74,7 +74,7 @@ impl Access {
             return false;
         }
         let overlap = self.parts.start < later.parts.end && later.parts.start < self.parts.end;
-        let is_volume = matches!(self.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume, _));
+        let is_volume = matches!(self.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume | Slot::TileRanges, _));
         overlap || (is_volume && self.write != later.write)
     }
 }

@@ -106,8 +106,9 @@ impl Plan {
     /// steps are compared by their numbers, structure and slots, and what reads a changed slot changes too.
     pub fn rerun(&self, old: &Scene, new: &Scene) -> Rerun {
         let before = Plan::new(old);
+        // What frames leave behind; whatever follows from a volume can be made again from it.
         let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
-            let slots = plan.steps.iter().filter(|s| s.pass.when != When::Picture).flat_map(|s| s.slots(scene));
+            let slots = plan.steps.iter().filter(|s| s.pass.when == When::Frame).flat_map(|s| s.slots(scene));
             slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
         };
         if stored(&before, old) != stored(self, new) || old.geometry != new.geometry || old.input != new.input {
@@ -219,9 +220,10 @@ impl Step {
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Filled::ByScene(make) = slot.filled() else { return false };
     match slot {
-        Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block => return make(old) != make(new),
+        Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
         // Follows from the other, which is shorter.
         Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
+        Slot::BrickTable => return old.geometry != new.geometry || old.brick_basis() != new.brick_basis(),
         _ => {}
     }
     // The rest follow from the geometry, and their content is too long to compare.

@@ -9,6 +9,8 @@
     vec4 clip_1;
     vec4 clip_2;
     vec4 clip_3;
+    vec3 brick_low;     // corner of the first brick, mm
+    vec3 brick_density; // bricks a mm
     float window_low;
     float window_scale;
     // Space to texture.

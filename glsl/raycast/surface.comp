@@ -11,10 +11,12 @@ layout(scalar) uniform Params {
     float rough_threshold;
     float polarity; // +1 bright tissue in dark fluid, -1 a dark cavity
     float noise;    // deviations of the noise that an edge stands out by
+    float silence;  // samples that do not exceed it cannot fire the detector
 };
 #include "ray.glsl"
 #include "sliding.glsl"
 #include "detector.glsl"
+#include "skip.glsl"
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
@@ -30,14 +32,41 @@ void main() {
 
     Slices slices = no_slices();
     segment = first;
-    for (int i = first; i < end || look_again(i);) {
-        vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT));
-        vec3 texel;
-        if (!locate(p, texel)) {
-            if (!skip_sample(i)) break;
-            continue;
+    bool goes_on = true;
+    for (int i = first; goes_on && (i < end || look_again(i));) {
+        int stop = end;
+        if (SKIP == 1) {
+            Stretch here = stretch_at(ray, i, SAMPLE_AT);
+            while (here.kind == NOTHING && state == START && !again && i < end) {
+                // As if each sample had been found to lie outside.
+                i += (here.stop - i + ROUGH - 1) / ROUGH * ROUGH;
+                restart(i);
+                here = stretch_at(ray, i, SAMPLE_AT);
+            }
+            stop = min(here.stop, end);
+            if (here.kind == KNOWN && DETECTOR == 0 && state == START && !again) {
+                vec4 most = max(older, newer);
+                bool calm = filled >= RING && max(max(most.x, most.y), max(most.z, most.w)) <= silence;
+                // The ring is filled anew with the last samples of the stretch: what follows finds it as it would have been.
+                int steps = (stop - i + stride - 1) / stride, left = stop == end ? 0 : RING;
+                if (calm && steps > left) {
+                    i += (steps - left) * stride;
+                    filled = 0;
+                }
+                if (!calm) stop = min(stop, i + RING * stride);
+            }
         }
-        if (!take_sample(sample_along(ray, i, SAMPLE_AT, texel, slices), i)) break;
+        while (i < stop) {
+            vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT));
+            vec3 texel;
+            if (locate(p, texel)) {
+                float value = sample_along(ray, i, SAMPLE_AT, texel, slices);
+                goes_on = take_sample(value, i);
+            } else {
+                goes_on = skip_sample(i);
+            }
+            if (!goes_on) break;
+        }
     }
     // The ray ended before the second look was through: nothing says that this edge lasts.
     if (again && seen < NUMBER) found = false;

@@ -20,6 +20,7 @@ layout(scalar) uniform Params {
 };
 #include "ray.glsl"
 #include "sliding.glsl"
+#include "skip.glsl"
 // Colour and absorption at a sample value; pre-integrated: their mean between two values, a row for each front value.
 readonly buffer TransferTable { vec4 entry[]; } transfer;
 uniform writeonly image2D picture;
@@ -75,39 +76,65 @@ void main() {
         }
         // One more than there are, where their number comes from a logarithm.
         int whole = int(steps_to(ray, path)) + SPREAD;
-        for (int i = 0; i <= whole; ++i) {
-            // Midpoints of the steps, or their ends; the last step is as long as what is left.
-            float from = offset_of(ray, float(i));
-            float length = min(length_of(ray, float(i)), path - from);
-            vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
-            vec3 texel;
-            if (length <= 0.0) continue;
-            bool inside = locate(p, texel);
-            vec4 entry;
-            if (COMPOSITING == 2) {
-                float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
-                bool both = inside && front_inside;
-                entry = looked_up_between(front, back);
-                front = back;
-                front_inside = inside;
-                if (!both) continue;
-            } else {
-                if (!inside) continue;
-                entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
+        // The last steps are not what their numbers say: they are taken in any case.
+        int last = whole - 1 - SPREAD;
+        for (int i = 0; i <= whole;) {
+            int stop = whole + 1;
+            bool known = false;
+            if (SKIP == 1) {
+                const float place = COMPOSITING == 2 ? 1.0 : SAMPLE_AT;
+                Stretch here = stretch_at(ray, i, place);
+                int to = i;
+                while (here.kind == NOTHING && to < last) {
+                    to = min(here.stop, last);
+                    here = stretch_at(ray, to, place);
+                }
+                if (to < last) stop = here.stop;
+                if (COMPOSITING != 2) {
+                    i = to;
+                } else if (to > i) {
+                    // A step sees the sample in front of it, too: the first one behind what is seen is taken, the last one fetches
+                    // the front of what follows.
+                    known = front_inside;
+                    if (known) stop = i + 1;
+                    else i = to - 1;
+                }
             }
-            float y = entry.a * absorption_scale * (length / step_length);
-            float a = COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
-            if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
-            float before = opacity;
-            colour += (1.0 - opacity) * a * entry.rgb;
-            opacity += (1.0 - opacity) * a;
+            for (; i < stop; ++i) {
+                // Midpoints of the steps, or their ends; the last step is as long as what is left.
+                float from = offset_of(ray, float(i));
+                float length = min(length_of(ray, float(i)), path - from);
+                vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
+                vec3 texel;
+                if (length <= 0.0) continue;
+                bool inside = locate(p, texel);
+                vec4 entry;
+                if (COMPOSITING == 2) {
+                    float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
+                    bool both = inside && front_inside;
+                    entry = looked_up_between(front, back);
+                    front = back;
+                    front_inside = inside;
+                    if (!both) continue;
+                } else {
+                    if (!inside) continue;
+                    entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
+                }
+                float y = entry.a * absorption_scale * (length / step_length);
+                float a = COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+                if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
+                float before = opacity;
+                colour += (1.0 - opacity) * a * entry.rgb;
+                opacity += (1.0 - opacity) * a;
 #ifdef HIT
-            // Between two samples in proportion, so that the surface has no terraces.
-            if (hit == MISS && opacity >= hit_opacity) {
-                hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
-            }
+                // Between two samples in proportion, so that the surface has no terraces.
+                if (hit == MISS && opacity >= hit_opacity) {
+                    hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
+                }
 #endif
-            if (EARLY_END == 1 && opacity >= opaque_enough) break;
+                if (EARLY_END == 1 && opacity >= opaque_enough) whole = stop = -1;
+            }
+            if (known) front_inside = false;
         }
     }
     imageStore(picture, pixel, vec4(colour, opacity));

@@ -13,6 +13,7 @@ pub fn vulkan(format: Format) -> vk::Format {
         Format::R16 => vk::Format::R16_UNORM,
         Format::R16f => vk::Format::R16_SFLOAT,
         Format::R32f | Format::Floats => vk::Format::R32_SFLOAT,
+        Format::Rg16 => vk::Format::R16G16_UNORM,
         Format::Rg16f => vk::Format::R16G16_SFLOAT,
         Format::Rg32f => vk::Format::R32G32_SFLOAT,
         Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,

@@ -36,6 +36,7 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod shade;
+pub mod skip;
 pub mod postprocess {
     pub mod assemble;
     pub mod tone;
@@ -69,7 +70,13 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
+    skip::tile_ranges::PASS,
+    skip::brick_ranges::PASS,
+    skip::classify::SURFACE,
+    skip::leap::SURFACE,
     raycast::surface::PASS,
+    skip::classify::VOLUME,
+    skip::leap::VOLUME,
     raycast::volume::PASS,
     raycast::projection::PASS,
     raycast::planes::PASS,

@@ -1,7 +1,7 @@
 //! Slots: the GPU resources that passes read and write. A slot's shape and format follow from the scene; a slot that no pass
 //! of a plan names does not exist.
 
-use super::tables;
+use super::{skip, tables};
 use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
@@ -33,6 +33,22 @@ pub enum Slot {
     SharpVolume,
     /// The 3D texture that rays are cast through.
     Volume,
+    /// Smallest and largest value of every tile of every slice.
+    TileRanges,
+    /// What each brick looks at of the tiles, and where it lies to the sector.
+    BrickTable,
+    /// Smallest and largest value that samples within each brick may have.
+    BrickRanges,
+    /// What each brick is to a mode.
+    BrickKinds,
+    /// The same with the distance to the nearest brick of another kind along x, and within x and y.
+    LeapsX,
+    LeapsXy,
+    /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
+    SurfaceLeaps,
+    VolumeLeaps,
+    /// Entries of the transfer function that are not transparent, before each.
+    OpaqueBefore,
     SweepLut,
     LineLut,
     SliceTable,
@@ -86,6 +102,7 @@ pub enum Format {
     R16,
     R16f,
     R32f,
+    Rg16,
     Rg16f,
     Rg32f,
     Rgba16f,
@@ -99,7 +116,7 @@ impl Format {
     pub fn channels(self) -> usize {
         match self {
             Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::Floats => 1,
-            Format::Rg16f | Format::Rg32f => 2,
+            Format::Rg16 | Format::Rg16f | Format::Rg32f => 2,
             Format::Rgba16f | Format::Rgba32f | Format::Rgba8 => 4,
         }
     }
@@ -107,7 +124,7 @@ impl Format {
     pub fn channel_bytes(self) -> usize {
         match self {
             Format::R8 | Format::Rgba8 => 1,
-            Format::R16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
+            Format::R16 | Format::R16f | Format::Rg16 | Format::Rg16f | Format::Rgba16f => 2,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => 4,
         }
     }
@@ -158,6 +175,15 @@ impl Slot {
         Slot::SliceRows,
         Slot::SharpVolume,
         Slot::Volume,
+        Slot::TileRanges,
+        Slot::BrickTable,
+        Slot::BrickRanges,
+        Slot::BrickKinds,
+        Slot::LeapsX,
+        Slot::LeapsXy,
+        Slot::SurfaceLeaps,
+        Slot::VolumeLeaps,
+        Slot::OpaqueBefore,
         Slot::SweepLut,
         Slot::LineLut,
         Slot::SliceTable,
@@ -198,6 +224,15 @@ impl Slot {
             Slot::SliceRows => "slice_rows",
             Slot::SharpVolume => "sharp_volume",
             Slot::Volume => "volume",
+            Slot::TileRanges => "tile_ranges",
+            Slot::BrickTable => "brick_table",
+            Slot::BrickRanges => "brick_ranges",
+            Slot::BrickKinds => "brick_kinds",
+            Slot::LeapsX => "leaps_x",
+            Slot::LeapsXy => "leaps_xy",
+            Slot::SurfaceLeaps => "surface_leaps",
+            Slot::VolumeLeaps => "volume_leaps",
+            Slot::OpaqueBefore => "opaque_before",
             Slot::SweepLut => "sweep_lut",
             Slot::LineLut => "line_lut",
             Slot::SliceTable => "slice_table",
@@ -233,6 +268,11 @@ impl Slot {
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
             Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
             Slot::SharpVolume | Slot::Volume => Shape::Three(scene.volume_size()),
+            Slot::TileRanges => Shape::Three(scene.tile_counts()),
+            Slot::BrickTable => Shape::Buffer(16 * scene.bricks().total() as u32),
+            Slot::BrickRanges | Slot::BrickKinds | Slot::LeapsX | Slot::LeapsXy => Shape::Three(scene.bricks().count),
+            Slot::SurfaceLeaps | Slot::VolumeLeaps => Shape::Three(scene.bricks().count),
+            Slot::OpaqueBefore => Shape::Buffer(4 * (transfer::ENTRIES as u32 + 1)),
             Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * scene.settings.ray.entries),
             Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
             Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
@@ -268,7 +308,9 @@ impl Slot {
             Slot::Tgc | Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => {
                 Format::Floats
             }
-            Slot::Tiles | Slot::Block => Format::Floats,
+            Slot::Tiles | Slot::Block | Slot::BrickTable | Slot::OpaqueBefore => Format::Floats,
+            Slot::TileRanges | Slot::BrickRanges => Format::Rg16,
+            Slot::BrickKinds | Slot::LeapsX | Slot::LeapsXy | Slot::SurfaceLeaps | Slot::VolumeLeaps => Format::R8,
             Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
             Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
             Slot::Surface => Format::Rg16f,
@@ -284,6 +326,8 @@ impl Slot {
             Slot::Frames => Filled::ByFrames,
             Slot::Tgc => Filled::ByScene(tables::tgc),
             Slot::ScanLut => Filled::ByScene(tables::scan_lut),
+            Slot::BrickTable => Filled::ByScene(skip::table),
+            Slot::OpaqueBefore => Filled::ByScene(tables::opaque_before),
             Slot::SweepLut => Filled::ByScene(tables::sweep_lut),
             Slot::LineLut => Filled::ByScene(tables::line_lut),
             Slot::SliceTable => Filled::ByScene(tables::slice_table),
@@ -297,7 +341,7 @@ impl Slot {
 
     /// Whether each of the volume images that take turns has its own.
     pub fn takes_turns(self) -> bool {
-        matches!(self, Slot::SharpVolume | Slot::Volume)
+        matches!(self, Slot::SharpVolume | Slot::Volume | Slot::TileRanges | Slot::BrickRanges)
     }
 
     /// Written and read by different queues where the device has several: created CONCURRENT then.

@@ -134,6 +134,17 @@ pub fn transfer_table(scene: &Scene) -> Vec<f32> {
     floats(transfer_of(scene).into_iter().flatten())
 }
 
+/// How many entries before each are not transparent, and in all.
+pub fn opaque_before(scene: &Scene) -> Vec<f32> {
+    let absorption: Vec<f32> = transfer_table(scene).chunks_exact(4).map(|entry| entry[3]).collect();
+    let mut before = vec![0.0];
+    before.extend(absorption.iter().scan(0.0, |count, a| {
+        *count += if *a > 0.0 { 1.0 } else { 0.0 };
+        Some(*count)
+    }));
+    before
+}
+
 /// The same between every two sample values.
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())

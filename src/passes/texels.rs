@@ -81,7 +81,7 @@ impl Texels {
         for &v in &self.values {
             match format {
                 Format::R8 | Format::Rgba8 => bytes.push((v.clamp(0.0, 1.0) * 255.0).round_ties_even() as u8),
-                Format::R16 => {
+                Format::R16 | Format::Rg16 => {
                     bytes.extend(((v.clamp(0.0, 1.0) * 65535.0).round_ties_even() as u16).to_le_bytes());
                 }
                 Format::R16f | Format::Rg16f | Format::Rgba16f => bytes.extend(f16::from_f64(v).to_le_bytes()),
@@ -97,7 +97,7 @@ impl Texels {
         let two = |b: &[u8]| [b[0], b[1]];
         let values = bytes.chunks_exact(format.channel_bytes()).map(|b| match format {
             Format::R8 | Format::Rgba8 => f64::from(b[0]) / 255.0,
-            Format::R16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
+            Format::R16 | Format::Rg16 => f64::from(u16::from_le_bytes(two(b))) / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => f64::from(f16::from_le_bytes(two(b))),
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
                 f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -110,7 +110,7 @@ impl Texels {
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 => 1.0 / 255.0,
-            Format::R16 => 1.0 / 65535.0,
+            Format::R16 | Format::Rg16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,
         }

@@ -2,7 +2,7 @@
 //! and what error is measured against where it is fast enough.
 
 use crate::passes::slots::{Filled, Shape};
-use crate::passes::{Arrays, Bind, Slot, Texels, Turn, When};
+use crate::passes::{Arrays, Slot, Texels, Turn, When};
 use crate::plan::{Plan, Step};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -41,19 +41,17 @@ fn empty(slot: Slot, scene: &Scene) -> Texels {
 
 fn run(scene: &Scene, step: &Step, turn: &Turn, slots: &mut BTreeMap<Slot, Texels>) {
     let (reads, writes) = ((step.pass.reads)(scene, turn), (step.pass.writes)(scene, turn));
-    let mut take = |binds: &[Bind]| {
-        let mut arrays = Arrays::default();
-        for bind in binds {
-            // A plan lists every slot that its steps name, and no step reads what it writes.
-            arrays.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(|| Texels::untouched([0; 3], 1)));
-        }
-        arrays
-    };
-    let (inputs, mut outputs) = (take(&reads), take(&writes));
+    let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+    // A plan lists every slot that its steps name, and no step reads what it writes.
+    let missing = || Texels::untouched([0; 3], 1);
+    for bind in &reads {
+        inputs.insert(bind.name, slots.get(&bind.slot).cloned().unwrap_or_else(missing));
+    }
+    for bind in &writes {
+        outputs.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(missing));
+    }
     (step.pass.reference)(scene, turn, &inputs, &mut outputs);
-    for (binds, arrays) in [(reads, inputs), (writes, outputs)] {
-        for bind in binds {
-            slots.insert(bind.slot, arrays.get(bind.name).clone());
-        }
+    for bind in writes {
+        slots.insert(bind.slot, outputs.get(bind.name).clone());
     }
 }

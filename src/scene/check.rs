@@ -14,6 +14,9 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
     }
     within("ray.spread", settings.ray.spread, 0.0, 1.0)?;
+    if settings.ray.brick != 0 {
+        within("ray.brick", f64::from(settings.ray.brick), 4.0, 64.0)?;
+    }
     within("ray.entries", f64::from(settings.ray.entries), 2.0, 65536.0)?;
     if !matches!(settings.ray.sliding, 0 | 3 | 5) {
         return refuse("ray.sliding", format!("is {}, must be 0 (none), 3 or 5", settings.ray.sliding));

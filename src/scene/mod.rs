@@ -1,6 +1,7 @@
 //! Everything that determines a picture: the probe's geometry, the kind of samples, and the user's [`Settings`], checked
 //! and resolved into what the passes ask for. Pure data, no Vulkan.
 
+mod bricks;
 pub mod camera;
 mod check;
 mod check_planes;
@@ -11,6 +12,7 @@ mod region;
 pub mod settings;
 pub mod transfer;
 
+pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use region::insonified_box;
 pub use settings::*;
@@ -246,6 +248,11 @@ impl Scene {
     /// Whether samples are composited through the transfer function.
     pub fn composites(&self) -> bool {
         matches!(self.settings.mode, Mode::Volume | Mode::Mixed)
+    }
+
+    /// Whether one value of each ray is kept.
+    pub fn projects(&self) -> bool {
+        matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
     }
 
     /// Whether planes are cut: a mode of planes, or the three of a 4-up picture.

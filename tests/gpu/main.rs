@@ -13,6 +13,7 @@ mod filters;
 mod goldens;
 mod growth;
 mod known_answers;
+mod leaping;
 mod led_astray;
 mod modes;
 mod motion;

@@ -14,34 +14,50 @@ fn of(toml: &str) -> Scene {
 
 /// Mode (and what belongs to it), its passes, its slots.
 const MODES: &[(&str, &str, &str)] = &[
-    ("mode = 'vr'", "scan_convert raycast_volume tone", "frames scan_lut volume sweep_lut transfer picture screen"),
+    (
+        "mode = 'vr'",
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen",
+    ),
     (
         "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
-        "scan_convert raycast_volume tone",
-        "frames scan_lut volume sweep_lut pre_integrated picture screen",
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut pre_integrated picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { shading = 'first-hit' }",
-        "scan_convert raycast_volume light tone",
-        "frames scan_lut volume sweep_lut transfer distance_map veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer distance_map veil picture screen",
     ),
     (
         "mode = 'sr'",
-        "scan_convert raycast_surface light tone",
-        "frames scan_lut volume sweep_lut distance_map surface picture screen",
+        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map surface picture screen",
     ),
     (
         "mode = 'mixed'",
-        "scan_convert raycast_surface raycast_volume light tone",
-        "frames scan_lut volume sweep_lut transfer distance_map surface veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps volume_leaps opaque_before sweep_lut transfer distance_map surface veil picture screen",
     ),
-    ("mode = 'mip'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
-    ("mode = 'minip'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
-    ("mode = 'mean'", "scan_convert raycast_projection tone", "frames scan_lut volume sweep_lut picture screen"),
+    (
+        "mode = 'mip'",
+        "scan_convert tile_ranges brick_ranges raycast_projection tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut picture screen",
+    ),
+    (
+        "mode = 'minip'",
+        "scan_convert tile_ranges brick_ranges raycast_projection tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut picture screen",
+    ),
+    (
+        "mode = 'mean'",
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_projection tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps sweep_lut picture screen",
+    ),
     (
         "mode = 'mip'\nray = { rays = 2 }",
-        "scan_convert raycast_projection assemble tone",
-        "frames scan_lut volume sweep_lut rendered picture screen",
+        "scan_convert tile_ranges brick_ranges raycast_projection assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut rendered picture screen",
     ),
     ("mode = 'plane'", "scan_convert raycast_planes tone", "frames scan_lut volume sweep_lut tiles picture screen"),
     (
@@ -57,8 +73,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
     (
         "mode = 'sr'\nlayout = '4up'",
-        "scan_convert raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume sweep_lut tiles distance_map surface rendered planes picture screen",
+        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface raycast_planes light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut tiles distance_map surface rendered planes picture screen",
     ),
 ];
 
@@ -88,8 +104,17 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
         let from = |first: &[&str]| -> Vec<&str> {
             all.iter().position(|p| first.contains(p)).map_or(Vec::new(), |i| all[i..].to_vec())
         };
-        // Planes lie where they lie, wherever the camera stands.
-        let moved = |p: &&str| *p != "raycast_planes";
+        // Planes and bricks lie where they lie, wherever the camera stands.
+        let aside = [
+            "raycast_planes",
+            "tile_ranges",
+            "brick_ranges",
+            "classify_surface",
+            "leap_surface",
+            "classify_volume",
+            "leap_volume",
+        ];
+        let moved = |p: &&str| !aside.contains(p);
         let seen_from_elsewhere = match base.is_flat() {
             true => Vec::new(),
             false => all[1..].iter().copied().filter(moved).collect(),
@@ -99,7 +124,7 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
             (
                 "transfer function",
                 |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
-                from(&["raycast_volume"]),
+                from(&["classify_volume"]),
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
             ("contrast", |s| s.settings.post.contrast = 1.5, vec!["tone"]),

@@ -7,6 +7,7 @@ use echolume::gpu::renderer::size_of;
 use echolume::gpu::single::Single;
 use echolume::passes::slots::{Filled, Shape};
 use echolume::passes::{Arrays, Bind, MISS, PASSES, Part, Pass, Slot, Texels, Turn, measure};
+use echolume::plan::Plan;
 use echolume::probe::Geometry;
 use echolume::scene::Scene;
 
@@ -110,6 +111,32 @@ fn compare(pass: &Pass, scene: &Scene, expected: &Arrays, got: &Arrays, writes: 
     Ok(largest)
 }
 
+/// What the passes between a volume and its rays make of it, by their references.
+fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
+    let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
+    let made = |name: &str| ["tile_ranges", "brick_ranges", "classify", "leap"].iter().any(|p| name.starts_with(p));
+    for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
+        let turn = Turn { slices: scene.slices(), ..step.turn() };
+        let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+        for bind in (step.pass.reads)(scene, &turn) {
+            let there = slots.get(&bind.slot).cloned();
+            inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
+        }
+        for bind in (step.pass.writes)(scene, &turn) {
+            let channels = bind.slot.format(scene).channels();
+            outputs.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+        }
+        (step.pass.reference)(scene, &turn, &inputs, &mut outputs);
+        for bind in (step.pass.writes)(scene, &turn) {
+            slots.insert(bind.slot, outputs.get(bind.name).clone());
+        }
+        if slots.contains_key(&slot) {
+            break;
+        }
+    }
+    slots.remove(&slot).expect("made")
+}
+
 fn run_one(
     single: &mut Single,
     scene: &Scene,
@@ -121,8 +148,16 @@ fn run_one(
     let turn = Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 };
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
-    for bind in (pass.reads)(scene, &turn) {
-        inputs.insert(bind.name, input(scene, &bind, kind, &mut noise));
+    let reads = (pass.reads)(scene, &turn);
+    for (n, bind) in reads.iter().enumerate() {
+        // One image bound under two names has one content.
+        let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
+        inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
+    }
+    if let Some(bricks) = reads.iter().find(|b| b.name == "bricks" && b.slot != Slot::Volume) {
+        // What rays leap by says what the volume says.
+        let leaps = leaps_of(scene, bricks.slot, inputs.get("volume"));
+        inputs.insert("bricks", leaps);
     }
     let writes = (pass.writes)(scene, &turn);
     let mut expected = Arrays::default();

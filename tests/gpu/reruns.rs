@@ -104,16 +104,29 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
         (passes.join(" "), slots.join(" "))
     };
     let (passes, slots) = names("mode = 'vr'");
-    assert_eq!(passes, "scan_convert raycast_volume tone");
-    assert_eq!(slots, "frames scan_lut volume sweep_lut transfer picture screen");
+    assert_eq!(
+        passes,
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone"
+    );
+    assert_eq!(
+        slots,
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen"
+    );
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
         passes,
-        "scan_convert raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
+        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
     );
-    assert_eq!(slots, "frames scan_lut volume sweep_lut distance_map distance_a distance_b surface picture screen");
+    assert_eq!(
+        slots,
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map distance_a distance_b surface picture screen"
+    );
     let (passes, slots) = names("mode = 'vr'\nslices = { sigma = { window = 5, sigma = 0.0 } }");
-    assert_eq!(passes, "scan_convert raycast_volume tone", "a sigma of 0 changes nothing");
+    assert_eq!(
+        passes,
+        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
+        "a sigma of 0 changes nothing"
+    );
     assert!(!slots.contains("slice_a"));
 }
 

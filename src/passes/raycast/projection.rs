@@ -14,13 +14,13 @@ pub const PASS: Pass = Pass {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
         _ => Err("the mode is no projection"),
     },
-    reads: |s, _| ray::reads(s),
+    reads: |s, _| ray::marching_reads(s, skip::volume_leaps(s)),
     writes: |s, _| vec![whole("picture", chain::rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| ray::params(s, s.projection_view()),
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s);
+        let mut constants = ray::marching_constants(s, skip::volume_leaps(s));
         constants.push(("KEPT", kept(s)));
         constants
     },

@@ -1,5 +1,6 @@
 //! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
+use crate::passes::skip::Leaps;
 use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
@@ -47,6 +48,13 @@ pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
     reads
 }
 
+/// Of the passes that take samples along rays: what they leap by, too.
+pub(super) fn marching_reads(scene: &Scene, leaps: Leaps) -> Vec<Bind> {
+    let mut reads = reads(scene);
+    reads.push(whole("bricks", leaps.slot()));
+    reads
+}
+
 pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     let (sweep, array) = match &scene.geometry {
         Geometry::Cartesian(_) => (0, 0),
@@ -76,8 +84,9 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// Constants of the passes that take samples along rays.
-pub(super) fn marching_constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+pub(super) fn marching_constants(scene: &Scene, leaps: Leaps) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
+    constants.push(leaps.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));
     constants
 }
@@ -90,7 +99,10 @@ pub(super) fn params(scene: &Scene, view: View) -> Params {
         *clip = [normal.x, normal.y, normal.z, limit];
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
+    let bricks = scene.bricks();
     let params = ray_params(scene)
+        .vec3("brick_low", bricks.low)
+        .vec3("brick_density", bricks.edge.recip())
         .f32("spread", scene.settings.ray.spread)
         .f32("spread_range", scene.probe().map_or(1.0, spread_range).max(1e-6))
         .vec4("clip_0", clip_0)

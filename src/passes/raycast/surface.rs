@@ -11,7 +11,7 @@ pub const PASS: Pass = Pass {
     when: When::Picture,
     shader: |s, _| ray::variant!(s, "raycast/surface"),
     needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
-    reads: |s, _| ray::reads(s),
+    reads: |s, _| ray::marching_reads(s, skip::surface_leaps(s)),
     writes: |_, _| vec![whole("distance_map", Slot::Distance), whole("surface", Slot::Surface)],
     extent: ray_extent,
     repeat: once,
@@ -22,9 +22,10 @@ pub const PASS: Pass = Pass {
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
             .f32("noise", surface.noise)
+            .f32("silence", skip::classify::quiet(s))
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s);
+        let mut constants = ray::marching_constants(s, skip::surface_leaps(s));
         let detector = match s.settings.surface.detector {
             Detector::Threshold => 0,
             Detector::Adaptive => 1,

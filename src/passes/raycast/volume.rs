@@ -16,7 +16,7 @@ pub const PASS: Pass = Pass {
     },
     needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
-        let mut reads = ray::reads(s);
+        let mut reads = ray::marching_reads(s, skip::volume_leaps(s));
         reads.push(match s.settings.volume.compositing {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
             _ => whole("transfer", Slot::Transfer),
@@ -44,7 +44,7 @@ pub const PASS: Pass = Pass {
             .f32("depth_near", near)
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s);
+        let mut constants = ray::marching_constants(s, skip::volume_leaps(s));
         let compositing = match s.settings.volume.compositing {
             Compositing::Riemann => 0,
             Compositing::Corrected => 1,

@@ -45,6 +45,9 @@ pub struct Ray {
     pub entries: u32,
     /// Rays for each pixel along each edge, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
+    /// Edge of the bricks that rays leap over where nothing in them can change the picture, texels: 4..=64, 0 takes every
+    /// sample. The picture is the same bit for bit.
+    pub brick: u32,
 }
 
 impl Default for Ray {
@@ -57,6 +60,7 @@ impl Default for Ray {
             sliding: 0,
             entries: 1025,
             rays: 1,
+            brick: 8,
         }
     }
 }
