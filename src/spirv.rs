@@ -3,6 +3,8 @@
 
 use std::collections::HashMap;
 
+pub mod stored;
+
 /// Every shader, embedded: name and variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../spirv/embedded.rs");
 
@@ -143,32 +145,47 @@ fn text(words: &[u32]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn scan(words: &[u32]) -> Result<Tables, SpirvError> {
+/// One instruction: its number in the SPIR-V 1.5 specification and what follows.
+struct Instruction<'a> {
+    opcode: u32,
+    operands: &'a [u32],
+}
+
+/// Every instruction, each with the least operands that the code here takes for granted.
+fn instructions(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
     if words.len() < 5 || words[0] != 0x0723_0203 {
         return error("no SPIR-V module");
     }
-    let mut tables = Tables { local_size: [1; 3], ..Tables::default() };
+    let mut all = Vec::new();
     let mut at = 5;
     while at < words.len() {
         let length = (words[at] >> 16) as usize;
         let Some(instruction) = words.get(at..at + length).filter(|i| !i.is_empty()) else {
             return error(format!("instruction at word {at} runs past the end"));
         };
-        let arguments = &instruction[1..];
-        // Every opcode below has at least this many operands, by the specification's tables.
-        let needed = match words[at] & 0xffff {
+        let (opcode, operands) = (words[at] & 0xffff, &instruction[1..]);
+        let needed = match opcode {
             5 | 19 | 20 | 26 | 30 => 1,
             6 | 16 | 21 | 22 | 27 | 54 | 71 => 2,
-            23 | 32 | 43 | 50 | 59 | 72 => 3,
+            23 | 32 | 43 | 50 | 59 | 72 | 103 => 3,
+            88 | 95 => 4,
             25 => 8,
             331 => 2,
             _ => 0,
         };
-        if arguments.len() < needed {
+        if operands.len() < needed {
             return error(format!("instruction at word {at} is cut short"));
         }
-        tables.take(words[at] & 0xffff, arguments);
+        all.push(Instruction { opcode, operands });
         at += length;
+    }
+    Ok(all)
+}
+
+fn scan(words: &[u32]) -> Result<Tables, SpirvError> {
+    let mut tables = Tables { local_size: [1; 3], ..Tables::default() };
+    for i in instructions(words)? {
+        tables.take(i.opcode, i.operands);
     }
     Ok(tables)
 }

@@ -8,7 +8,7 @@ use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
+use super::pipelines::{Fetch, Pipeline, Pipelines, Shaders, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
@@ -27,11 +27,13 @@ pub struct Options {
     pub shaders: Arc<Shaders>,
     /// Keep every span of time, host and device, and count invocations.
     pub spans: bool,
+    /// How single texels are read; what is fast on the device unless given.
+    pub fetch: Option<Fetch>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { volume_images: 1, shaders: embedded(), spans: false }
+        Options { volume_images: 1, shaders: embedded(), spans: false, fetch: None }
     }
 }
 
@@ -79,7 +81,7 @@ impl Renderer {
     pub fn new(context: &Arc<Context>, scene: Scene, options: &Options) -> Result<Renderer, GpuError> {
         let plan = Plan::new(&scene);
         super::formats::check(context, &plan, &scene)?;
-        let mut pipelines = Pipelines::new(context, options.shaders.clone())?;
+        let mut pipelines = Pipelines::new(context, options.shaders.clone(), options.fetch.unwrap_or(Fetch::of(context)))?;
         let steps = pipelines_of(&mut pipelines, &plan, &scene)?;
         let mut renderer = Renderer {
             lanes: Vec::new(),

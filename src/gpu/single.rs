@@ -4,7 +4,7 @@ use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::pipelines::{Fetch, Pipeline, Pipelines, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
@@ -24,7 +24,12 @@ pub struct Single {
 
 impl Single {
     pub fn new(context: &Arc<Context>) -> Result<Single, GpuError> {
-        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded())? })
+        Single::fetching(context, Fetch::of(context))
+    }
+
+    /// With texels read in a way that may not be the device's fastest.
+    pub fn fetching(context: &Arc<Context>, fetch: Fetch) -> Result<Single, GpuError> {
+        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)? })
     }
 
     /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
@@ -128,11 +133,22 @@ impl Timed {
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
     ) -> Result<Timed, GpuError> {
+        Timed::fetching(context, scene, pass, contents, Fetch::of(context))
+    }
+
+    /// The same with texels read in a way that may not be the device's fastest.
+    pub fn fetching(
+        context: &Arc<Context>,
+        scene: &Scene,
+        pass: &'static Pass,
+        contents: &[(Slot, Texels)],
+        fetch: Fetch,
+    ) -> Result<Timed, GpuError> {
         let first = Turn { slice: scene.slices() / 2, ..Turn::default() };
         let first = if pass.when == When::Frame { first } else { Turn { slice: 0, slices: scene.slices(), ..first } };
         let turns: Vec<Turn> = (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let mut pipelines = Pipelines::new(context, embedded())?;
+        let mut pipelines = Pipelines::new(context, embedded(), fetch)?;
         let mut dispatches = Vec::new();
         for turn in turns {
             let binds = [(pass.reads)(scene, &turn), (pass.writes)(scene, &turn)].concat();

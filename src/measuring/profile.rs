@@ -236,9 +236,9 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
 
 /// What an upload or a readback moves each way.
 fn copied_bytes(name: &str, scene: &Scene) -> u64 {
-    use crate::passes::Slot;
+    use crate::passes::{Slot, layer};
     match name {
-        "upload" => touched(&Bind { name: "frames", slot: Slot::Frames, part: Part::Layer }, scene),
+        "upload" => touched(&layer("frames", Slot::Frames), scene),
         "readback" => Slot::Screen.bytes(scene),
         _ => 0,
     }

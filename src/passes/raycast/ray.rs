@@ -40,7 +40,8 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
 
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, uneven, moved) = tables(scene);
-    let mut reads = vec![whole("volume", Slot::Volume)];
+    let filtered = scene.settings.ray.sampling == Sampling::Hardware;
+    let mut reads = vec![Bind { filtered, ..whole("volume", Slot::Volume) }];
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
