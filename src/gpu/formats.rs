@@ -1,6 +1,6 @@
 //! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
 
-use super::{Context, GpuError};
+use super::{Context, Fetch, GpuError};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
@@ -37,10 +37,18 @@ fn features(slot: Slot, scene: &Scene) -> vk::FormatFeatureFlags {
     if usage(slot).contains(vk::ImageUsageFlags::STORAGE) {
         features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
     }
-    if slot == Slot::Volume && scene.settings.ray.sampling == Sampling::Hardware {
+    if slot == Slot::Volume && scene.filters_in_hardware() {
         features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
     }
     features
+}
+
+/// The scene with its samples taken in the way that is fastest here: by eight texels where those are loaded, and where the device
+/// cannot filter the volume's format at all.
+pub fn suited(context: &Context, fetch: Fetch, scene: Scene) -> Scene {
+    let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
+    let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact })
 }
 
 /// Refuses a plan whose slots the device cannot hold, before anything is allocated.

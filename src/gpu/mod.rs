@@ -23,7 +23,7 @@ pub mod timeline;
 pub mod timing;
 
 pub use context::{Context, ContextOptions};
-pub use pipelines::Fetch;
 pub use error::GpuError;
+pub use pipelines::Fetch;
 pub use renderer::{Options, Renderer};
 pub use select::{Candidate, Choice};

@@ -1,12 +1,11 @@
 //! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
 
-use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
-use super::formats;
+use super::{Candidate, GpuError, formats};
 use crate::passes::slots::Format;
 use crate::passes::{Pass, Turn, contract};
-use crate::scene::Scene;
+use crate::scene::{Sampling, Scene};
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::HashMap;
@@ -36,8 +35,20 @@ pub enum Fetch {
 impl Fetch {
     /// What is fast on a device. One that is a CPU sends every fetch through its sampler in software; a GPU's textures have
     /// caches of their own.
-    pub fn of(context: &Context) -> Fetch {
-        if context.candidate.is_software() { Fetch::Storage } else { Fetch::Textures }
+    pub fn of(candidate: &Candidate) -> Fetch {
+        if candidate.is_software() { Fetch::Storage } else { Fetch::Textures }
+    }
+
+    /// What `auto` sampling is then.
+    pub fn sampling(self) -> Sampling {
+        if self == Fetch::Storage { Sampling::Exact } else { Sampling::Hardware }
+    }
+
+    pub fn words(self) -> &'static str {
+        match self {
+            Fetch::Textures => "texels by texelFetch",
+            Fetch::Storage => "texels by imageLoad",
+        }
     }
 }
 

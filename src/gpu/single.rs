@@ -1,6 +1,5 @@
 //! One pass alone on inputs of the caller's: what the tests hold against its reference, and what benches time.
 
-use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
@@ -10,6 +9,7 @@ use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timeline;
+use super::{GpuError, formats};
 use crate::passes::slots::{Filled, Shape};
 use crate::passes::{Arrays, Bind, Part, Pass, Slot, Texels, Turn, When};
 use crate::plan::Plan;
@@ -20,16 +20,17 @@ use std::sync::Arc;
 pub struct Single {
     context: Arc<Context>,
     pipelines: Pipelines,
+    fetch: Fetch,
 }
 
 impl Single {
     pub fn new(context: &Arc<Context>) -> Result<Single, GpuError> {
-        Single::fetching(context, Fetch::of(context))
+        Single::fetching(context, Fetch::of(&context.candidate))
     }
 
     /// With texels read in a way that may not be the device's fastest.
     pub fn fetching(context: &Arc<Context>, fetch: Fetch) -> Result<Single, GpuError> {
-        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)? })
+        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)?, fetch })
     }
 
     /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
@@ -42,6 +43,7 @@ impl Single {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
+        let scene = &formats::suited(&self.context, self.fetch, scene.clone());
         let (reads, writes) = ((pass.reads)(scene, turn), (pass.writes)(scene, turn));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, turn.image + 1);
@@ -133,7 +135,7 @@ impl Timed {
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
     ) -> Result<Timed, GpuError> {
-        Timed::fetching(context, scene, pass, contents, Fetch::of(context))
+        Timed::fetching(context, scene, pass, contents, Fetch::of(&context.candidate))
     }
 
     /// The same with texels read in a way that may not be the device's fastest.
@@ -144,6 +146,7 @@ impl Timed {
         contents: &[(Slot, Texels)],
         fetch: Fetch,
     ) -> Result<Timed, GpuError> {
+        let scene = &formats::suited(context, fetch, scene.clone());
         let first = Turn { slice: scene.slices() / 2, ..Turn::default() };
         let first = if pass.when == When::Frame { first } else { Turn { slice: 0, slices: scene.slices(), ..first } };
         let turns: Vec<Turn> = (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..first }).collect();

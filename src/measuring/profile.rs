@@ -119,6 +119,7 @@ impl Run {
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
+            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.fetch().words())),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
         (profile, spans.collect())

@@ -205,7 +205,9 @@ mod tests {
             assert_eq!(new.access, old.access, "{}", old.name);
         }
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
-        let fetches = |words: &[u32], opcode| super::super::instructions(words).unwrap().iter().filter(|i| i.opcode == opcode).count();
+        let fetches = |words: &[u32], opcode| {
+            super::super::instructions(words).unwrap().iter().filter(|i| i.opcode == opcode).count()
+        };
         assert_eq!(fetches(&before, 95), fetches(&after, 95) + fetches(&after, 98));
         assert_eq!(fetches(&after, 95), 1, "the surface stays a texture");
     }
