@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 pub mod stored;
+pub mod tables;
 
 /// Every shader, embedded: name and variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../spirv/embedded.rs");
@@ -21,6 +22,8 @@ pub enum Kind {
     Filtered,
     Storage,
     Buffer,
+    /// A buffer read by texels of so many floats.
+    Texels(u32),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +85,7 @@ enum Type {
     Int { signed: bool },
     Float,
     Vector(u32, u32),
-    Image { dimension: u32, arrayed: bool, sampled: u32 },
+    Image { dimension: u32, arrayed: bool, sampled: u32, format: u32 },
     SampledImage(u32),
     Struct(Vec<u32>),
     Pointer(u32),
@@ -202,7 +205,7 @@ impl Tables {
             22 => drop(self.types.insert(a[0], Type::Float)),
             23 => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
             25 => {
-                let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6] };
+                let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] };
                 self.types.insert(a[0], image);
             }
             27 => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
@@ -254,6 +257,16 @@ impl Tables {
         };
         let (kind, access, dimension) = match self.types.get(&pointee) {
             Some(Type::SampledImage(image)) => (Kind::Filtered, Access::Read, shape(image)),
+            // Dimension Buffer, in one of the formats that tables have: R32f, Rg32f, Rgba32f.
+            Some(Type::Image { dimension: 5, sampled: 2, format, .. }) => {
+                let components = match format {
+                    3 => 1,
+                    6 => 2,
+                    1 => 4,
+                    _ => return error(format!("'{name}' is a texel buffer of a format that no table has")),
+                };
+                (Kind::Texels(components), declared, Dimension::None)
+            }
             Some(Type::Image { sampled: 1, .. }) => (Kind::Sampled, Access::Read, shape(&pointee)),
             Some(Type::Image { .. }) => (Kind::Storage, declared, shape(&pointee)),
             Some(Type::Struct(members)) if storage == 2 => {

@@ -2,9 +2,10 @@
 
 use super::context::Context;
 use super::error::Doing;
+use super::resources::has_texels;
 use super::{Candidate, GpuError, formats};
-use crate::passes::slots::Format;
-use crate::passes::{Pass, Turn, contract};
+use crate::passes::slots::{Format, Shape};
+use crate::passes::{Pass, Slot, Turn, contract};
 use crate::scene::{Sampling, Scene};
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
@@ -28,7 +29,7 @@ type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 pub enum Fetch {
     /// `texelFetch` from textures, as the shaders say.
     Textures,
-    /// `imageLoad` from storage images: the modules are rewritten.
+    /// `imageLoad` from storage images and texel buffers: the modules are rewritten.
     Storage,
 }
 
@@ -78,6 +79,7 @@ pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
         Kind::Filtered => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
         Kind::Storage => vk::DescriptorType::STORAGE_IMAGE,
         Kind::Buffer => vk::DescriptorType::STORAGE_BUFFER,
+        Kind::Texels(_) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
     }
 }
 
@@ -108,7 +110,10 @@ impl Pipelines {
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let mut words = (self.shaders)(key.0).map_err(at_fault)?;
         if self.fetch == Fetch::Storage {
-            let stores = |slot| formats::usage(slot).contains(vk::ImageUsageFlags::STORAGE);
+            let stores = |slot: Slot| match slot.shape(scene) {
+                Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
+                _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
+            };
             words = contract::with_storage(pass, scene, turn, &words, stores).map_err(at_fault)?;
         }
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;

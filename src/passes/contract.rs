@@ -4,9 +4,11 @@ use super::slots::{Format, Shape};
 use super::{Bind, Params, Part, Pass, Slot, Turn, Value};
 use crate::scene::Scene;
 use crate::spirv::stored::{ImageFormat, as_storage};
+use crate::spirv::tables::as_texels;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// A pass's shader, with what it only fetches texels of as storage images where `stores` says that the slot can be one.
+/// A pass's shader, with what it only fetches texels of as storage images, and its tables as storage texel buffers, where
+/// `stores` says that the slot can be one.
 ///
 /// # Errors
 /// A module that breaks the format.
@@ -27,7 +29,9 @@ pub fn with_storage(
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
         .collect();
-    as_storage(words, &textures).map_err(|e| e.to_string())
+    let words = as_storage(words, &textures).map_err(|e| e.to_string())?;
+    let reads = (pass.reads)(scene, turn);
+    as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
 }
 
 fn image_format(format: Format) -> Option<ImageFormat> {

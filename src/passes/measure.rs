@@ -36,7 +36,7 @@ pub const FILTERED: Pass = Pass {
     },
 };
 
-/// Trilinear interpolation of our own.
+/// Trilinear interpolation of our own: eight texels, fetched or loaded as the device reads them fastest.
 pub const EIGHT_FETCHES: Pass = Pass {
     name: "measure_eight_fetches",
     reads: |_, _| vec![whole("volume", Slot::Volume)],

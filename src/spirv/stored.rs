@@ -27,11 +27,11 @@ impl ImageFormat {
     }
 }
 
-const EXTENDED_FORMATS: u32 = 49;
-const NON_WRITABLE: u32 = 24;
+pub(super) const EXTENDED_FORMATS: u32 = 49;
+pub(super) const NON_WRITABLE: u32 = 24;
 const LOD: u32 = 2;
 
-fn instruction(opcode: u32, operands: &[u32]) -> Vec<u32> {
+pub(super) fn instruction(opcode: u32, operands: &[u32]) -> Vec<u32> {
     let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode];
     words.extend_from_slice(operands);
     words
