@@ -93,6 +93,9 @@ impl Plan {
                 }
             }
         }
+        if self.slots.contains(&Slot::Volume) {
+            let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
+        }
         let _ = writeln!(text, "slots");
         for slot in &self.slots {
             let shape = format!("{:?} {:?}", slot.shape(scene), slot.format(scene));

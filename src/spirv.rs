@@ -3,6 +3,9 @@
 
 use std::collections::HashMap;
 
+pub mod stored;
+pub mod tables;
+
 /// Every shader, embedded: name and variant, and its words as bytes.
 pub const EMBEDDED: &[(&str, &[u8])] = include!("../spirv/embedded.rs");
 
@@ -19,6 +22,8 @@ pub enum Kind {
     Filtered,
     Storage,
     Buffer,
+    /// A buffer read by texels of so many floats.
+    Texels(u32),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,7 +85,7 @@ enum Type {
     Int { signed: bool },
     Float,
     Vector(u32, u32),
-    Image { dimension: u32, arrayed: bool, sampled: u32 },
+    Image { dimension: u32, arrayed: bool, sampled: u32, format: u32 },
     SampledImage(u32),
     Struct(Vec<u32>),
     Pointer(u32),
@@ -143,32 +148,47 @@ fn text(words: &[u32]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-fn scan(words: &[u32]) -> Result<Tables, SpirvError> {
+/// One instruction: its number in the SPIR-V 1.5 specification and what follows.
+struct Instruction<'a> {
+    opcode: u32,
+    operands: &'a [u32],
+}
+
+/// Every instruction, each with the least operands that the code here takes for granted.
+fn instructions(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
     if words.len() < 5 || words[0] != 0x0723_0203 {
         return error("no SPIR-V module");
     }
-    let mut tables = Tables { local_size: [1; 3], ..Tables::default() };
+    let mut all = Vec::new();
     let mut at = 5;
     while at < words.len() {
         let length = (words[at] >> 16) as usize;
         let Some(instruction) = words.get(at..at + length).filter(|i| !i.is_empty()) else {
             return error(format!("instruction at word {at} runs past the end"));
         };
-        let arguments = &instruction[1..];
-        // Every opcode below has at least this many operands, by the specification's tables.
-        let needed = match words[at] & 0xffff {
+        let (opcode, operands) = (words[at] & 0xffff, &instruction[1..]);
+        let needed = match opcode {
             5 | 19 | 20 | 26 | 30 => 1,
             6 | 16 | 21 | 22 | 27 | 54 | 71 => 2,
-            23 | 32 | 43 | 50 | 59 | 72 => 3,
+            23 | 32 | 43 | 50 | 59 | 72 | 103 => 3,
+            88 | 95 => 4,
             25 => 8,
             331 => 2,
             _ => 0,
         };
-        if arguments.len() < needed {
+        if operands.len() < needed {
             return error(format!("instruction at word {at} is cut short"));
         }
-        tables.take(words[at] & 0xffff, arguments);
+        all.push(Instruction { opcode, operands });
         at += length;
+    }
+    Ok(all)
+}
+
+fn scan(words: &[u32]) -> Result<Tables, SpirvError> {
+    let mut tables = Tables { local_size: [1; 3], ..Tables::default() };
+    for i in instructions(words)? {
+        tables.take(i.opcode, i.operands);
     }
     Ok(tables)
 }
@@ -185,7 +205,7 @@ impl Tables {
             22 => drop(self.types.insert(a[0], Type::Float)),
             23 => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
             25 => {
-                let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6] };
+                let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] };
                 self.types.insert(a[0], image);
             }
             27 => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
@@ -237,6 +257,16 @@ impl Tables {
         };
         let (kind, access, dimension) = match self.types.get(&pointee) {
             Some(Type::SampledImage(image)) => (Kind::Filtered, Access::Read, shape(image)),
+            // Dimension Buffer, in one of the formats that tables have: R32f, Rg32f, Rgba32f.
+            Some(Type::Image { dimension: 5, sampled: 2, format, .. }) => {
+                let components = match format {
+                    3 => 1,
+                    6 => 2,
+                    1 => 4,
+                    _ => return error(format!("'{name}' is a texel buffer of a format that no table has")),
+                };
+                (Kind::Texels(components), declared, Dimension::None)
+            }
             Some(Type::Image { sampled: 1, .. }) => (Kind::Sampled, Access::Read, shape(&pointee)),
             Some(Type::Image { .. }) => (Kind::Storage, declared, shape(&pointee)),
             Some(Type::Struct(members)) if storage == 2 => {

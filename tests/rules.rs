@@ -47,7 +47,7 @@ fn layers_hold() {
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/plan.rs", &["crate::gpu", "ash::vk"]),
         ("src/barriers.rs", &["crate::gpu", "ash::vk"]),
-        ("src/spirv.rs", &["crate::gpu", "crate::passes", "ash::vk"]),
+        ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),
         ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::report", "ash::vk"]),
         ("src/report", &["crate::gpu", "crate::measuring", "ash::vk"]),
@@ -187,9 +187,18 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                 let shader = (pass.shader)(&scene, &turn);
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
-                let module = spirv::reflect(&spirv::words(bytes)).expect("reflection");
-                let agreed = contract::check(pass, &scene, &turn, &module);
-                agreed.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                // As it is compiled, and with its textures as storage images.
+                let words = spirv::words(bytes);
+                let stored = contract::with_storage(pass, &scene, &turn, &words, |_| true);
+                let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                for words in [&words, &stored] {
+                    let module = spirv::reflect(words).expect("reflection");
+                    let agreed = contract::check(pass, &scene, &turn, &module);
+                    agreed.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                }
+                let left = spirv::reflect(&stored).expect("reflection").bindings;
+                let textures = left.iter().filter(|b| b.kind == spirv::Kind::Sampled).count();
+                assert_eq!(textures, 0, "{shader} still fetches from a texture");
                 used.push(shader);
             }
         }

@@ -93,6 +93,7 @@ pub const SCENES: &[Stated] = &[
     sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
     sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
     sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
+    sweep("hardware sampling", &["ray.sampling=hardware"], &["raycast_surface"]),
     sweep("corrected", &["mode=vr"], &["raycast_volume"]),
     sweep("pre-integrated", &["mode=vr", "volume.compositing=pre-integrated"], &["raycast_volume"]),
     sweep("first hit", &["mode=vr", "volume.shading=first-hit"], &["raycast_volume", "light"]),

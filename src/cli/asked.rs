@@ -1,7 +1,8 @@
 //! What a command is asked to render: the recording, the settings in layers, the device.
 
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
+use echolume::gpu::context::list;
+use echolume::gpu::{Choice, Context, ContextOptions, Fetch, GpuError, select};
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene};
 use echolume::source::phantom::{self, Phantom};
@@ -97,6 +98,15 @@ impl Asked {
         }
         bar.finish_and_clear();
         Ok(())
+    }
+
+    /// The scene as the device will sample it; as it is where there is no device.
+    pub fn suited(&self, scene: Scene) -> Scene {
+        let there = list().unwrap_or_default();
+        match select::choose(&there, self.device.as_ref().unwrap_or(&Choice::Best)) {
+            Ok(n) => scene.sampled(Fetch::of(&there[n]).sampling()),
+            Err(_) => scene,
+        }
     }
 
     /// The device, named on one line.

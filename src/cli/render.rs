@@ -46,6 +46,7 @@ impl Render {
         let (mut source, scene) = self.asked.open()?;
         self.asked.keep_inputs("-o", &self.output)?;
         if self.explain {
+            let scene = self.asked.suited(scene);
             let plan = Plan::new(&scene);
             say!("{}", plan.explain(&scene).trim_end());
             return Ok(());

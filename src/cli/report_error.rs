@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub struct Error {
     #[command(flatten)]
     asked: Asked,
-    /// step, compositing, format, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, or all; may be
+    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, or all; may be
     /// given again
     #[arg(long, value_name = "NAME", default_value = "all")]
     dial: Vec<String>,

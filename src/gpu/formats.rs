@@ -1,6 +1,6 @@
 //! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
 
-use super::{Context, GpuError};
+use super::{Context, Fetch, GpuError};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
@@ -22,26 +22,34 @@ pub fn vulkan(format: Format) -> vk::Format {
     }
 }
 
-/// What an image of this slot is used for.
-pub fn usage(slot: Slot) -> vk::ImageUsageFlags {
+/// What an image of this slot is used for. What no pass writes is a storage image only where those are read by preference.
+pub fn usage(context: &Context, slot: Slot) -> vk::ImageUsageFlags {
     let read = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::TRANSFER_SRC;
     match slot {
-        Slot::Frames | Slot::ScanLut => read,
+        Slot::Frames | Slot::ScanLut if Fetch::of(&context.candidate) == Fetch::Textures => read,
         _ => read | vk::ImageUsageFlags::STORAGE,
     }
 }
 
-fn features(slot: Slot, scene: &Scene) -> vk::FormatFeatureFlags {
+fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFlags {
     let mut features = vk::FormatFeatureFlags::SAMPLED_IMAGE
         | vk::FormatFeatureFlags::TRANSFER_DST
         | vk::FormatFeatureFlags::TRANSFER_SRC;
-    if usage(slot).contains(vk::ImageUsageFlags::STORAGE) {
+    if usage(context, slot).contains(vk::ImageUsageFlags::STORAGE) {
         features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
     }
-    if slot == Slot::Volume && scene.settings.ray.sampling == Sampling::Hardware {
+    if slot == Slot::Volume && scene.filters_in_hardware() {
         features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
     }
     features
+}
+
+/// The scene with its samples taken in the way that is fastest here: by eight texels where those are loaded, and where the device
+/// cannot filter the volume's format at all.
+pub fn suited(context: &Context, fetch: Fetch, scene: Scene) -> Scene {
+    let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
+    let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact })
 }
 
 /// Refuses a plan whose slots the device cannot hold, before anything is allocated.
@@ -70,7 +78,7 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
             Shape::Three([w, h, d]) => within(w.max(h).max(d), limits.max_image_dimension3_d)?,
         }
         let format = vulkan(slot.format(scene));
-        let needed = features(slot, scene);
+        let needed = features(context, slot, scene);
         if !context.format_features(format).contains(needed) {
             return Err(GpuError::Format {
                 what: what(),
@@ -82,7 +90,7 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
             Shape::Three(_) => vk::ImageType::TYPE_3D,
             _ => vk::ImageType::TYPE_2D,
         };
-        let allowed = context.image_limits(format, kind, usage(slot))?.max_resource_size;
+        let allowed = context.image_limits(format, kind, usage(context, slot))?.max_resource_size;
         if bytes > allowed {
             return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
         }

@@ -24,5 +24,6 @@ pub mod timing;
 
 pub use context::{Context, ContextOptions};
 pub use error::GpuError;
+pub use pipelines::Fetch;
 pub use renderer::{Options, Renderer};
 pub use select::{Candidate, Choice};

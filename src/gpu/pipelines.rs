@@ -1,10 +1,12 @@
 //! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
 
-use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
-use crate::passes::{Pass, Turn, contract};
-use crate::scene::Scene;
+use super::resources::has_texels;
+use super::{Candidate, GpuError, formats};
+use crate::passes::slots::{Format, Shape};
+use crate::passes::{Pass, Slot, Turn, contract};
+use crate::scene::{Sampling, Scene};
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::HashMap;
@@ -19,7 +21,37 @@ pub struct Pipeline {
     pub handle: vk::Pipeline,
 }
 
-type Key = (&'static str, Vec<(&'static str, i32)>);
+/// Shader, constants, and the formats of what is read: those of storage images are part of the module.
+type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+
+/// How single texels are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fetch {
+    /// `texelFetch` from textures, as the shaders say.
+    Textures,
+    /// `imageLoad` from storage images and texel buffers: the modules are rewritten.
+    Storage,
+}
+
+impl Fetch {
+    /// What is fast on a device. One that is a CPU sends every fetch through its sampler in software; a GPU's textures have
+    /// caches of their own.
+    pub fn of(candidate: &Candidate) -> Fetch {
+        if candidate.is_software() { Fetch::Storage } else { Fetch::Textures }
+    }
+
+    /// What `auto` sampling is then.
+    pub fn sampling(self) -> Sampling {
+        if self == Fetch::Storage { Sampling::Exact } else { Sampling::Hardware }
+    }
+
+    pub fn words(self) -> &'static str {
+        match self {
+            Fetch::Textures => "texels by texelFetch",
+            Fetch::Storage => "texels by imageLoad",
+        }
+    }
+}
 
 /// Where the words of a shader come from; embedded unless hot reload compiles them.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
@@ -29,6 +61,7 @@ pub struct Pipelines {
     context: Arc<Context>,
     made: HashMap<Key, Arc<Pipeline>>,
     shaders: Arc<Shaders>,
+    fetch: Fetch,
     sampler: vk::Sampler,
 }
 
@@ -46,11 +79,12 @@ pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
         Kind::Filtered => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
         Kind::Storage => vk::DescriptorType::STORAGE_IMAGE,
         Kind::Buffer => vk::DescriptorType::STORAGE_BUFFER,
+        Kind::Texels(_) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
     }
 }
 
 impl Pipelines {
-    pub fn new(context: &Arc<Context>, shaders: Arc<Shaders>) -> Result<Pipelines, GpuError> {
+    pub fn new(context: &Arc<Context>, shaders: Arc<Shaders>, fetch: Fetch) -> Result<Pipelines, GpuError> {
         let create = vk::SamplerCreateInfo::default()
             .mag_filter(vk::Filter::LINEAR)
             .min_filter(vk::Filter::LINEAR)
@@ -60,7 +94,7 @@ impl Pipelines {
         // SAFETY: the create structure is complete.
         let sampler = unsafe { context.device.create_sampler(&create, None) }.doing(|| "create sampler".into())?;
         context.name(sampler, "trilinear");
-        Ok(Pipelines { context: context.clone(), made: HashMap::new(), shaders, sampler })
+        Ok(Pipelines { context: context.clone(), made: HashMap::new(), shaders, fetch, sampler })
     }
 
     /// The pipeline of a pass in a scene; made at its first use.
@@ -68,12 +102,20 @@ impl Pipelines {
     /// # Errors
     /// A shader that is not there, or that disagrees with the pass's declaration.
     pub fn get(&mut self, pass: &Pass, scene: &Scene, turn: &Turn) -> Result<Arc<Pipeline>, GpuError> {
-        let key = ((pass.shader)(scene, turn), (pass.constants)(scene, turn));
+        let formats = (pass.reads)(scene, turn).iter().map(|b| b.slot.format(scene)).collect();
+        let key = ((pass.shader)(scene, turn), (pass.constants)(scene, turn), formats);
         if let Some(pipeline) = self.made.get(&key) {
             return Ok(pipeline.clone());
         }
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
-        let words = (self.shaders)(key.0).map_err(at_fault)?;
+        let mut words = (self.shaders)(key.0).map_err(at_fault)?;
+        if self.fetch == Fetch::Storage {
+            let stores = |slot: Slot| match slot.shape(scene) {
+                Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
+                _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
+            };
+            words = contract::with_storage(pass, scene, turn, &words, stores).map_err(at_fault)?;
+        }
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         contract::check(pass, scene, turn, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
         let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, &key, &words, module)?);

@@ -32,6 +32,13 @@ pub struct Work<'a> {
     pub turn: &'a Turn,
 }
 
+/// Where a binding's entry is while a dispatch is bound.
+enum Listed {
+    Image(usize),
+    Buffer(usize),
+    Texels(usize),
+}
+
 /// Parts of a slot: layers of an array, slices of a 3D image; of one of the images that take turns.
 #[derive(Clone, Debug)]
 pub struct Place {
@@ -230,21 +237,26 @@ impl Recorder {
         let binds = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
         let mut images = Vec::with_capacity(binds.len());
         let mut buffers = Vec::with_capacity(binds.len());
-        // Which of the two lists a binding's entry went to, and where.
+        let mut texels = Vec::with_capacity(binds.len());
+        // Which of the three lists a binding's entry went to, and where.
         let mut places = Vec::with_capacity(binds.len());
         for binding in &pipeline.module.bindings {
             let bound = binds.iter().find(|b| b.name == binding.name);
             match (binding.kind, bound.map(|b| (b, slots.get(b.slot, turn.image)))) {
                 (Kind::Params, _) => {
-                    places.push((binding, false, buffers.len()));
+                    places.push((binding, Listed::Buffer(buffers.len())));
                     buffers.push([vk::DescriptorBufferInfo {
                         buffer: self.params.handle,
                         offset: params_offset,
                         range: params_size,
                     }]);
                 }
+                (Kind::Texels(components), Some((_, Resource::Buffer(buffer)))) => {
+                    places.push((binding, Listed::Texels(texels.len())));
+                    texels.push([buffer.texels(components)]);
+                }
                 (_, Some((_, Resource::Buffer(buffer)))) => {
-                    places.push((binding, false, buffers.len()));
+                    places.push((binding, Listed::Buffer(buffers.len())));
                     buffers.push([vk::DescriptorBufferInfo {
                         buffer: buffer.handle,
                         offset: 0,
@@ -256,7 +268,7 @@ impl Recorder {
                         Part::Layer => image.layers[turn.layer as usize],
                         _ => image.view,
                     };
-                    places.push((binding, true, images.len()));
+                    places.push((binding, Listed::Image(images.len())));
                     images.push([vk::DescriptorImageInfo {
                         sampler: vk::Sampler::null(),
                         image_view: view,
@@ -269,11 +281,15 @@ impl Recorder {
         }
         let writes: Vec<_> = places
             .iter()
-            .map(|(binding, is_image, at)| {
+            .map(|(binding, listed)| {
                 let write = vk::WriteDescriptorSet::default()
                     .dst_binding(binding.binding)
                     .descriptor_type(descriptor_type(binding.kind));
-                if *is_image { write.image_info(&images[*at]) } else { write.buffer_info(&buffers[*at]) }
+                match *listed {
+                    Listed::Image(at) => write.image_info(&images[at]),
+                    Listed::Buffer(at) => write.buffer_info(&buffers[at]),
+                    Listed::Texels(at) => write.texel_buffer_view(&texels[at]),
+                }
             })
             .collect();
         // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait.

@@ -8,7 +8,7 @@ use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
+use super::pipelines::{Fetch, Pipeline, Pipelines, Shaders, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
@@ -27,11 +27,13 @@ pub struct Options {
     pub shaders: Arc<Shaders>,
     /// Keep every span of time, host and device, and count invocations.
     pub spans: bool,
+    /// How single texels are read; what is fast on the device unless given.
+    pub fetch: Option<Fetch>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { volume_images: 1, shaders: embedded(), spans: false }
+        Options { volume_images: 1, shaders: embedded(), spans: false, fetch: None }
     }
 }
 
@@ -69,6 +71,7 @@ pub struct Renderer {
     shown: u32,
     measured: Measured,
     spans: bool,
+    fetch: Fetch,
 }
 
 impl Renderer {
@@ -77,9 +80,11 @@ impl Renderer {
     /// # Errors
     /// What the device cannot hold or compile, named.
     pub fn new(context: &Arc<Context>, scene: Scene, options: &Options) -> Result<Renderer, GpuError> {
+        let fetch = options.fetch.unwrap_or(Fetch::of(&context.candidate));
+        let scene = super::formats::suited(context, fetch, scene);
         let plan = Plan::new(&scene);
         super::formats::check(context, &plan, &scene)?;
-        let mut pipelines = Pipelines::new(context, options.shaders.clone())?;
+        let mut pipelines = Pipelines::new(context, options.shaders.clone(), fetch)?;
         let steps = pipelines_of(&mut pipelines, &plan, &scene)?;
         let mut renderer = Renderer {
             lanes: Vec::new(),
@@ -103,6 +108,7 @@ impl Renderer {
             shown: 0,
             measured: Measured::new(context, options.spans),
             spans: options.spans,
+            fetch,
         };
         renderer.lanes = lanes(context, &renderer.scene, options.spans)?;
         renderer.forget_volumes();
@@ -114,8 +120,14 @@ impl Renderer {
         &self.plan
     }
 
+    /// The scene that is shown, with what the device decides of it decided.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// How single texels are read.
+    pub fn fetch(&self) -> Fetch {
+        self.fetch
     }
 
     /// Bytes of a frame as this scene expects it.

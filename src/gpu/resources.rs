@@ -29,6 +29,8 @@ pub struct Buffer {
     context: Arc<Context>,
     pub handle: vk::Buffer,
     pub size: u64,
+    /// A table as texels of one, two and four floats.
+    texels: [vk::BufferView; 3],
     allocation: Option<Allocation>,
 }
 
@@ -108,7 +110,7 @@ impl Image {
             .array_layers(layers)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(formats::usage(slot));
+            .usage(formats::usage(context, slot));
         if slot.crosses_queues() && context.queue_families.len() > 1 {
             create = create.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(&context.queue_families);
         }
@@ -188,11 +190,21 @@ impl Drop for Image {
     }
 }
 
+const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
+
+/// Whether a table of so many bytes can be read by texels, whatever its entries are.
+pub fn has_texels(context: &Context, bytes: u64) -> bool {
+    bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
+}
+
 impl Buffer {
     pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
         let doing = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
         let (usage, location) = match purpose {
-            Purpose::Table => (vk::BufferUsageFlags::STORAGE_BUFFER, MemoryLocation::CpuToGpu),
+            Purpose::Table => (
+                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
+                MemoryLocation::CpuToGpu,
+            ),
             Purpose::Params => (vk::BufferUsageFlags::UNIFORM_BUFFER, MemoryLocation::CpuToGpu),
             Purpose::Staging => (vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
             Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
@@ -204,7 +216,8 @@ impl Buffer {
         let device = &context.device;
         // SAFETY: the create structure is complete.
         let handle = unsafe { device.create_buffer(&create, None) }.doing(doing)?;
-        let mut buffer = Buffer { context: context.clone(), handle, size, allocation: None };
+        let mut buffer =
+            Buffer { context: context.clone(), handle, size, texels: Default::default(), allocation: None };
         // SAFETY: the buffer was just made by this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
         let allocation = allocate(context, name, requirements, location, true, &doing)?;
@@ -213,7 +226,20 @@ impl Buffer {
         buffer.allocation = Some(allocation);
         bound.doing(doing)?;
         context.name(handle, name);
+        if purpose == Purpose::Table && has_texels(context, size) {
+            for (n, format) in TEXELS.into_iter().enumerate() {
+                let create = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
+                // SAFETY: the buffer is bound to memory and alive; every device has these formats as texel buffers.
+                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.doing(doing)?;
+                context.name(buffer.texels[n], name);
+            }
+        }
         Ok(buffer)
+    }
+
+    /// A table as texels of so many floats.
+    pub fn texels(&self, components: u32) -> vk::BufferView {
+        self.texels[components.ilog2().min(2) as usize]
     }
 
     /// The bytes, mapped as long as the buffer lives. Every purpose is visible to the host.
@@ -232,8 +258,13 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: whoever drops a buffer has waited for the device to be done with it.
-        unsafe { self.context.device.destroy_buffer(self.handle, None) };
+        // SAFETY: whoever drops a buffer has waited for the device to be done with it; null handles are allowed.
+        unsafe {
+            for view in self.texels {
+                self.context.device.destroy_buffer_view(view, None);
+            }
+            self.context.device.destroy_buffer(self.handle, None);
+        }
         free(&self.context, self.allocation.take());
     }
 }

@@ -1,15 +1,15 @@
 //! One pass alone on inputs of the caller's: what the tests hold against its reference, and what benches time.
 
-use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::pipelines::{Fetch, Pipeline, Pipelines, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timeline;
+use super::{GpuError, formats};
 use crate::passes::slots::{Filled, Shape};
 use crate::passes::{Arrays, Bind, Part, Pass, Slot, Texels, Turn, When};
 use crate::plan::Plan;
@@ -20,11 +20,17 @@ use std::sync::Arc;
 pub struct Single {
     context: Arc<Context>,
     pipelines: Pipelines,
+    fetch: Fetch,
 }
 
 impl Single {
     pub fn new(context: &Arc<Context>) -> Result<Single, GpuError> {
-        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded())? })
+        Single::fetching(context, Fetch::of(&context.candidate))
+    }
+
+    /// With texels read in a way that may not be the device's fastest.
+    pub fn fetching(context: &Arc<Context>, fetch: Fetch) -> Result<Single, GpuError> {
+        Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)?, fetch })
     }
 
     /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
@@ -37,6 +43,7 @@ impl Single {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
+        let scene = &formats::suited(&self.context, self.fetch, scene.clone());
         let (reads, writes) = ((pass.reads)(scene, turn), (pass.writes)(scene, turn));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, turn.image + 1);
@@ -128,11 +135,23 @@ impl Timed {
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
     ) -> Result<Timed, GpuError> {
+        Timed::fetching(context, scene, pass, contents, Fetch::of(&context.candidate))
+    }
+
+    /// The same with texels read in a way that may not be the device's fastest.
+    pub fn fetching(
+        context: &Arc<Context>,
+        scene: &Scene,
+        pass: &'static Pass,
+        contents: &[(Slot, Texels)],
+        fetch: Fetch,
+    ) -> Result<Timed, GpuError> {
+        let scene = &formats::suited(context, fetch, scene.clone());
         let first = Turn { slice: scene.slices() / 2, ..Turn::default() };
         let first = if pass.when == When::Frame { first } else { Turn { slice: 0, slices: scene.slices(), ..first } };
         let turns: Vec<Turn> = (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let mut pipelines = Pipelines::new(context, embedded())?;
+        let mut pipelines = Pipelines::new(context, embedded(), fetch)?;
         let mut dispatches = Vec::new();
         for turn in turns {
             let binds = [(pass.reads)(scene, &turn), (pass.writes)(scene, &turn)].concat();

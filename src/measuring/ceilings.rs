@@ -37,9 +37,10 @@ pub fn measure(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
     let bytes = 2.0 * Slot::Picture.bytes(&copied) as f64;
     let copy = rate(&measure::COPY, &copied, bytes)?;
     let sampling = rate(&measure::FILTERED, &sampled, samples)?;
+    let exact = rate(&measure::EIGHT_FETCHES, &sampled, samples)?;
     let fetch = rate(&measure::ONE_FETCH, &sampled, samples)?;
     Ok(match (copy, sampling, fetch) {
-        (Some(copy), Some(sampling), Some(fetch)) => Some(Ceilings { copy, sampling, fetch }),
+        (Some(copy), Some(sampling), Some(fetch)) => Some(Ceilings { copy, sampling, exact, fetch }),
         _ => None,
     })
 }

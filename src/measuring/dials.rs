@@ -1,7 +1,7 @@
 //! The dials of a scene: settings that trade error for time, each with the places it is turned to and the place that every
 //! other is held against.
 
-use crate::scene::{Mode, Scene, Scheme, VolumeFormat};
+use crate::scene::{Mode, Sampling, Scene, Scheme, VolumeFormat};
 
 /// One place of a dial.
 #[derive(Clone, Debug)]
@@ -30,6 +30,7 @@ pub const NAMES: &[&str] = &[
     "step",
     "compositing",
     "format",
+    "sampling",
     "filter3d",
     "termination",
     "sigma",
@@ -89,6 +90,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let best = ["slices.format=r32f".to_string(), "ray.sampling=exact".into()];
             let nearly = ["slices.format=r16".to_string(), "ray.sampling=exact".into()];
             made("format", "bits", is(serde_word(&now), bits(now)), others.collect(), &best, &nearly)
+        }
+        "sampling" => {
+            let all = [Sampling::Hardware, Sampling::Exact];
+            let others = all.iter().enumerate().filter(|(_, w)| **w != s.ray.sampling);
+            let set = |w: &Sampling| [format!("ray.sampling={}", serde_word(w))];
+            let others = others.map(|(n, w)| at(serde_word(w), &set(w), n as f64));
+            // `auto` is one of the two.
+            let value = all.iter().position(|w| *w == scene.sampling).unwrap_or(0) as f64;
+            let exact = set(&Sampling::Exact);
+            made("sampling", "", is(serde_word(&s.ray.sampling), value), others.collect(), &exact, &exact)
         }
         "filter3d" => {
             need(marches, "casts no ray")?;

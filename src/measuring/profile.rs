@@ -119,6 +119,7 @@ impl Run {
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
+            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.fetch().words())),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
         (profile, spans.collect())
@@ -236,9 +237,9 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
 
 /// What an upload or a readback moves each way.
 fn copied_bytes(name: &str, scene: &Scene) -> u64 {
-    use crate::passes::Slot;
+    use crate::passes::{Slot, layer};
     match name {
-        "upload" => touched(&Bind { name: "frames", slot: Slot::Frames, part: Part::Layer }, scene),
+        "upload" => touched(&layer("frames", Slot::Frames), scene),
         "readback" => Slot::Screen.bytes(scene),
         _ => 0,
     }

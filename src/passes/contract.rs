@@ -1,9 +1,53 @@
 //! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
 
-use super::slots::Shape;
-use super::{Bind, Params, Part, Pass, Turn, Value};
+use super::slots::{Format, Shape};
+use super::{Bind, Params, Part, Pass, Slot, Turn, Value};
 use crate::scene::Scene;
-use crate::spirv::{Access, Dimension, Kind, Member, Module};
+use crate::spirv::stored::{ImageFormat, as_storage};
+use crate::spirv::tables::as_texels;
+use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
+
+/// A pass's shader, with what it only fetches texels of as storage images, and its tables as storage texel buffers, where
+/// `stores` says that the slot can be one.
+///
+/// # Errors
+/// A module that breaks the format.
+pub fn with_storage(
+    pass: &Pass,
+    scene: &Scene,
+    turn: &Turn,
+    words: &[u32],
+    stores: impl Fn(Slot) -> bool,
+) -> Result<Vec<u32>, String> {
+    let module = spirv::reflect(words).map_err(|e| e.to_string())?;
+    let is_texture = |bind: &Bind| {
+        let binding = module.bindings.iter().find(|b| b.name == bind.name);
+        binding.is_some_and(|b| matches!(b.kind, Kind::Sampled | Kind::Filtered))
+    };
+    let textures: Vec<_> = (pass.reads)(scene, turn)
+        .into_iter()
+        .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
+        .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
+        .collect();
+    let words = as_storage(words, &textures).map_err(|e| e.to_string())?;
+    let reads = (pass.reads)(scene, turn);
+    as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
+}
+
+fn image_format(format: Format) -> Option<ImageFormat> {
+    Some(match format {
+        Format::R8 => ImageFormat::R8,
+        Format::R16 => ImageFormat::R16,
+        Format::R16f => ImageFormat::R16f,
+        Format::R32f => ImageFormat::R32f,
+        Format::Rg16f => ImageFormat::Rg16f,
+        Format::Rg32f => ImageFormat::Rg32f,
+        Format::Rgba16f => ImageFormat::Rgba16f,
+        Format::Rgba32f => ImageFormat::Rgba32f,
+        Format::Rgba8 => ImageFormat::Rgba8,
+        Format::Floats => return None,
+    })
+}
 
 /// The first disagreement, naming both sides.
 pub fn check(pass: &Pass, scene: &Scene, turn: &Turn, module: &Module) -> Result<(), String> {
@@ -44,6 +88,9 @@ fn check_bind(scene: &Scene, module: &Module, bind: &Bind, access: Access) -> Re
     };
     if binding.access != access {
         return Err(format!("glsl declares '{}' {:?}, the pass {verb} it", bind.name, binding.access));
+    }
+    if bind.filtered && binding.kind != Kind::Filtered {
+        return Err(format!("glsl declares '{}' {:?}, the pass takes filtered samples of it", bind.name, binding.kind));
     }
     let declared = binding.dimension;
     let there = match (bind.slot.shape(scene), bind.part) {

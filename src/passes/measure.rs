@@ -19,7 +19,7 @@ pub const FILTERED: Pass = Pass {
     when: When::Picture,
     shader: |_, _| "measure/sampling.plain",
     needed: |_| Err("measures the device, not a scene"),
-    reads: |_, _| vec![whole("volume", Slot::Volume)],
+    reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![whole("picture", Slot::Picture)],
     extent: picture_extent,
     repeat: once,
@@ -36,15 +36,17 @@ pub const FILTERED: Pass = Pass {
     },
 };
 
-/// Trilinear interpolation of our own.
+/// Trilinear interpolation of our own: eight texels, fetched or loaded as the device reads them fastest.
 pub const EIGHT_FETCHES: Pass = Pass {
     name: "measure_eight_fetches",
+    reads: |_, _| vec![whole("volume", Slot::Volume)],
     constants: |_, _| vec![("SAMPLING", 1), ("SAMPLES", SAMPLES as i32)],
     ..FILTERED
 };
 
 pub const ONE_FETCH: Pass = Pass {
     name: "measure_one_fetch",
+    reads: |_, _| vec![whole("volume", Slot::Volume)],
     constants: |_, _| vec![("SAMPLING", 2), ("SAMPLES", SAMPLES as i32)],
     reference: |_, _, reads, writes| {
         mean(reads, writes, |volume, at| {

@@ -160,20 +160,22 @@ pub struct Bind {
     pub name: &'static str,
     pub slot: Slot,
     pub part: Part,
+    /// Samples are taken of it through the device's linear filter; otherwise only texels are fetched.
+    pub filtered: bool,
 }
 
 pub fn whole(name: &'static str, slot: Slot) -> Bind {
-    Bind { name, slot, part: Part::Whole }
+    Bind { name, slot, part: Part::Whole, filtered: false }
 }
 
 /// One slice of a 3D texture, or all of a plane.
 pub fn slice(name: &'static str, slot: Slot) -> Bind {
     let part = if matches!(slot, Slot::Volume | Slot::SharpVolume) { Part::Slice } else { Part::Whole };
-    Bind { name, slot, part }
+    Bind { part, ..whole(name, slot) }
 }
 
 pub fn layer(name: &'static str, slot: Slot) -> Bind {
-    Bind { name, slot, part: Part::Layer }
+    Bind { part: Part::Layer, ..whole(name, slot) }
 }
 
 /// Whether a scene needs a pass, and why (or why not), for `--explain`.

@@ -77,6 +77,8 @@ pub struct Scene {
     pub rays: Rays,
     /// Distance between samples on a ray, mm.
     pub step: f64,
+    /// How the volume is sampled: as asked for, and where that is `Auto` as [`Scene::sampled`] was told last.
+    pub sampling: Sampling,
     /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
     /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
     pub apron: f64,
@@ -126,7 +128,8 @@ impl Scene {
                 format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
             );
         }
-        let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0 };
+        let sampling = settings.ray.sampling;
+        let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, sampling, apron: 0.0 };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
         {
@@ -139,6 +142,19 @@ impl Scene {
         scene.apron = 2.0 + scene.filter_reach();
         check_planes::check_resolved(&scene)?;
         Ok(scene)
+    }
+
+    /// The scene where samples are taken fastest in this way: what `auto` becomes on a device.
+    pub fn sampled(mut self, fastest: Sampling) -> Scene {
+        if self.settings.ray.sampling == Sampling::Auto {
+            self.sampling = fastest;
+        }
+        self
+    }
+
+    /// Whether samples of the volume go through the device's own filter.
+    pub fn filters_in_hardware(&self) -> bool {
+        self.sampling != Sampling::Exact
     }
 
     pub fn probe(&self) -> Option<&Probe> {

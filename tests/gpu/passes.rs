@@ -5,11 +5,13 @@ use crate::common::*;
 use crate::scenes::{ALL_FILTERS, scenes};
 use echolume::gpu::renderer::size_of;
 use echolume::gpu::single::Single;
+use echolume::gpu::{Fetch, Options, Renderer};
 use echolume::passes::slots::{Filled, Shape};
 use echolume::passes::{Arrays, Bind, MISS, PASSES, Part, Pass, Slot, Texels, Turn, measure};
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
-use echolume::scene::Scene;
+use echolume::scene::{Sampling, Scene};
+use std::collections::HashSet;
 
 /// What outputs hold before a pass: no pass computes it by chance, and every format stores it (nearly).
 const POISON: f64 = 0.654_321;
@@ -201,14 +203,67 @@ fn every_pass_matches_its_reference() {
     assert!(failures.is_empty(), "{} failures:\n{}", failures.len(), failures.join("\n"));
 }
 
+/// How texels are read may cost time, never a bit: every pass that reads some, in every format and variant that the scenes have.
+#[test]
+fn texels_loaded_are_the_texels_fetched() {
+    let device = Device::new();
+    let ways = [Fetch::Textures, Fetch::Storage];
+    let mut singles = ways.map(|fetch| Single::fetching(&device, fetch).expect("single"));
+    let (mut seen, mut loaded) = (HashSet::new(), 0);
+    for (name, mut scene) in scenes() {
+        // Automatic sampling would be another for each way.
+        if scene.settings.ray.sampling == Sampling::Auto {
+            (scene.settings.ray.sampling, scene.sampling) = (Sampling::Exact, Sampling::Exact);
+        }
+        for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
+            let reads: Vec<_> = (pass.reads)(&scene, &Turn::default()).iter().map(|b| b.slot.format(&scene)).collect();
+            // Once with each shader, the formats of what it reads, and what is special about it.
+            let shader = (pass.shader)(&scene, &Turn::default());
+            if !seen.insert((shader, reads, (pass.constants)(&scene, &Turn::default()))) {
+                continue;
+            }
+            let [fetched, stored] = singles.each_mut().map(|s| run_one(s, &scene, pass, 0, "noise", 3).2);
+            for ((name_of, fetched), (_, stored)) in fetched.iter().zip(stored.iter()) {
+                let differ = fetched.values.iter().zip(&stored.values).filter(|(a, b)| a.to_bits() != b.to_bits());
+                assert_eq!(differ.count(), 0, "texels of '{name_of}' by {} in '{name}'", pass.name);
+            }
+            loaded += 1;
+        }
+    }
+    assert!(loaded > 100, "{loaded} passes were held against each other");
+}
+
+#[test]
+fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_stays() {
+    let device = Device::new();
+    let sampled = |fetch, asked: &str| {
+        let toml =
+            format!("picture = {{ size = [8, 8] }}\nslices = {{ pixels = 8 }}\nray = {{ sampling = '{asked}' }}");
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml);
+        let options = Options { fetch, ..Options::default() };
+        let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
+        let before = renderer.scene().sampling;
+        renderer.change(scene).expect("change");
+        assert_eq!(before, renderer.scene().sampling, "a change of scene changes nothing of it");
+        before
+    };
+    assert_eq!(sampled(Some(Fetch::Textures), "auto"), Sampling::Hardware);
+    assert_eq!(sampled(Some(Fetch::Storage), "auto"), Sampling::Exact);
+    assert_eq!(sampled(Some(Fetch::Storage), "hardware"), Sampling::Hardware);
+    assert_eq!(sampled(Some(Fetch::Textures), "exact"), Sampling::Exact);
+    assert_eq!(sampled(None, "auto"), Fetch::of(&device.candidate).sampling());
+}
+
 #[test]
 fn what_measures_the_device_computes_what_it_says() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
     let scene = measure::scene(11, 19).expect("scene");
-    for pass in measure::MEASURES {
-        let (_, expected, got, writes) = run_one(&mut single, &scene, pass, 0, "noise", 7);
-        compare(pass, &scene, &expected, &got, &writes).unwrap_or_else(|e| panic!("{}: {e}", pass.name));
+    for fetch in [Fetch::Textures, Fetch::Storage] {
+        let mut single = Single::fetching(&device, fetch).expect("single");
+        for pass in measure::MEASURES {
+            let (_, expected, got, writes) = run_one(&mut single, &scene, pass, 0, "noise", 7);
+            compare(pass, &scene, &expected, &got, &writes).unwrap_or_else(|e| panic!("{}: {e}", pass.name));
+        }
     }
 }
 

@@ -54,10 +54,12 @@ pub fn scenes() -> Vec<(String, Scene)> {
         add(name, geometry, BYTES, toml);
     }
     for format in ["r8", "r16", "r16f", "r32f"] {
-        let toml = format!(
-            "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.6 }}"
-        );
-        add(&format!("volume in {format}, the device's filter"), &sweep, BYTES, &toml);
+        for sampling in ["hardware", "exact"] {
+            let toml = format!(
+                "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.6, sampling = '{sampling}' }}"
+            );
+            add(&format!("volume in {format}, sampling {sampling}"), &sweep, BYTES, &toml);
+        }
     }
     for (name, stored, range) in [("u16", StoredType::U16, [1000.0, 40000.0]), ("f32", StoredType::F32, [-0.25, 1.5])] {
         let toml = "slices = { pixels = 9 }\npicture = { size = [1, 1] }\nray = { sampling = 'exact' }";

@@ -115,6 +115,7 @@ pub fn profile(repeats: usize) -> Profile {
         host: Vec::new(),
         wall_ns: vec![2e6; repeats],
         device_ns: vec![0.0; repeats],
-        ceilings: Some(Ceilings { copy: ceiling(4e11), sampling: ceiling(1e11), fetch: ceiling(2e11) }),
+        ceilings: Some(Ceilings { copy: ceiling(4e11), sampling: ceiling(1e11), exact: None, fetch: ceiling(2e11) }),
+        sampling: None,
     }
 }

@@ -10,6 +10,7 @@ impl Renderer {
     /// A shader that does not compile or a slot that the device cannot hold at all leaves the old scene as it was. When memory
     /// runs out half-way nothing can be drawn until another change succeeds; that one builds everything anew.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
+        let scene = super::super::formats::suited(&self.context, self.fetch, scene);
         let plan = Plan::new(&scene);
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&self.scene, &scene) };
         super::super::formats::check(&self.context, &plan, &scene)?;

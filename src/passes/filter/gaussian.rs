@@ -47,9 +47,9 @@ pub const ELEVATION: Pass = Pass {
     needed: |s| asked(s, 2),
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
-        vec![Bind { name: "source", slot: Slot::SharpVolume, part }]
+        vec![Bind { part, ..whole("source", Slot::SharpVolume) }]
     },
-    writes: |_, _| vec![Bind { name: "target", slot: Slot::Volume, part: Part::Around(0) }],
+    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("target", Slot::Volume) }],
     extent: |s, t| [s.grid.size[0], s.grid.size[1], t.slices],
     repeat: once,
     params: |s, t| params(s, 2, t),

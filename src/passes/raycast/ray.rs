@@ -4,7 +4,7 @@ use crate::passes::skip::Leaps;
 use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
-use crate::scene::{MAX_CLIPS, Sampling, Scene, View};
+use crate::scene::{MAX_CLIPS, Scene, View};
 
 /// Picks the variant that has the tables this geometry needs, and no other.
 macro_rules! variant {
@@ -41,7 +41,7 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
 
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, uneven, moved) = tables(scene);
-    let mut reads = vec![whole("volume", Slot::Volume)];
+    let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
@@ -70,14 +70,10 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
             },
         ),
     };
-    let sampling = match scene.settings.ray.sampling {
-        Sampling::Hardware => 0,
-        Sampling::Exact => 1,
-    };
     vec![
         ("SWEEP", sweep),
         ("ARRAY", array),
-        ("SAMPLING", sampling),
+        ("SAMPLING", !scene.filters_in_hardware() as i32),
         ("CLIPS", scene.settings.clip.len() as i32),
         ("SPREAD", scene.spreads() as i32),
     ]

@@ -63,6 +63,9 @@ pub struct Profile {
     /// From the first pass' begin to the last one's end, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     pub ceilings: Option<Ceilings>,
+    /// How the volume is sampled and texels are read, in words.
+    #[serde(default)]
+    pub sampling: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -149,7 +152,10 @@ pub struct Ceilings {
     pub copy: Ceiling,
     /// Filtered samples.
     pub sampling: Ceiling,
-    /// Texel fetches.
+    /// Samples of eight texels, interpolated by the shader.
+    #[serde(default)]
+    pub exact: Option<Ceiling>,
+    /// Texel fetches, or loads where the device takes those.
     pub fetch: Ceiling,
 }
 
@@ -246,7 +252,8 @@ impl Profile {
         }
         let ceilings =
             self.ceilings.iter().flat_map(|c| [("copy", c.copy), ("sampling", c.sampling), ("fetch", c.fetch)]);
-        for (name, ceiling) in ceilings {
+        let exact = self.ceilings.iter().filter_map(|c| Some(("exact", c.exact?)));
+        for (name, ceiling) in ceilings.chain(exact) {
             if ![ceiling.low, ceiling.median, ceiling.high].iter().all(|v| v.is_finite() && *v >= 0.0) {
                 return fault(name, format!("ceiling {ceiling:?} is not finite and at least 0"));
             }

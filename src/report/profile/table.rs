@@ -91,12 +91,16 @@ fn conditions(profile: &Profile) -> String {
         ("sizes", sizes),
         ("repeats", format!("{} after {} to warm up", profile.repeats, profile.warm_up)),
     ];
+    if let Some(sampling) = &profile.sampling {
+        rows.push(("samples", sampling.clone()));
+    }
     if let Some(ceilings) = &profile.ceilings {
         let rate = |c: &Ceiling| format!("{:.2} ({:.2}..{:.2})", c.median * 1e-9, c.low * 1e-9, c.high * 1e-9);
         let line = format!(
-            "copy {} GB/s, sampling {} G/s, fetch {} G/s",
+            "copy {} GB/s, sampling {} G/s{}, fetch {} G/s",
             rate(&ceilings.copy),
             rate(&ceilings.sampling),
+            ceilings.exact.as_ref().map_or_else(String::new, |c| format!(", by eight texels {} G/s", rate(c))),
             rate(&ceilings.fetch)
         );
         rows.push(("ceilings", line));

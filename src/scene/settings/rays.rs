@@ -55,7 +55,7 @@ impl Default for Ray {
         Ray {
             step: None,
             early_end: 1.0 / 512.0,
-            sampling: Sampling::Hardware,
+            sampling: Sampling::Auto,
             spread: 0.0,
             sliding: 0,
             entries: 1025,
@@ -68,9 +68,22 @@ impl Default for Ray {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sampling {
-    /// The device's own trilinear filter; its weights may have no more than 8 bits.
+    /// Whichever the device takes faster: a GPU filters in hardware, a CPU loads eight texels sooner than it works through a sampler.
     #[default]
+    Auto,
+    /// The device's own trilinear filter; its weights may have no more than 8 bits.
     Hardware,
-    /// Eight fetches and our own interpolation in f32.
+    /// Eight texels and our own interpolation in f32.
     Exact,
+}
+
+impl Sampling {
+    /// For `--explain` and profiles.
+    pub fn words(self) -> &'static str {
+        match self {
+            Sampling::Auto => "as the device takes them fastest",
+            Sampling::Hardware => "by the device's trilinear filter",
+            Sampling::Exact => "eight texels each, interpolated in f32",
+        }
+    }
 }
