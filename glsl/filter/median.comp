@@ -1,78 +1,55 @@
 // Median of a square window; beyond the border the nearest pixel stands in. Of distances: hits and misses vote, and where
-// hits win, the (lower) median of the hits, so that a pinhole is closed and no rim is drawn towards a miss.
+// hits win, the (lower) median of the hits, so that a pinhole is closed and no rim is drawn towards a miss. An invocation
+// makes four pixels, one below the other, whose windows share most of their texels.
 // variants: plane; slice SLICE; distance DISTANCE
 #version 460
-layout(constant_id = 0) const int RADIUS = 1;
+#ifdef DISTANCE
+layout(constant_id = 0) const int RADIUS = 7;
+#endif
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
     int slice;
 };
 #include "filter.glsl"
 
+const int RUN = 4;
+float tap(ivec2 at, ivec2 last) { return read_at(ivec3(clamp(at, ivec2(0), last), 0)); }
+
+#ifdef DISTANCE
+#include "median.glsl"
+#else
+vec3 sorted(vec3 v) {
+    float low = min(v.x, v.y), high = max(v.x, v.y), rest = max(low, v.z);
+    return vec3(min(low, v.z), min(high, rest), max(high, rest));
+}
+
+// Of 3x3, from rows that are sorted: the middle of the largest least, the middle middle and the smallest largest.
+vec4 medians(ivec2 at, ivec2 last) {
+    vec3 row[RUN + 2];
+    for (int y = 0; y < RUN + 2; ++y) {
+        ivec2 tap_at = at + ivec2(0, y - 1);
+        row[y] = sorted(vec3(tap(tap_at - ivec2(1, 0), last), tap(tap_at, last), tap(tap_at + ivec2(1, 0), last)));
+    }
+    vec4 found;
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        vec3 a = row[i], b = row[i + 1], c = row[i + 2];
+        float least = max(max(a.x, b.x), c.x), most = min(min(a.z, b.z), c.z);
+        float middle = max(min(a.y, b.y), min(max(a.y, b.y), c.y));
+        found[i] = max(min(least, middle), min(max(least, middle), most));
+    }
+    return found;
+}
+#endif
+
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID);
+    at.y *= RUN;
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;
-
-    float low = MISS, high = -MISS;
-    int valid = 0;
-    for (int y = -RADIUS; y <= RADIUS; ++y) {
-        for (int x = -RADIUS; x <= RADIUS; ++x) {
-            float value = read_at(ivec3(clamp(at.xy + ivec2(x, y), ivec2(0), last), at.z));
-            if (!VALID(value)) continue;
-            low = min(low, value);
-            high = max(high, value);
-            ++valid;
-        }
+    vec4 found = medians(at.xy, last);
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        if (at.y + i <= last.y) write_at(at + ivec3(0, i, 0), found[i]);
     }
-    int window = (2 * RADIUS + 1) * (2 * RADIUS + 1);
-    if (2 * valid <= window) {
-        write_at(at, MISS);
-        return;
-    }
-    // Selection by narrowing the value range (after Torben Mogensen's method): every round ends on values that are there, so
-    // the result is exact, and no window has to be held in registers. The guess goes by rank, as if values lay evenly, which
-    // on a smooth surface they do; every other round halves the range, so that a cliff costs no more than a logarithm.
-    int rank = (valid - 1) / 2;
-    int under_low = 0, within = valid; // values below `low`, and from `low` to `high`
-    float found = low;
-    bool halve = false;
-    while (low < high) {
-        float share = halve ? 0.5 : (float(rank - under_low) + 0.5) / float(within);
-        halve = !halve;
-        // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
-        float guess = clamp(low + share * (high - low), low, high);
-        int below = 0, equal = 0;
-        float under = low, over = high;
-        for (int y = -RADIUS; y <= RADIUS; ++y) {
-            for (int x = -RADIUS; x <= RADIUS; ++x) {
-                float value = read_at(ivec3(clamp(at.xy + ivec2(x, y), ivec2(0), last), at.z));
-                if (!VALID(value)) continue;
-                if (value < guess) {
-                    ++below;
-                    under = max(under, value);
-                } else if (value == guess) {
-                    ++equal;
-                } else {
-                    over = min(over, value);
-                }
-            }
-        }
-        if (rank < below) {
-            high = under;
-            found = under;
-            within = below - under_low;
-        } else if (rank < below + equal) {
-            low = guess;
-            high = guess;
-            found = guess;
-        } else {
-            low = over;
-            found = over;
-            within -= below + equal - under_low;
-            under_low = below + equal;
-        }
-    }
-    write_at(at, found);
 }

@@ -1,10 +1,12 @@
 // Lee's sigma filter: the mean of the neighbours within `range` of the centre; where no more than `few` are, nor all that
-// there are, the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.)
+// there are, the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.) An invocation makes four pixels, one below
+// the other, whose windows share most of their texels.
 // variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
 layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of the centre
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
     float few;   // K
@@ -12,47 +14,79 @@ layout(scalar) uniform Params {
 };
 #include "filter.glsl"
 
+#ifdef PICTURE
+#define SCARCE(count, enough) any(lessThanEqual(count, vec4(enough)))
+#define WHERE_CLOSE(away, within, value) mix(vec4(0.0), value, lessThanEqual(abs(away), within))
+#else
+#define SCARCE(count, enough) ((count) <= (enough))
+#define WHERE_CLOSE(away, within, value) (abs(away) <= (within) ? (value) : 0.0)
+#endif
+const int RUN = 4;
+
 void main() {
     ivec3 at = ivec3(gl_GlobalInvocationID);
+    at.y *= RUN;
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
-    T centre = read_at(at);
-    if (!VALID(centre)) {
-        write_at(at, centre);
-        return;
+    ivec2 last = size.xy - 1;
+    T centre[RUN], within[RUN];
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        centre[i] = read_at(ivec3(at.x, min(at.y + i, last.y), at.z));
+        within[i] = MULTIPLICATIVE != 0 ? range * abs(centre[i]) : T(range);
     }
-    T within = MULTIPLICATIVE != 0 ? range * abs(centre) : T(range);
     // Sums of differences from the centre: a distance of 100 mm keeps its micrometres in f32.
-    T sum = T(0.0);
-    T count = T(0.0);
-    float there = 0.0;
-    ivec2 low = max(at.xy - RADIUS, ivec2(0)), high = min(at.xy + RADIUS, size.xy - 1);
-    for (int y = low.y; y <= high.y; ++y) {
-        for (int x = low.x; x <= high.x; ++x) {
-            T away = read_at(ivec3(x, y, at.z)) - centre;
-            T inside = WITHIN(away, within);
-            bool valid = VALID(away + centre);
-            if (!valid) inside = T(0.0);
-            there += valid ? 1.0 : 0.0;
-            sum += inside * min(away, within);
-            count += inside;
+    T sum[RUN] = T[RUN](T(0.0), T(0.0), T(0.0), T(0.0)), count[RUN] = sum;
+    float there[RUN] = float[RUN](0.0, 0.0, 0.0, 0.0);
+    int top = max(at.y - RADIUS, 0), bottom = min(at.y + RUN - 1 + RADIUS, last.y);
+    for (int y = top; y <= bottom; ++y) {
+        T row_sum[RUN] = T[RUN](T(0.0), T(0.0), T(0.0), T(0.0)), row_count[RUN] = row_sum;
+        float row_there = 0.0;
+        [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
+            int column = clamp(at.x + x, 0, last.x);
+            T value = read_at(ivec3(column, y, at.z));
+            bool is_there = column == at.x + x && VALID(value);
+            // Further away than `range` can be, as a miss is from any hit.
+            if (!is_there) value = T(MISS);
+            row_there += is_there ? 1.0 : 0.0;
+            [[unroll]] for (int i = 0; i < RUN; ++i) {
+                T away = value - centre[i];
+                row_sum[i] += WHERE_CLOSE(away, within[i], away);
+                row_count[i] += WHERE_CLOSE(away, within[i], T(1.0));
+            }
+        }
+        [[unroll]] for (int i = 0; i < RUN; ++i) {
+            float part = abs(y - at.y - i) <= RADIUS ? 1.0 : 0.0;
+            sum[i] += part * row_sum[i];
+            count[i] += part * row_count[i];
+            there[i] += part * row_there;
         }
     }
-    T near_sum = T(0.0);
-    float near_count = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        ivec2 next = at.xy + ivec2((i & 1) * (i - 2), (1 - (i & 1)) * (i - 1));
-        if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next, size.xy))) continue;
-        T value = read_at(ivec3(next, at.z));
-        if (!VALID(value)) continue;
-        near_sum += value - centre;
-        near_count += 1.0;
-    }
-    T mean = sum / count;
-    T neighbours = near_count > 0.0 ? near_sum / near_count : T(0.0);
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        ivec3 here = at + ivec3(0, i, 0);
+        if (here.y > last.y) break;
+        T result = centre[i];
+        if (VALID(centre[i])) {
+            float enough = min(few, there[i] - 1.0);
+            result += sum[i] / count[i];
+            if (SCARCE(count[i], enough)) {
+                T near_sum = T(0.0);
+                float near_count = 0.0;
+                for (int n = 0; n < 4; ++n) {
+                    ivec2 next = here.xy + ivec2((n & 1) * (n - 2), (1 - (n & 1)) * (n - 1));
+                    if (any(lessThan(next, ivec2(0))) || any(greaterThan(next, last))) continue;
+                    T value = read_at(ivec3(next, at.z));
+                    if (!VALID(value)) continue;
+                    near_sum += value - centre[i];
+                    near_count += 1.0;
+                }
+                T neighbours = near_count > 0.0 ? near_sum / near_count : T(0.0);
 #ifdef PICTURE
-    write_at(at, centre + mix(mean, neighbours, lessThanEqual(count, vec4(min(few, there - 1.0)))));
+                result = mix(result, centre[i] + neighbours, lessThanEqual(count[i], vec4(enough)));
 #else
-    write_at(at, centre + (count <= min(few, there - 1.0) ? neighbours : mean));
+                result = centre[i] + neighbours;
 #endif
+            }
+        }
+        write_at(here, result);
+    }
 }

@@ -40,6 +40,7 @@ fn image_format(format: Format) -> Option<ImageFormat> {
         Format::R16 => ImageFormat::R16,
         Format::R16f => ImageFormat::R16f,
         Format::R32f => ImageFormat::R32f,
+        Format::Rg16 => ImageFormat::Rg16,
         Format::Rg16f => ImageFormat::Rg16f,
         Format::Rg32f => ImageFormat::Rg32f,
         Format::Rgba16f => ImageFormat::Rgba16f,

@@ -325,3 +325,12 @@ pub fn picture_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
 pub fn ray_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
     [scene.ray_size()[0], scene.ray_size()[1], 1]
 }
+
+/// Neighbours that one invocation of some filters makes, because their windows share most texels: RUN of glsl/filter.
+pub const RUN: u32 = 4;
+
+/// Invocations that make so many texels in runs along an axis.
+pub fn in_runs(mut texels: [u32; 3], axis: usize) -> [u32; 3] {
+    texels[axis] = texels[axis].div_ceil(RUN);
+    texels
+}

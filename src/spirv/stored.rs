@@ -16,6 +16,7 @@ pub enum ImageFormat {
     Rg32f = 6,
     Rg16f = 7,
     R16f = 9,
+    Rg16 = 12,
     R16 = 14,
     R8 = 15,
 }

@@ -2,7 +2,7 @@
 //! volume kept up to date slice by slice.
 
 use crate::common::*;
-use echolume::passes::Slot;
+use echolume::passes::{Slot, in_runs};
 use echolume::plan::{Plan, affected};
 use echolume::probe::Geometry;
 use echolume::scene::Scene;
@@ -176,7 +176,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
         slices.iter().for_each(|s| changed[*s] = true);
         let expected: Vec<_> = affected(&changed, reach)
             .iter()
-            .map(|run| ("gaussian_elevation", [size[0], size[1], run.end - run.start]))
+            .map(|run| ("gaussian_elevation", in_runs([size[0], size[1], run.end - run.start], 2)))
             .collect();
         let got: Vec<_> = recorded.into_iter().filter(|(name, _)| *name == "gaussian_elevation").collect();
         assert_eq!(got, expected, "{slices:?}");

@@ -18,7 +18,7 @@ pub const DISTANCE: Pass = Pass {
     },
     reads: |s, t| vec![whole("source", distance_link(s, NAME, t).0)],
     writes: |s, t| vec![whole("target", distance_link(s, NAME, t).1)],
-    extent: ray_extent,
+    extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| settings(s).repeat,
     params: |s, t| {
         let b = settings(s);

@@ -12,7 +12,7 @@ pub const PASS: Pass = Pass {
     needed: super::asked,
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
-        vec![whole("brick_table", Slot::BrickTable), Bind { name: "tile_ranges", slot: Slot::TileRanges, part }]
+        vec![whole("brick_table", Slot::BrickTable), Bind { part, ..whole("tile_ranges", Slot::TileRanges) }]
     },
     writes: |_, _| vec![whole("brick_ranges", Slot::BrickRanges)],
     extent: |s, _| s.bricks().count,

@@ -11,8 +11,8 @@ pub const PASS: Pass = Pass {
     shader: |_, _| "skip/tile_ranges.plain",
     needed: super::asked,
     // A slice changes with the frames that are smoothed into it.
-    reads: |s, _| vec![Bind { name: "volume", slot: Slot::Volume, part: Part::Around(s.smoothing_radius()[2]) }],
-    writes: |_, _| vec![Bind { name: "tile_ranges", slot: Slot::TileRanges, part: Part::Around(0) }],
+    reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],
+    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("tile_ranges", Slot::TileRanges) }],
     extent: |s, t| {
         let [width, height, _] = s.tile_counts();
         [width, height, t.slices]

@@ -1,0 +1,146 @@
+// Exact medians of the hits in the windows of four pixels one below the other. Eight thresholds at a time are counted over
+// the rows that the windows share, each for all four; they close in on the ranks wanted, and once at most three values lie
+// between a threshold and the rank, one more look keeps the four least above it. Nothing is held but counts, at any window.
+// Whoever includes this declares RADIUS and `float tap(ivec2, ivec2)`.
+const vec4 PLACE = vec4(0.0, 1.0, 2.0, 3.0);
+const int ROUNDS = 6;
+
+vec4 ones(bvec4 which) { return mix(vec4(0.0), vec4(1.0), which); }
+bvec4 both(bvec4 a, bvec4 b) { return bvec4(ivec4(a) & ivec4(b)); }
+// The windows that hold a row, counted from the uppermost pixel's.
+bvec4 holding(int row) { return lessThanEqual(abs(float(row) - PLACE), vec4(RADIUS)); }
+
+struct Counts {
+    vec4 below[8]; // values below each threshold, by window
+    vec4 hits, least, most;
+};
+
+Counts counted(ivec2 at, ivec2 last, vec4 a, vec4 b, bool first) {
+    Counts c = Counts(vec4[8](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0)),
+                      vec4(0.0), vec4(MISS), vec4(-MISS));
+    for (int y = -RADIUS; y < RADIUS + 4; ++y) {
+        vec4 row_a = vec4(0.0), row_b = vec4(0.0);
+        float hits = 0.0, least = MISS, most = -MISS;
+        [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
+            float value = tap(at + ivec2(x, y), last);
+            row_a += ones(lessThan(vec4(value), a));
+            row_b += ones(lessThan(vec4(value), b));
+            if (first) {
+                hits += is_hit(value) ? 1.0 : 0.0;
+                least = min(least, value);
+                most = max(most, is_hit(value) ? value : -MISS);
+            }
+        }
+        bvec4 inside = holding(y);
+        vec4 part = ones(inside);
+        for (int i = 0; i < 4; ++i) {
+            c.below[i] += row_a[i] * part;
+            c.below[4 + i] += row_b[i] * part;
+        }
+        if (first) {
+            c.hits += hits * part;
+            c.least = mix(c.least, min(c.least, vec4(least)), inside);
+            c.most = mix(c.most, max(c.most, vec4(most)), inside);
+        }
+    }
+    return c;
+}
+
+// Where values repeat so often that no threshold comes within three of the rank: by narrowing the range (after Torben
+// Mogensen's method). Every round ends on values that are there. The guess goes by rank, as if values lay evenly; every other
+// round halves the range, so that a cliff costs no more than a logarithm.
+float narrowed(ivec2 at, ivec2 last, float rank, float low, float high, float under_low, float within) {
+    float found = low;
+    bool halve = false;
+    while (low < high) {
+        float share = halve ? 0.5 : clamp((rank - under_low + 0.5) / within, 0.0, 1.0);
+        halve = !halve;
+        // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
+        float guess = clamp(mix(low, high, share), low, high);
+        float below = 0.0, equal = 0.0, under = low, over = high;
+        for (int y = -RADIUS; y <= RADIUS; ++y) {
+            for (int x = -RADIUS; x <= RADIUS; ++x) {
+                float value = tap(at + ivec2(x, y), last);
+                if (value < guess) {
+                    below += 1.0;
+                    under = max(under, value);
+                } else if (value == guess) {
+                    equal += 1.0;
+                } else {
+                    over = min(over, value);
+                }
+            }
+        }
+        if (rank < below) {
+            high = under;
+            found = under;
+            within = below - under_low;
+        } else if (rank < below + equal) {
+            low = guess;
+            high = guess;
+            found = guess;
+        } else {
+            low = over;
+            found = over;
+            within -= below + equal - under_low;
+            under_low = below + equal;
+        }
+    }
+    return found;
+}
+
+vec4 medians(ivec2 at, ivec2 last) {
+    // The first thresholds are values of the window, around its middle.
+    vec4 a, b;
+    for (int i = 0; i < 4; ++i) {
+        vec2 inner = float(RADIUS) * vec2(0.1, 0.3), outer = float(RADIUS) * vec2(0.65, -0.25);
+        mat2 turn = i == 0 ? mat2(1, 0, 0, 1) : i == 1 ? mat2(0, 1, -1, 0) : i == 2 ? mat2(-1, 0, 0, -1) : mat2(0, -1, 1, 0);
+        a[i] = tap(at + ivec2(0, 1) + ivec2(round(turn * inner)), last);
+        b[i] = tap(at + ivec2(0, 1) + ivec2(round(turn * outer)), last);
+    }
+    Counts c = counted(at, last, a, b, true);
+    bvec4 surface = greaterThan(2.0 * c.hits, vec4((2 * RADIUS + 1) * (2 * RADIUS + 1)));
+    if (!any(surface)) return vec4(MISS);
+    // The value of rank `rank` lies from low to high; `under` lie below low, `upto` not above high.
+    vec4 low = c.least, high = c.most, under = vec4(0.0), upto = c.hits, rank = floor((c.hits - 1.0) * 0.5);
+    for (int round = 0; round < ROUNDS; ++round) {
+        for (int i = 0; i < 8; ++i) {
+            vec4 t = vec4(i < 4 ? a[i & 3] : b[i & 3]);
+            bvec4 is_under = lessThanEqual(c.below[i], rank);
+            bvec4 raise = both(is_under, greaterThan(t, low)), lower = both(not(is_under), lessThan(t, high));
+            low = mix(low, t, raise);
+            under = mix(under, c.below[i], raise);
+            high = mix(high, t, lower);
+            upto = mix(upto, c.below[i], lower);
+        }
+        vec4 above = rank - under, within = max(upto - under, vec4(1.0));
+        if (!any(both(surface, both(greaterThan(above, vec4(3.0)), lessThan(low, high))))) break;
+        // Where the rank would be if values lay evenly, a little below it so that the last look is from below.
+        vec4 margin = 0.25 * sqrt(within);
+        a = mix(low, high, clamp((above - 1.0 - margin) / within, 0.0, 1.0));
+        b = mix(low, high, clamp((above - 1.0 + margin) / within, 0.0, 1.0));
+        c = counted(at, last, a, b, false);
+    }
+    // Of the values from low on the four least, in order.
+    vec4 v0 = vec4(MISS), v1 = v0, v2 = v0, v3 = v0;
+    for (int y = -RADIUS; y < RADIUS + 4; ++y) {
+        vec4 from = mix(vec4(MISS), low, holding(y));
+        [[unroll]] for (int x = -RADIUS; x <= RADIUS; ++x) {
+            float value = tap(at + ivec2(x, y), last);
+            vec4 v = mix(vec4(MISS), vec4(value), greaterThanEqual(vec4(value), from));
+            v3 = min(v3, max(v2, v));
+            v2 = min(v2, max(v1, v));
+            v1 = min(v1, max(v0, v));
+            v0 = min(v0, v);
+        }
+    }
+    vec4 above = rank - under;
+    vec4 found = mix(mix(v0, v1, greaterThan(above, vec4(0.0))), mix(v2, v3, greaterThan(above, vec4(2.0))), greaterThan(above, vec4(1.0)));
+    found = mix(vec4(MISS), found, surface);
+    for (int i = 0; i < 4; ++i) {
+        if (surface[i] && above[i] > 3.0) {
+            found[i] = narrowed(at + ivec2(0, i), last, rank[i], low[i], high[i], under[i], upto[i] - under[i]);
+        }
+    }
+    return found;
+}
