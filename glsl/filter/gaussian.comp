@@ -6,12 +6,12 @@ layout(constant_id = 1) const int AXIS = 0;
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
     float narrowness; // 1 / (2 sigma^2), a texel
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
 #ifdef VOLUME
     at.z += slice; // the first that is made anew

@@ -5,12 +5,12 @@
 layout(constant_id = 0) const int RADIUS = 1;
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;

@@ -8,12 +8,12 @@ layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
     float few;   // K
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     T centre = read_at(at);

@@ -40,6 +40,15 @@ uniform writeonly image3D target;
 uniform writeonly image2D target;
 #endif
 
+// The texel that this invocation makes: of a slice, what can be seen begins at its first.
+ivec3 made_texel() {
+#if defined(DISTANCE) || defined(PICTURE)
+    return ivec3(gl_GlobalInvocationID);
+#else
+    return ivec3(gl_GlobalInvocationID) + ivec3(first_column, first_row, 0);
+#endif
+}
+
 void write_at(ivec3 at, T value) {
 #if defined(VOLUME)
     imageStore(target, at, STORED(value));

@@ -250,7 +250,7 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let constants = (pass.constants)(scene, &turn);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
-    let texels: u64 = (pass.extent)(scene, &turn).iter().map(|n| u64::from(*n)).product();
+    let texels: u64 = pass.invocations(scene, &turn).iter().map(|n| u64::from(*n)).product();
     let window = match pass.name.split('_').next()? {
         "gaussian" => edge,
         "sigma" => edge * edge,

@@ -8,11 +8,13 @@ pub mod cube;
 pub mod load;
 pub mod planes;
 mod region;
+pub mod seen;
 pub mod settings;
 pub mod transfer;
 
 pub use camera::Rays;
 pub use region::insonified_box;
+pub use seen::Seen;
 pub use settings::*;
 
 use crate::probe::{Array, Geometry, Probe};
@@ -78,6 +80,8 @@ pub struct Scene {
     /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
     /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
     pub apron: f64,
+    /// The texels of the volume that stage 2 can look at: stage 1 makes these.
+    pub seen: seen::Seen,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -124,7 +128,8 @@ impl Scene {
                 format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
             );
         }
-        let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0 };
+        let mut scene =
+            Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0, seen: Seen::default() };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
         {
@@ -136,6 +141,7 @@ impl Scene {
         }
         scene.apron = 2.0 + scene.filter_reach();
         check_planes::check_resolved(&scene)?;
+        scene.seen = seen::seen(&scene);
         Ok(scene)
     }
 
