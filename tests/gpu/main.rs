@@ -24,6 +24,7 @@ mod recordings;
 mod reruns;
 mod scenes;
 mod sector;
+mod seen;
 mod shading;
 mod tiles;
 mod timing;
