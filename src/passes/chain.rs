@@ -98,9 +98,10 @@ impl Chain {
     }
 }
 
-/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or planes stand beside it.
+/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or one makes four, or planes stand beside it.
 pub fn rendered(scene: &Scene) -> Slot {
-    let is_picture = scene.settings.ray.rays == 1 && scene.settings.layout == Layout::Single;
+    let is_picture =
+        scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
     if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
 }
 

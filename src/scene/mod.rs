@@ -80,6 +80,8 @@ pub struct Scene {
     /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
     /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
     pub apron: f64,
+    /// Filters of the distance map, in pixels of rays.
+    pub distance: Distance,
     /// The texels of the volume that stage 2 can look at: stage 1 makes these.
     pub seen: seen::Seen,
 }
@@ -128,8 +130,20 @@ impl Scene {
                 format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
             );
         }
-        let mut scene =
-            Scene { geometry, input, settings, grid, low, high, rays, step, apron: 0.0, seen: Seen::default() };
+        let distance = if settings.ray.half { settings.distance.halved() } else { settings.distance.clone() };
+        let mut scene = Scene {
+            geometry,
+            input,
+            settings,
+            grid,
+            low,
+            high,
+            rays,
+            step,
+            apron: 0.0,
+            distance,
+            seen: Seen::default(),
+        };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
         {
@@ -308,6 +322,11 @@ impl Scene {
     /// The look of skin, if it is one: without wrapping and translucency nothing is left of it.
     pub fn skin(&self) -> Option<Skin> {
         self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
+    }
+
+    /// Distances of neighbouring rays that lie further apart belong to two surfaces, mm.
+    pub fn cliff(&self) -> f64 {
+        self.settings.light.cliff * if self.settings.ray.half { 2.0 } else { 1.0 }
     }
 
     /// Where a near light is, in space.

@@ -12,6 +12,7 @@ mod faults;
 mod filters;
 mod goldens;
 mod growth;
+mod half;
 mod known_answers;
 mod led_astray;
 mod modes;

@@ -45,6 +45,9 @@ pub struct Ray {
     pub entries: u32,
     /// Rays for each pixel along each edge, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
+    /// One ray for four pixels, and the picture enlarged between rays: for a view while it moves. Windows of the distance map's
+    /// filters span as much of the picture as before, in half as many rays. `rays` must be 1.
+    pub half: bool,
 }
 
 impl Default for Ray {
@@ -57,6 +60,7 @@ impl Default for Ray {
             sliding: 0,
             entries: 1025,
             rays: 1,
+            half: false,
         }
     }
 }
