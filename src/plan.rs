@@ -63,7 +63,7 @@ impl Plan {
             }
             match (pass.needed)(scene) {
                 Ok(why) => {
-                    let [x, y, z] = (pass.extent)(scene, &Turn { slices: scene.slices(), ..Turn::default() });
+                    let [x, y, z] = pass.invocations(scene, &Turn { slices: scene.slices(), ..Turn::default() });
                     let each = match pass.when {
                         When::Frame => "each frame",
                         When::Volume => "each volume",
@@ -96,6 +96,17 @@ impl Plan {
         if self.slots.contains(&Slot::Volume) {
             let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
         }
+        let (seen, [columns, rows, slices]) = (&scene.seen, scene.volume_size());
+        let span = |axis: usize| format!("{}..{}", seen.low[axis], seen.high[axis]);
+        let _ = writeln!(
+            text,
+            "seen: columns {} of {columns}, rows {} of {rows}, slices {} of {slices}: {:.1} % of the volume; frames {:?}",
+            span(0),
+            span(1),
+            span(2),
+            100.0 * scene.share_seen(),
+            scene.frames_seen()
+        );
         let _ = writeln!(text, "slots");
         for slot in &self.slots {
             let shape = format!("{:?} {:?}", slot.shape(scene), slot.format(scene));
@@ -117,6 +128,11 @@ impl Plan {
         if stored(&before, old) != stored(self, new) || old.geometry != new.geometry || old.input != new.input {
             return Rerun::Everything;
         }
+        // Less to be seen changes nothing that is there; more needs frames.
+        if !old.seen.holds(&new.seen) {
+            return Rerun::Frames;
+        }
+        let old = &Scene { seen: new.seen, ..old.clone() };
         let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| made_differently(*s, old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();
@@ -212,8 +228,8 @@ impl Step {
         let turn = self.turn();
         (a.shader)(old, &turn) == (b.shader)(new, &turn)
             && (a.constants)(old, &turn) == (b.constants)(new, &turn)
-            && (a.params)(old, &turn) == (b.params)(new, &turn)
-            && (a.extent)(old, &turn) == (b.extent)(new, &turn)
+            && a.numbers(old, &turn) == b.numbers(new, &turn)
+            && a.invocations(old, &turn) == b.invocations(new, &turn)
             && (a.reads)(old, &turn) == (b.reads)(new, &turn)
             && (a.writes)(old, &turn) == (b.writes)(new, &turn)
     }

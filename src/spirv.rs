@@ -326,7 +326,16 @@ mod tests {
         let constants = [("RADIUS", 0), ("MULTIPLICATIVE", 1)].map(|(name, id)| Constant { name: name.into(), id });
         assert_eq!(module.constants, constants);
         let names: Vec<_> = module.params.iter().map(|p| (p.name.as_str(), p.offset, p.is_float)).collect();
-        assert_eq!(names, [("range", 0, true), ("few", 4, true), ("slice", 8, false)]);
+        assert_eq!(
+            names,
+            [
+                ("range", 0, true),
+                ("few", 4, true),
+                ("slice", 8, false),
+                ("first_column", 12, false),
+                ("first_row", 16, false)
+            ]
+        );
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
         assert_eq!((target.kind, target.access, target.dimension), (Kind::Storage, Access::Write, Dimension::Three));
         let source = module.bindings.iter().find(|b| b.name == "source").unwrap();

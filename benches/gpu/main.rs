@@ -103,7 +103,7 @@ fn bench(
     mut inputs: impl FnMut() -> Result<Vec<(Slot, Texels)>, String>,
 ) {
     let turn = Turn { slices: scene.slices(), ..Turn::default() };
-    let invocations = (pass.extent)(scene, &turn).map(u64::from).iter().product();
+    let invocations = pass.invocations(scene, &turn).map(u64::from).iter().product();
     let mut timed = None;
     let mut group = criterion.benchmark_group(pass.name);
     // Every sample of as many runs: they do not depend on what came before.

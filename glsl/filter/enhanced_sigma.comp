@@ -13,7 +13,7 @@ layout(scalar) uniform Params {
     float few;   // K
     float edge;  // k of a Perona-Malik centre
     float least; // difference that a gradient-inverse centre takes for none
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
@@ -26,7 +26,7 @@ float level(ivec2 at) { return brightness(read_at(ivec3(at, 0))); }
 #include "estimators.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;

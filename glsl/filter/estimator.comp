@@ -6,14 +6,14 @@ layout(constant_id = 0) const int ESTIMATOR = 0;
 layout(scalar) uniform Params {
     float edge;  // k of Perona-Malik
     float least; // difference that gradient-inverse takes for none
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 float level(ivec2 at) { return read_at(ivec3(at, 0)); }
 #include "estimators.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     write_at(at, estimate(at.xy, size.xy - 1));

@@ -8,7 +8,7 @@ layout(constant_id = 1) const int AXIS = 0;
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
     float narrowness; // 1 / (2 sigma^2), a texel
-    int slice;
+#include "slice_params.glsl"
 #ifdef VOLUME
     int slices; // that are made anew, from `slice` on
 #endif
@@ -18,8 +18,7 @@ layout(scalar) uniform Params {
 const int RUN = 4;
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
-    at[AXIS] *= RUN;
+    ivec3 at = made_run(AXIS, RUN);
     ivec3 size = source_size();
 #ifdef VOLUME
     at.z += slice; // the first that is made anew

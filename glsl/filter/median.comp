@@ -9,7 +9,7 @@ layout(constant_id = 0) const int RADIUS = 7;
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
@@ -43,8 +43,7 @@ vec4 medians(ivec2 at, ivec2 last) {
 #endif
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
-    at.y *= RUN;
+    ivec3 at = made_run(1, RUN);
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;

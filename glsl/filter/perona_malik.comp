@@ -7,13 +7,13 @@ layout(constant_id = 0) const int CONDUCTANCE = 0; // 0 quotient, 1 exponential
 layout(scalar) uniform Params {
     float edge;   // k, 1e-30..1e30
     float lambda; // 0..1/4
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 #include "diffusion.glsl"
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
+    ivec3 at = made_texel();
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     T here = read_at(at);

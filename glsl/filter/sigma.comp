@@ -10,7 +10,7 @@ layout(constant_id = 1) const int MULTIPLICATIVE = 0; // the range is a share of
 layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
     float few;   // K
-    int slice;
+#include "slice_params.glsl"
 };
 #include "filter.glsl"
 
@@ -24,8 +24,7 @@ layout(scalar) uniform Params {
 const int RUN = 4;
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID);
-    at.y *= RUN;
+    ivec3 at = made_run(1, RUN);
     ivec3 size = source_size();
     if (any(greaterThanEqual(at, size))) return;
     ivec2 last = size.xy - 1;

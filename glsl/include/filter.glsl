@@ -40,6 +40,17 @@ uniform writeonly image3D target;
 uniform writeonly image2D target;
 #endif
 
+// The first of the `run` texels along an axis that this invocation makes: of a slice, what can be seen begins at its first.
+ivec3 made_run(int axis, int run) {
+    ivec3 at = ivec3(gl_GlobalInvocationID);
+    at[axis] *= run;
+#if !defined(DISTANCE) && !defined(PICTURE)
+    at.xy += ivec2(first_column, first_row);
+#endif
+    return at;
+}
+ivec3 made_texel() { return made_run(0, 1); }
+
 void write_at(ivec3 at, T value) {
 #if defined(VOLUME)
     imageStore(target, at, STORED(value));

@@ -6,3 +6,4 @@ void write_slice(ivec2 at, float value) { imageStore(target, ivec3(at, slice), v
 uniform writeonly image2D target;
 void write_slice(ivec2 at, float value) { imageStore(target, at, vec4(value, 0.0, 0.0, 0.0)); }
 #endif
+ivec2 made_texel() { return ivec2(gl_GlobalInvocationID.xy) + ivec2(first_column, first_row); }

@@ -5,13 +5,13 @@
 layout(scalar) uniform Params {
     float gain; // stored value to 0..1
     float offset;
-    int slice;
+#include "slice_params.glsl"
 };
 uniform texture2D frames; // one layer of the frame array
 #include "slice_target.glsl"
 
 void main() {
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 at = made_texel();
     if (any(greaterThanEqual(at, textureSize(frames, 0)))) return;
     write_slice(at, clamp(texelFetch(frames, at, 0).x * gain + offset, 0.0, 1.0));
 }

@@ -1,12 +1,12 @@
 // One polar frame into one slice: the look-up table says between which samples and lines a pixel lies; pixels outside the
-// sector are left out (thesis Fig. 31).
+// sector are left out (thesis Fig. 31), or black where filters read next.
 // variants: plane; slice SLICE
 #version 460
 #include "common.glsl"
 layout(scalar) uniform Params {
     float gain; // stored value to 0..1
     float offset;
-    int slice;
+#include "slice_params.glsl"
 };
 uniform texture2D frames; // one layer of the frame array
 uniform texture2D scan_lut;
@@ -15,10 +15,16 @@ uniform texture2D scan_lut;
 float sample_at(ivec2 at) { return texelFetch(frames, at, 0).x; }
 
 void main() {
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 at = made_texel();
     if (any(greaterThanEqual(at, textureSize(scan_lut, 0)))) return;
     vec2 index = texelFetch(scan_lut, at, 0).xy;
-    if (index.x < 0.0) return; // the inside flag
+    if (index.x < 0.0) { // the inside flag
+#ifndef SLICE
+        // Filters that carry far must not see what an earlier frame left there.
+        write_slice(at, 0.0);
+#endif
+        return;
+    }
     ivec2 base = min(ivec2(index), textureSize(frames, 0) - 2);
     vec2 share = index - vec2(base);
     float near = mix(sample_at(base), sample_at(base + ivec2(1, 0)), share.x);

@@ -57,6 +57,11 @@ pub struct Asked {
 impl Asked {
     /// The recording and the scene of its volume.
     pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
+        self.open_over(&[])
+    }
+
+    /// The same with these assignments as a layer below the flags and `--set`.
+    pub fn open_over(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
         let source = self.source()?;
         if self.volume >= source.volumes() {
             let (asked, there) = (self.volume, source.volumes());
@@ -64,7 +69,8 @@ impl Asked {
         }
         let geometry = source.geometry(self.volume);
         let samples = Input { stored: source.stored_type(), range: source.range() };
-        let scene = Scene::new(geometry, samples, self.settings()?).map_err(input)?;
+        let settings = self.layers_over(chosen)?.finish().map_err(input)?;
+        let scene = Scene::new(geometry, samples, settings).map_err(input)?;
         Ok((source, scene))
     }
 
@@ -121,12 +127,12 @@ impl Asked {
         }
     }
 
-    fn settings(&self) -> Result<echolume::scene::Settings, Failure> {
-        self.layers()?.finish().map_err(input)
-    }
-
     /// The settings before they are resolved.
     pub fn layers(&self) -> Result<Layers, Failure> {
+        self.layers_over(&[])
+    }
+
+    fn layers_over(&self, chosen: &[String]) -> Result<Layers, Failure> {
         let mut layers = Layers::default();
         if self.input.is_none() {
             layers.preset("phantom").map_err(input)?;
@@ -136,6 +142,12 @@ impl Asked {
         }
         if let Some(file) = &self.scene {
             layers.file(file).map_err(input)?;
+        }
+        for assignment in chosen {
+            // What is already off cannot be switched off.
+            if !assignment.ends_with("=none") || layers.has(assignment) {
+                layers.set_by(&format!("--budget, {assignment}"), assignment).map_err(input)?;
+            }
         }
         for (flag, assignment) in self.flags()? {
             layers.set_by(&flag, &assignment).map_err(input)?;

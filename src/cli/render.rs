@@ -1,12 +1,15 @@
 //! `echolume render`.
 
 use super::asked::Asked;
-use super::{Failure, failed, say};
+use super::report_error::{nanoseconds, read};
+use super::{Failure, failed, input, say};
 use echolume::gpu::{Options, Renderer};
 use echolume::picture;
 use echolume::plan::Plan;
+use echolume::report::curves::{Measure, choose};
 use echolume::report::{dump, times};
-use echolume::source::Frame;
+use echolume::scene::Scene;
+use echolume::source::{Frame, Source};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -29,6 +32,12 @@ pub struct Render {
     /// Write every slot as a picture into this folder
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
+    /// Take the most accurate settings that a report of errors found to need less time, such as 16ms; flags and --set override
+    #[arg(long, value_name = "TIME", requires = "report")]
+    budget: Option<String>,
+    /// The error.json that `echolume report error -o DIR` wrote of this recording on this device
+    #[arg(long, value_name = "FILE", requires = "budget")]
+    report: Option<PathBuf>,
     /// Print the time of every pass
     #[arg(long)]
     timings: bool,
@@ -43,7 +52,7 @@ pub struct Render {
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
-        let (mut source, scene) = self.asked.open()?;
+        let (mut source, scene) = self.open()?;
         self.asked.keep_inputs("-o", &self.output)?;
         if self.explain {
             let scene = self.asked.suited(scene);
@@ -77,6 +86,30 @@ impl Render {
             None => Ok(()),
             Some(first) => Err(failed(format!("validation: {first}"))),
         }
+    }
+
+    /// The recording and its scene, within the budget if one is set.
+    fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.asked.open() };
+        let time = nanoseconds("--budget", budget)?;
+        let report = read(file)?;
+        let (_, scene) = self.asked.open()?;
+        let (there, here) = (report.sizes.volume, scene.volume_size());
+        if there != here {
+            let shown = |[x, y, z]: [u32; 3]| format!("{x}x{y}x{z}");
+            let fault = format!(
+                "--report {}: is of a volume of {}, this one has {}",
+                file.display(),
+                shown(there),
+                shown(here)
+            );
+            return Err(input(fault));
+        }
+        let measure = Measure::Rmse;
+        let choice = choose::most_accurate_under(&report, measure, time, 0.1)
+            .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
+        say!("budget {budget}: {}, measured on {}", choice.say(measure), report.device);
+        self.asked.open_over(&choice.set)
     }
 
     #[cfg(feature = "hot-reload")]

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 pub struct Error {
     #[command(flatten)]
     asked: Asked,
-    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, or all; may be
-    /// given again
+    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, or
+    /// all; may be given again
     #[arg(long, value_name = "NAME", default_value = "all")]
     dial: Vec<String>,
     /// Volumes timed at each place of a dial
@@ -54,7 +54,7 @@ impl Error {
             "degrees" => Measure::Degrees,
             other => return Err(input(format!("--measure {other}: must be rmse, mm or degrees"))),
         };
-        let time = self.under_time.as_deref().map(nanoseconds).transpose()?;
+        let time = self.under_time.as_deref().map(|time| nanoseconds("--under-time", time)).transpose()?;
         let report = match &self.from {
             Some(file) => read(file)?,
             None => self.measured()?,
@@ -139,7 +139,8 @@ fn write(report: &curves::Report, measure: Measure, folder: &Path) -> Result<(),
     Ok(())
 }
 
-fn read(file: &Path) -> Result<curves::Report, Failure> {
+/// A stored report.
+pub(super) fn read(file: &Path) -> Result<curves::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
     if !about.is_file() || about.len() > 64 << 20 {
@@ -150,12 +151,12 @@ fn read(file: &Path) -> Result<curves::Report, Failure> {
 }
 
 /// A time such as 16ms, 0.25s or 250us.
-fn nanoseconds(text: &str) -> Result<f64, Failure> {
+pub(super) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
     let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
     let parsed =
         units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));
     match parsed {
         Some(ns) if ns > 0.0 && ns.is_finite() => Ok(ns),
-        _ => Err(input(format!("--under-time {text}: must be a time such as 16ms or 0.25s"))),
+        _ => Err(input(format!("{flag} {text}: must be a time such as 16ms or 0.25s"))),
     }
 }

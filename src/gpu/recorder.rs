@@ -191,10 +191,10 @@ impl Recorder {
         let Work { pipeline, scene, pass, turn, .. } = *work;
         self.barrier(order, &barriers::accesses(scene, pass, turn));
         self.context.begin_label(self.commands, pass.name);
-        let block = contract::pack(&pipeline.module, &(pass.params)(scene, turn));
+        let block = contract::pack(&pipeline.module, &pass.numbers(scene, turn));
         let offset = self.place_params(&block)?;
         self.bind(work, offset, block.len() as u64);
-        let extent = (pass.extent)(scene, turn);
+        let extent = pass.invocations(scene, turn);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
         let (device, commands) = (&self.context.device, self.commands);
         // Before any query begins: lavapipe looks at the pipeline then.

@@ -17,7 +17,7 @@ use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Span, Texels, Turn, When};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
-use crate::scene::Scene;
+use crate::scene::{Scene, Seen};
 use std::sync::Arc;
 
 #[derive(Clone)]
@@ -69,6 +69,9 @@ pub struct Renderer {
     next_lane: usize,
     /// The volume image that is shown.
     shown: u32,
+    /// What all frames that were sent have been filtered over, at least.
+    filtered: Seen,
+    skipped: u64,
     measured: Measured,
     spans: bool,
     fetch: Fetch,
@@ -103,6 +106,8 @@ impl Renderer {
             uploads: Vec::new(),
             volume_images: options.volume_images.max(1),
             plan,
+            filtered: scene.seen,
+            skipped: 0,
             scene,
             next_lane: 0,
             shown: 0,
@@ -192,7 +197,7 @@ impl Renderer {
     }
 
     /// Sends one frame through stage 1 into its slice of volume image `image`. Returns once the frame's bytes are copied; the
-    /// device works on. Waits only when the ring is full.
+    /// device works on. Waits only when the ring is full. A frame that nothing of this scene can see is left out and counted.
     ///
     /// # Errors
     /// A frame of the wrong size, a slice that is not there, a device that fails.
@@ -203,6 +208,11 @@ impl Renderer {
         }
         if slice >= self.scene.slices() {
             return Err(GpuError::FrameSlice { slice, slices: self.scene.slices() });
+        }
+        self.filtered = self.scene.seen;
+        if !self.scene.frames_seen().contains(&slice) {
+            self.skipped += 1;
+            return Ok(());
         }
         let layer = self.next_lane;
         self.next_lane = (layer + 1) % self.lanes.len();
@@ -251,10 +261,17 @@ impl Renderer {
         let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
         for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            let runs = match step.pass.when {
-                When::Volume => affected(unseen, step.reach(scene)),
+            let runs: Vec<_> = match step.pass.when {
+                When::Volume => {
+                    let (low, high) = (scene.seen.low[2], scene.seen.high[2]);
+                    let runs = affected(unseen, step.reach(scene)).into_iter();
+                    runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
+                }
                 _ => std::iter::once(0..0).collect(),
             };
+            if step.pass.when == When::Volume && !runs.is_empty() {
+                self.filtered = scene.seen;
+            }
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
                 let turn = Turn { image: self.shown, slice, slices, ..step.turn() };

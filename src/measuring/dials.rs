@@ -39,6 +39,7 @@ pub const NAMES: &[&str] = &[
     "resolution",
     "rays",
     "lut",
+    "half",
 ];
 
 /// The dial of that name, or why this scene has none.
@@ -237,6 +238,17 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 &["ray.entries=65536".into()],
                 &["ray.entries=16385".into()],
             )
+        }
+        "half" => {
+            need(!scene.is_flat(), "casts no ray")?;
+            need(s.ray.rays == 1, "casts several rays for each pixel")?;
+            // `ray.rays` is named, so that the two are never turned together.
+            let half = |on: bool| [format!("ray.half={on}"), "ray.rays=1".to_string()];
+            let (word, value) = if s.ray.half { ("half", 0.25) } else { ("whole", 1.0) };
+            let other =
+                if s.ray.half { at("whole".into(), &half(false), 1.0) } else { at("half".into(), &half(true), 0.25) };
+            let best = |n: u32| ["ray.half=false".to_string(), format!("ray.rays={n}")];
+            made("half", "rays a pixel", is(word.into(), value), vec![other], &best(3), &best(2))
         }
         _ => return Err(format!("is unknown; there are: {}, all", NAMES.join(", "))),
     };

@@ -251,7 +251,7 @@ fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
     let constants = (pass.constants)(scene, &turn);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
-    let invocations: u64 = (pass.extent)(scene, &turn).iter().map(|n| u64::from(*n)).product();
+    let invocations: u64 = pass.invocations(scene, &turn).iter().map(|n| u64::from(*n)).product();
     // Of an invocation's run of neighbours.
     let along = edge + u64::from(crate::passes::RUN) - 1;
     let window = match pass.name.split('_').next()? {

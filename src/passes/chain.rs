@@ -2,8 +2,8 @@
 //! the last, and a filter that is not needed leaves no copy behind.
 
 use super::filter::aos;
-use super::{PASSES, Pass, Slot, Turn};
-use crate::scene::{Layout, Scene};
+use super::{PASSES, Pass, RUN, Slot, Turn};
+use crate::scene::{Estimator, Layout, Scene};
 
 /// The slices of stage 1, the distance maps of stage 3, and the pictures of stage 4.
 struct Chain {
@@ -98,15 +98,80 @@ impl Chain {
     }
 }
 
-/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or planes stand beside it.
+/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or one makes four, or planes stand beside it.
 pub fn rendered(scene: &Scene) -> Slot {
-    let is_picture = scene.settings.ray.rays == 1 && scene.settings.layout == Layout::Single;
+    let is_picture =
+        scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
     if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
 }
 
 /// What a pass of stage 1 reads and writes.
 pub fn slice_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
     SLICES.link(scene, name, turn)
+}
+
+/// Columns and rows of a slice that a pass makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rectangle {
+    pub first: [u32; 2],
+    pub size: [u32; 2],
+}
+
+/// Texels along an edge that a workgroup of the slices' filters makes, eight invocations of a run each: a rectangle begins and ends
+/// with whole ones, or at the slice's border.
+const WORKGROUP: u32 = 8 * RUN;
+
+/// What a pass over slices has to make of each: what is seen, and as far around it as the filters behind it look. None for
+/// passes that are not cut: lines of a frame, and the rows and columns of AOS, each of which depends on all of its own.
+pub fn rectangle(scene: &Scene, pass: &str, turn: &Turn) -> Option<Rectangle> {
+    let whole = Rectangle { first: [0; 2], size: scene.grid.size };
+    match pass {
+        "growth_slice" => return Some(whole),
+        "aos_slice" => return None,
+        "gaussian_elevation" => {}
+        _ if !SLICES.passes.contains(&pass) => return None,
+        _ => {}
+    }
+    let (link, _) = SLICES.position(scene, pass, turn);
+    let mut around = [0, 0];
+    let mut before = 0;
+    for filter in SLICES.needed().filter(|p| p.is_needed(scene) && pass != "gaussian_elevation") {
+        let links = (filter.repeat)(scene) / dispatches(filter.name);
+        let behind = (before + links).saturating_sub((link + 1).max(before));
+        before += links;
+        match reach(scene, filter.name) {
+            _ if behind == 0 => {}
+            None => return Some(whole),
+            Some(reach) => (0..2).for_each(|axis| around[axis] += behind * reach[axis]),
+        }
+    }
+    let cut = |axis: usize| {
+        let (low, high) = (scene.seen.low[axis], scene.seen.high[axis]);
+        let first = low.saturating_sub(around[axis]) / WORKGROUP * WORKGROUP;
+        let end = high.saturating_add(around[axis]).next_multiple_of(WORKGROUP).min(scene.grid.size[axis]);
+        (first, end - first)
+    };
+    let (columns, rows) = (cut(0), cut(1));
+    Some(Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] })
+}
+
+/// How many columns and rows away a filter of slices looks at each step; none: from border to border.
+fn reach(scene: &Scene, name: &str) -> Option<[u32; 2]> {
+    let slices = &scene.settings.slices;
+    let estimator = |kind| if kind == Estimator::NagaoMatsuyama { 2 } else { 1 };
+    let [lateral, depth, _] = scene.smoothing_radius();
+    Some(match name {
+        "median_slice" | "perona_malik_slice" => [1; 2],
+        "estimator_slice" => [slices.estimator.map_or(0, estimator); 2],
+        "sigma_slice" => [slices.sigma.map_or(0, |s| s.window / 2); 2],
+        "enhanced_sigma_slice" => {
+            [slices.enhanced_sigma.map_or(0, |e| (e.largest / 2).max(estimator(scene.centre(e)))); 2]
+        }
+        "aos_slice" => return None,
+        "gaussian_lateral" => [lateral, 0],
+        "gaussian_depth" => [0, depth],
+        _ => [0; 2],
+    })
 }
 
 /// Whether a pass of stage 1 writes into the 3D texture itself.

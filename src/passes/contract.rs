@@ -64,7 +64,7 @@ pub fn check(pass: &Pass, scene: &Scene, turn: &Turn, module: &Module) -> Result
             return Err(format!("glsl declares '{}', the pass neither reads nor writes it", binding.name));
         }
     }
-    check_params(module, &(pass.params)(scene, turn))?;
+    check_params(module, &pass.numbers(scene, turn))?;
     let constants = (pass.constants)(scene, turn);
     for (name, _) in &constants {
         if !module.constants.iter().any(|c| c.name == *name) {

@@ -278,6 +278,42 @@ impl Pass {
     pub fn is_needed(&self, scene: &Scene) -> bool {
         (self.needed)(scene).is_ok()
     }
+
+    /// Invocations of a dispatch: of a slice only what can be seen.
+    pub fn invocations(&self, scene: &Scene, turn: &Turn) -> [u32; 3] {
+        let extent = (self.extent)(scene, turn);
+        let Some(seen) = chain::rectangle(scene, self.name, turn) else { return extent };
+        // Some make a run of neighbours each.
+        let run = |axis: usize| if extent[axis] < scene.grid.size[axis] { RUN } else { 1 };
+        [seen.size[0].div_ceil(run(0)), seen.size[1].div_ceil(run(1)), extent[2]]
+    }
+
+    /// Numbers of a dispatch: of a slice, with the texel that its first invocation makes.
+    pub fn numbers(&self, scene: &Scene, turn: &Turn) -> Params {
+        let params = (self.params)(scene, turn);
+        match chain::rectangle(scene, self.name, turn) {
+            Some(r) => params.i32("first_column", r.first[0]).i32("first_row", r.first[1]),
+            None => params,
+        }
+    }
+
+    /// What a dispatch leaves: the reference, and around what it makes of a slice what was there.
+    pub fn expected(&self, scene: &Scene, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+        let before = writes.clone();
+        (self.reference)(scene, turn, reads, writes);
+        let Some(r) = chain::rectangle(scene, self.name, turn) else { return };
+        for (name, kept) in before.iter() {
+            let target = writes.get_mut(name);
+            for (x, y) in (0..kept.size[1]).flat_map(|y| (0..kept.size[0]).map(move |x| (x, y))) {
+                let made = [x, y]
+                    .iter()
+                    .zip(r.first)
+                    .zip(r.size)
+                    .all(|((at, first), size)| (first as usize..(first + size) as usize).contains(at));
+                (0..kept.size[2]).filter(|_| !made).for_each(|z| target.set([x, y, z], kept.get([x, y, z])));
+            }
+        }
+    }
 }
 
 /// Time of one pass over a run.

@@ -36,8 +36,14 @@ impl Rays {
     }
 }
 
-/// Width and height of the lattice of rays: a quarter of a 4-up picture (rounded up), and several rays for each pixel.
+/// Width and height of the lattice of rays: a quarter of a 4-up picture (rounded up), and several rays for each pixel, or one
+/// for two along each edge (rounded up).
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
+    let full = full_size(settings);
+    if settings.ray.half { full.map(|n| n.div_ceil(2)) } else { full }
+}
+
+fn full_size(settings: &Settings) -> [u32; 2] {
     let tile = match settings.layout {
         Layout::Single => settings.picture.size,
         Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),
@@ -64,7 +70,7 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     };
     // Half extents of the box along the camera's axes.
     let along = |axis: DVec3| axis.abs().dot(half);
-    let [width, height] = ray_size(settings).map(f64::from);
+    let [width, height] = full_size(settings).map(f64::from);
     let fit = (along(up) / height).max(along(right) / width);
     // mm a pixel where the target is.
     let pixel = 2.0 * fit / camera.zoom;
@@ -72,6 +78,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
 
     // The picture's upper left corner, as seen from its middle, in pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
+    // The ray of four pixels goes through their common corner.
+    let apart = if settings.ray.half { 2.0 } else { 1.0 };
     if camera.field_of_view > 0.0 {
         let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
         let distance = pixel / spread + if camera.zoom >= 1.0 { along(forward) } else { 0.0 };
@@ -80,8 +88,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
             origin_dx: DVec3::ZERO,
             origin_dy: DVec3::ZERO,
             direction: forward + corner(right, up) * spread,
-            direction_dx: right * spread,
-            direction_dy: -up * spread,
+            direction_dx: right * spread * apart,
+            direction_dy: -up * spread * apart,
             right,
             up,
             forward,
@@ -91,8 +99,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     } else {
         Rays {
             origin: target - forward * away + corner(right, up) * pixel,
-            origin_dx: right * pixel,
-            origin_dy: -up * pixel,
+            origin_dx: right * pixel * apart,
+            origin_dy: -up * pixel * apart,
             direction: forward,
             direction_dx: DVec3::ZERO,
             direction_dy: DVec3::ZERO,

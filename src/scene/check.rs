@@ -23,6 +23,11 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     check_clip(&settings.clip)?;
     within("ray.rays", f64::from(settings.ray.rays), 1.0, 4.0)?;
+    if settings.ray.half && settings.ray.rays > 1 {
+        let fault =
+            format!("takes one ray for four pixels, ray.rays={} several for each: set one of them", settings.ray.rays);
+        return refuse("ray.half", fault);
+    }
     let [width, height] = super::camera::ray_size(settings);
     if width > MAX_PICTURE || height > MAX_PICTURE {
         return refuse("ray.rays", format!("makes {width}x{height} rays, each edge must lie in 1..={MAX_PICTURE}"));

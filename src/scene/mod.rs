@@ -9,12 +9,14 @@ pub mod cube;
 pub mod load;
 pub mod planes;
 mod region;
+pub mod seen;
 pub mod settings;
 pub mod transfer;
 
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use region::insonified_box;
+pub use seen::Seen;
 pub use settings::*;
 
 use crate::probe::{Array, Geometry, Probe};
@@ -82,6 +84,10 @@ pub struct Scene {
     /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
     /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
     pub apron: f64,
+    /// Filters of the distance map, in pixels of rays.
+    pub distance: Distance,
+    /// The texels of the volume that stage 2 can look at: stage 1 makes these.
+    pub seen: seen::Seen,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -129,7 +135,21 @@ impl Scene {
             );
         }
         let sampling = settings.ray.sampling;
-        let mut scene = Scene { geometry, input, settings, grid, low, high, rays, step, sampling, apron: 0.0 };
+        let distance = if settings.ray.half { settings.distance.halved() } else { settings.distance.clone() };
+        let mut scene = Scene {
+            geometry,
+            input,
+            settings,
+            grid,
+            low,
+            high,
+            rays,
+            step,
+            sampling,
+            apron: 0.0,
+            distance,
+            seen: Seen::default(),
+        };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
         {
@@ -141,6 +161,7 @@ impl Scene {
         }
         scene.apron = 2.0 + scene.filter_reach();
         check_planes::check_resolved(&scene)?;
+        scene.seen = seen::seen(&scene);
         Ok(scene)
     }
 
@@ -325,6 +346,11 @@ impl Scene {
     /// The look of skin, if it is one: without wrapping and translucency nothing is left of it.
     pub fn skin(&self) -> Option<Skin> {
         self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
+    }
+
+    /// Distances of neighbouring rays that lie further apart belong to two surfaces, mm.
+    pub fn cliff(&self) -> f64 {
+        self.settings.light.cliff * if self.settings.ray.half { 2.0 } else { 1.0 }
     }
 
     /// Where a near light is, in space.

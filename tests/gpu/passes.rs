@@ -167,7 +167,7 @@ fn run_one(
         let channels = bind.slot.format(scene).channels();
         expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
     }
-    (pass.reference)(scene, &turn, &inputs, &mut expected);
+    pass.expected(scene, &turn, &inputs, &mut expected);
     let got = single.run(scene, pass, &turn, &inputs, POISON).expect("dispatch");
     (inputs, expected, got, writes)
 }

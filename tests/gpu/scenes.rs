@@ -164,6 +164,11 @@ pub fn scenes() -> Vec<(String, Scene)> {
         ("Riemann", "mode = 'vr'\nvolume = { compositing = 'riemann', transfer = 'cool' }\nslices = { pixels = 30 }"),
         ("pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', threshold = 0.5 }\nslices = { pixels = 30 }"),
         ("two rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2 }"),
+        ("half the rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { half = true }"),
+        (
+            "4-up, half the rays, filters in their pixels",
+            "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { half = true }",
+        ),
         ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
         (
             "every diffusion, explicit",

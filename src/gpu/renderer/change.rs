@@ -12,7 +12,9 @@ impl Renderer {
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
         let scene = super::super::formats::suited(&self.context, self.fetch, scene);
         let plan = Plan::new(&scene);
-        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&self.scene, &scene) };
+        // What was seen before a region shrank is still there.
+        let before = Scene { seen: self.filtered, ..self.scene.clone() };
+        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         super::super::formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
         self.collect()?;
@@ -20,6 +22,9 @@ impl Renderer {
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;
+        if !matches!(rerun, Rerun::Steps { .. }) {
+            self.filtered = self.scene.seen;
+        }
         self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
     }

@@ -54,6 +54,11 @@ impl Renderer {
         done.map(|_| dispatched)
     }
 
+    /// Frames so far that nothing of their scene could see, and that were not uploaded.
+    pub fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
     /// Barriers recorded so far.
     pub fn barriers(&self) -> u32 {
         self.order.barriers

@@ -11,7 +11,7 @@ pub const DISTANCE: Pass = Pass {
     stage: Stage::Shade,
     when: When::Picture,
     shader: |_, _| "filter/bilateral.distance",
-    needed: |s| match (s.has_distance(), s.settings.distance.bilateral) {
+    needed: |s| match (s.has_distance(), s.distance.bilateral) {
         (false, _) => Err("no distance map in this mode"),
         (true, None) => Err("not asked for"),
         _ => Ok("asked for"),
@@ -67,7 +67,7 @@ pub const DISTANCE: Pass = Pass {
 };
 
 fn settings(scene: &Scene) -> Bilateral {
-    scene.settings.distance.bilateral.unwrap_or(Bilateral { pixels: 1.0, distance: 1.0, repeat: 1 })
+    scene.distance.bilateral.unwrap_or(Bilateral { pixels: 1.0, distance: 1.0, repeat: 1 })
 }
 
 /// Two standard deviations hold 95 % of the weight.

@@ -38,19 +38,19 @@ pub const DISTANCE: Pass = Pass {
     when: When::Picture,
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
-        true => asked(s.settings.distance.enhanced_sigma),
+        true => asked(s.distance.enhanced_sigma),
         false => Err("no distance map in this mode"),
     },
     reads: |s, t| vec![whole("source", distance_link(s, "enhanced_sigma_distance", t).0)],
     writes: |s, t| vec![whole("target", distance_link(s, "enhanced_sigma_distance", t).1)],
     extent: ray_extent,
     repeat: once,
-    params: |s, t| params(s.settings.distance.enhanced_sigma, LEAST_DISTANCE, t),
-    constants: |s, _| constants(s, s.settings.distance.enhanced_sigma),
+    params: |s, t| params(s.distance.enhanced_sigma, LEAST_DISTANCE, t),
+    constants: |s, _| constants(s, s.distance.enhanced_sigma),
     // A pixel of f32 in mm lies 4e-6 from where f64 has it, a hundred times as far as one in 0..1.
     tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
     reference: |s, t, reads, writes| {
-        let enhanced = Enhanced::new(s, s.settings.distance.enhanced_sigma, LEAST_DISTANCE, is_hit);
+        let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, LEAST_DISTANCE, is_hit);
         enhanced.filter(t, reads, writes, |found| found.mean);
     },
 };

@@ -29,7 +29,7 @@ pub const DISTANCE: Pass = Pass {
     stage: Stage::Shade,
     when: When::Picture,
     shader: |_, _| "filter/median.distance",
-    needed: |s| match (s.has_distance(), s.settings.distance.median) {
+    needed: |s| match (s.has_distance(), s.distance.median) {
         (false, _) => Err("no distance map in this mode"),
         (true, 0) => Err("not asked for"),
         _ => Ok("asked for"),
@@ -39,9 +39,9 @@ pub const DISTANCE: Pass = Pass {
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
-    constants: |s, _| vec![("RADIUS", (s.settings.distance.median / 2) as i32)],
+    constants: |s, _| vec![("RADIUS", (s.distance.median / 2) as i32)],
     tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a value that is there, chosen exactly" },
-    reference: |s, turn, reads, writes| reference(s.settings.distance.median / 2, turn, reads, writes, is_hit),
+    reference: |s, turn, reads, writes| reference(s.distance.median / 2, turn, reads, writes, is_hit),
 };
 
 /// The middle of the sorted window; of an even number, the lower. Hits and misses vote first: a tie is a miss.

@@ -33,17 +33,17 @@ pub const DISTANCE: Pass = Pass {
     when: When::Picture,
     shader: |_, _| "filter/perona_malik.distance",
     needed: |s| match s.has_distance() {
-        true => asked(s.settings.distance.perona_malik, Scheme::Explicit),
+        true => asked(s.distance.perona_malik, Scheme::Explicit),
         false => Err("no distance map in this mode"),
     },
     reads: |s, t| vec![whole("source", distance_link(s, "perona_malik_distance", t).0)],
     writes: |s, t| vec![whole("target", distance_link(s, "perona_malik_distance", t).1)],
     extent: ray_extent,
-    repeat: |s| repeat(s.settings.distance.perona_malik),
-    params: |s, t| params(s.settings.distance.perona_malik, t),
-    constants: |s, _| vec![constant(s.settings.distance.perona_malik)],
+    repeat: |s| repeat(s.distance.perona_malik),
+    params: |s, t| params(s.distance.perona_malik, t),
+    constants: |s, _| vec![constant(s.distance.perona_malik)],
     tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 0.0, why: WHY },
-    reference: |s, t, reads, writes| reference(s.settings.distance.perona_malik, t, reads, writes, is_hit),
+    reference: |s, t, reads, writes| reference(s.distance.perona_malik, t, reads, writes, is_hit),
 };
 
 pub const PICTURE: Pass = Pass {

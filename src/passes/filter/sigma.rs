@@ -30,15 +30,15 @@ pub const DISTANCE: Pass = Pass {
     stage: Stage::Shade,
     when: When::Picture,
     shader: |_, _| "filter/sigma.distance",
-    needed: |s| if s.has_distance() { asked(s.settings.distance.sigma) } else { Err("no distance map in this mode") },
+    needed: |s| if s.has_distance() { asked(s.distance.sigma) } else { Err("no distance map in this mode") },
     reads: |s, t| vec![whole("source", distance_link(s, "sigma_distance", t).0)],
     writes: |s, t| vec![whole("target", distance_link(s, "sigma_distance", t).1)],
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: once,
-    params: |s, t| params(s.settings.distance.sigma, t),
-    constants: |s, _| constants(s.settings.distance.sigma),
+    params: |s, t| params(s.distance.sigma, t),
+    constants: |s, _| constants(s.distance.sigma),
     tolerance: Tolerance { absolute: 1e-5, relative: 1e-6, outliers: 1e-3, why: WHY },
-    reference: |s, t, reads, writes| reference(s.settings.distance.sigma, t, reads, writes, is_hit),
+    reference: |s, t, reads, writes| reference(s.distance.sigma, t, reads, writes, is_hit),
 };
 
 pub const PICTURE: Pass = Pass {

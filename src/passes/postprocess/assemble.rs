@@ -1,4 +1,5 @@
-//! From what was rendered to the picture: the mean of several rays a pixel, and its place beside the planes of a 4-up picture.
+//! From what was rendered to the picture: the mean of several rays a pixel, or what lies between the
+//! rays where one makes four pixels, and its place beside the planes of a 4-up picture.
 
 use crate::passes::*;
 use crate::scene::Layout;
@@ -14,6 +15,7 @@ pub const PASS: Pass = Pass {
     needed: |s| match (chain::rendered(s), s.settings.layout) {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
+        (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),
         (_, Layout::Single) => Ok("several rays make a pixel"),
     },
     reads: |s, _| {
@@ -25,7 +27,7 @@ pub const PASS: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |_, _| Params::default(),
-    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32)],
+    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32), ("HALF", s.settings.ray.half as i32)],
     tolerance: Tolerance {
         absolute: 1e-3,
         relative: 0.0,
@@ -48,6 +50,10 @@ pub const PASS: Pass = Pass {
                     picture.set([x, y, 0], &plane);
                     continue;
                 }
+                if scene.settings.ray.half {
+                    picture.set([x, y, 0], &between(rendered, x - corner[0], y - corner[1]));
+                    continue;
+                }
                 let mut mean = [0.0; 4];
                 for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
                     let ray = rendered.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
@@ -58,3 +64,18 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// Linear between the rays about a pixel; ray i goes through the common corner of pixels 2 i and 2 i + 1. Beyond the outermost
+/// ray that one stands.
+fn between(rendered: &Texels, x: usize, y: usize) -> [f64; 4] {
+    let along = |pixel: usize, rays: usize| {
+        let at = ((pixel as f64 - 0.5) / 2.0).clamp(0.0, (rays - 1) as f64);
+        let low = at.floor() as usize;
+        (low, (low + 1).min(rays - 1), at - at.floor())
+    };
+    let ((x0, x1, u), (y0, y1, v)) = (along(x, rendered.size[0]), along(y, rendered.size[1]));
+    std::array::from_fn(|c| {
+        let at = |x, y| rendered.get([x, y, 0])[c];
+        (1.0 - v) * ((1.0 - u) * at(x0, y0) + u * at(x1, y0)) + v * ((1.0 - u) * at(x0, y1) + u * at(x1, y1))
+    })
+}

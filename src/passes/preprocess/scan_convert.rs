@@ -46,7 +46,13 @@ pub const PASS: Pass = Pass {
         for row in 0..scene.grid.size[1] {
             for column in 0..scene.grid.size[0] {
                 let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
-                let Some((sample, line)) = scan_index(scene, probe, x, y) else { continue };
+                let Some((sample, line)) = scan_index(scene, probe, x, y) else {
+                    // The volume's own texels there are never written; filters must not see what an earlier frame left.
+                    if !writes_volume(scene, NAME, turn) {
+                        target.set([column as usize, row as usize, z], &[0.0]);
+                    }
+                    continue;
+                };
                 let value = bilinear(frames, sample, line);
                 let value = (value * gain + offset).clamp(0.0, 1.0);
                 target.set([column as usize, row as usize, z], &[value]);

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use glam::DVec3;
 
 fn camera_params(scene: &Scene) -> Params {
-    ray_params(scene).f32("cliff", scene.settings.light.cliff)
+    ray_params(scene).f32("cliff", scene.cliff())
 }
 
 /// Unit direction to a light that is far away, or the place of one that is near, in space.
@@ -45,7 +45,7 @@ fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f6
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {
-        let same = |p: &(DVec3, f64)| (p.1 - distance).abs() <= scene.settings.light.cliff;
+        let same = |p: &(DVec3, f64)| (p.1 - distance).abs() <= scene.cliff();
         let back = place(scene, distances, x - dx, y - dy).filter(same);
         let on = place(scene, distances, x + dx, y + dy).filter(same);
         match (back, on) {

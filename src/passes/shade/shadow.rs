@@ -114,7 +114,7 @@ fn map_at(scene: &Scene, distances: &Texels, at: [f64; 2]) -> Option<f64> {
     let own = || super::hit_at(distances, at[0].floor() as i64, at[1].floor() as i64);
     let [Some(a), Some(b), Some(c), Some(d)] = corners else { return own() };
     let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-    if high - low > scene.settings.light.cliff {
+    if high - low > scene.cliff() {
         return own();
     }
     Some((1.0 - v) * ((1.0 - u) * a + u * b) + v * ((1.0 - u) * c + u * d))

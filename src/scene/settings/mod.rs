@@ -42,6 +42,13 @@ pub struct Settings {
     pub post: Post,
 }
 
+impl Settings {
+    /// What is shown while the view moves: a quarter of the rays at most. Stage 1 stays as it is.
+    pub fn moving(&self) -> Settings {
+        Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
+    }
+}
+
 /// What a pixel holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]

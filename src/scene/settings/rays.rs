@@ -48,6 +48,9 @@ pub struct Ray {
     /// Edge of the bricks that rays leap over where nothing in them can change the picture, texels: 4..=64, 0 takes every
     /// sample. The picture is the same bit for bit.
     pub brick: u32,
+    /// One ray for four pixels, and the picture enlarged between rays: for a view while it moves. Windows of the distance map's
+    /// filters span as much of the picture as before, in half as many rays. `rays` must be 1.
+    pub half: bool,
 }
 
 impl Default for Ray {
@@ -61,6 +64,7 @@ impl Default for Ray {
             entries: 1025,
             rays: 1,
             brick: 8,
+            half: false,
         }
     }
 }

@@ -19,6 +19,27 @@ pub struct Distance {
     pub perona_malik: Option<PeronaMalik>,
 }
 
+impl Distance {
+    /// The same filters for half as many rays along each edge: what they span of the picture, and how long they diffuse.
+    pub fn halved(&self) -> Distance {
+        let window = |edge: u32| 2 * (edge / 4).max(1) + 1;
+        Distance {
+            median: if self.median > 0 { window(self.median) } else { 0 },
+            bilateral: self.bilateral.map(|b| Bilateral { pixels: b.pixels / 2.0, ..b }),
+            sigma: self.sigma.map(|s| Sigma { window: window(s.window), ..s }),
+            enhanced_sigma: self.enhanced_sigma.map(|e| {
+                let (start, largest) = (window(e.window), window(e.largest));
+                EnhancedSigma { window: start, largest, ..e }
+            }),
+            perona_malik: self.perona_malik.map(|p| {
+                // Time goes as the square of a length.
+                let repeat = p.repeat.div_ceil(4);
+                PeronaMalik { step: p.step * f64::from(p.repeat) / (4.0 * f64::from(repeat)), repeat, ..p }
+            }),
+        }
+    }
+}
+
 /// Gaussian in place and in distance.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

@@ -22,6 +22,9 @@ pub struct Slices {
     /// surface. Where `smooth` blurs slices already, this adds nothing.
     pub blur: bool,
     pub format: VolumeFormat,
+    /// Converts and filters all of the volume, not only what the region, start depths and clip planes leave to be seen. The
+    /// picture is the same; a region that is dragged then needs no frames anew when it grows.
+    pub everything: bool,
 }
 
 impl Default for Slices {
@@ -37,6 +40,7 @@ impl Default for Slices {
             smooth: None,
             blur: false,
             format: VolumeFormat::R16f,
+            everything: false,
         }
     }
 }
