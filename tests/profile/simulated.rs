@@ -111,9 +111,11 @@ pub fn profile(repeats: usize) -> Profile {
         acquisition: Some(Acquisition { seconds: 0.8, sound_speed: 1540.0 }),
         repeats,
         warm_up: 3,
+        turn: 0.0,
         passes: Vec::new(),
         host: Vec::new(),
         wall_ns: vec![2e6; repeats],
+        cpu_ns: vec![3e6; repeats],
         device_ns: vec![0.0; repeats],
         ceilings: Some(Ceilings { copy: ceiling(4e11), sampling: ceiling(1e11), fetch: ceiling(2e11) }),
     }
