@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import time
 
 import rows
 import view
@@ -64,7 +63,6 @@ class Echolume:
         return {kind: less(kind) if measured[kind] else None for kind in measured}
 
     def estimate(self):
-        """Seconds a repeat takes; the driver's caches are warm afterwards."""
-        begun = time.perf_counter()
-        wall = self.profile(self.arguments, 2)["wall"]
-        return min(wall) * 1e-9, time.perf_counter() - begun
+        """Seconds that a repeat takes when nothing else runs; the driver's caches are warm afterwards."""
+        measured = self.profile(self.arguments, 2)
+        return min(measured["cpu"] or measured["wall"]) * 1e-9 / os.cpu_count()

@@ -103,7 +103,7 @@ def scipy(row, arrays):
     if row == "median_wide":
         return Each(arrays[0], lambda one: ndimage.median_filter(one, MEDIAN))
     if row.startswith("sweep_"):
-        frames, edge = arrays[0], int(row.split("_")[1])
+        frames, edge = arrays[0][0], int(row.split("_")[1])
         where = sweep_map(edge)
         return Each([frames], lambda one: ndimage.map_coordinates(one, where, order=1, output=np.uint8)[edge // 2])
     raise ValueError(f"scipy has no {row}")

@@ -25,6 +25,21 @@ def image(voxels):
     return out
 
 
+class Arriving:
+    """A volume that VTK holds, and others that arrive: their voxels are copied in, as Echolume copies every frame."""
+
+    def __init__(self, volumes):
+        self.volumes = volumes
+        self.image = image(volumes[0])
+        self.voxels = numpy_support.vtk_to_numpy(self.image.GetPointData().GetScalars())
+
+    def take(self, volume):
+        if volume is not None:
+            self.voxels[:] = self.volumes[volume].ravel()
+            self.image.GetPointData().GetScalars().Modified()
+            self.image.Modified()
+
+
 class Window:
     """An off-screen window with Echolume's camera and light."""
 
@@ -97,14 +112,14 @@ class RayCast:
 
     def __init__(self, mapper, row, volumes):
         n = volumes[0].shape[0]
-        self.images = [image(v) for v in volumes]
+        self.arriving = Arriving(volumes)
         self.mapper = mapper
         if hasattr(mapper, "SetAutoAdjustSampleDistances"):
             mapper.AutoAdjustSampleDistancesOff()
         if hasattr(mapper, "SetUseJittering"):
             mapper.UseJitteringOff()
         mapper.SetSampleDistance(phantom.pitch(n))
-        mapper.SetInputData(self.images[0])
+        mapper.SetInputData(self.arriving.image)
         shown = properties(n, row in ("vr_shaded", "vr_shadows", "surface"))
         blend = {
             "mip": "SetBlendModeToMaximumIntensity",
@@ -134,11 +149,7 @@ class RayCast:
         self.window.renderer.AddVolume(volume)
 
     def picture(self, n, volume):
-        if volume is not None:
-            data = self.images[volume]
-            data.GetPointData().GetScalars().Modified()
-            data.Modified()
-            self.mapper.SetInputData(data)
+        self.arriving.take(volume)
         self.window.picture(n)
 
     def shown(self):
@@ -160,9 +171,9 @@ class FlyingEdges:
     """The isosurface as triangles with normals, drawn by OpenGL; a new volume is contoured anew."""
 
     def __init__(self, row, volumes):
-        self.images = [image(v) for v in volumes]
+        self.arriving = Arriving(volumes)
         self.contour = vtk.vtkFlyingEdges3D()
-        self.contour.SetInputData(self.images[0])
+        self.contour.SetInputData(self.arriving.image)
         self.contour.SetValue(0, 255 * view.ISO)
         self.contour.ComputeNormalsOn()
         self.contour.ComputeScalarsOff()
@@ -180,9 +191,7 @@ class FlyingEdges:
         self.window.renderer.AddActor(actor)
 
     def picture(self, n, volume):
-        if volume is not None:
-            self.images[volume].Modified()
-            self.contour.SetInputData(self.images[volume])
+        self.arriving.take(volume)
         self.window.picture(n)
 
     shown = RayCast.shown
@@ -194,9 +203,9 @@ class Reslice:
 
     def __init__(self, row, volumes):
         n = volumes[0].shape[0]
-        self.images = [image(v) for v in volumes]
+        self.arriving = Arriving(volumes)
         self.reslice = vtk.vtkImageReslice()
-        self.reslice.SetInputData(self.images[0])
+        self.reslice.SetInputData(self.arriving.image)
         self.reslice.SetOutputDimensionality(2)
         self.reslice.SetInterpolationModeToLinear()
         self.reslice.SetBackgroundLevel(0)
@@ -204,9 +213,7 @@ class Reslice:
         self.reslice.BorderOn()
 
     def picture(self, n, volume):
-        if volume is not None:
-            self.images[volume].Modified()
-            self.reslice.SetInputData(self.images[volume])
+        self.arriving.take(volume)
         right, down = view.plane(n)
         extent = lambda axis: float(np.abs(axis).sum()) * phantom.BOX
         pixel = max(extent(right), extent(down)) / view.SIZE

@@ -89,7 +89,9 @@ def write(folder, order, machine):
                 if contestant["note"] not in marks:
                     marks.append(contestant["note"])
                 mark = f" [{marks.index(contestant['note']) + 1}]"
-            peers.append(f"{name}{mark}: {cell(contestant)}")
+            differs = contestant.get("differs")
+            said = f"; differs by {differs:.1f}" if differs is not None and not mark else ""
+            peers.append(f"{name}{mark}: {cell(contestant)}{said}")
         found = [ratio(m, kind) for kind in ("wall", "cpu")]
         shown = [f"{f[0]:.2f} ({f[1]})" if f else "" for f in found]
         own = cell(m["cells"]["Echolume"])
@@ -98,7 +100,8 @@ def write(folder, order, machine):
         file.write(
             f"{machine['cpu']}, {machine['cores']} cores; {'; '.join(versions)}; {'; '.join(drivers)}; "
             f"{dates[0] if dates else ''} to {dates[-1] if dates else ''}. ms, wall / CPU (user and system, all threads): median "
-            "(middle half). Ratios: Echolume over the fastest peer; the aim is of the CPU's.\n\n"
+            "(middle half). Ratios: Echolume over the fastest peer; the aim is of the CPU's. \"Differs\": mean difference between "
+            "the peer's first picture and Echolume's, grey levels of 255.\n\n"
             "| work | size | Echolume | peers | wall ratio | CPU ratio | aim |\n|---|---|---|---|---|---|---|\n"
         )
         file.write("\n".join(lines) + "\n")
@@ -107,21 +110,26 @@ def write(folder, order, machine):
 
 
 def side_by_side(pictures, folder, row, size):
-    """All contestants' pictures of a row in one PNG, in the order of the table."""
+    """All contestants' pictures of a row in one PNG, in the order of the table. Gives each peer's mean difference from
+    Echolume's picture, in grey levels of 255, where both have the same size."""
+    import numpy as np
     from PIL import Image
 
     if not pictures:
-        return
-    opened = [Image.open(file).convert("RGB") for _, file in pictures]
-    wide = Image.new("RGB", (sum(p.width for p in opened), max(p.height for p in opened)))
+        return {}
+    opened = {name: Image.open(file).convert("RGB") for name, file in pictures}
+    wide = Image.new("RGB", (sum(p.width for p in opened.values()), max(p.height for p in opened.values())))
     at = 0
-    for picture in opened:
+    for picture in opened.values():
         wide.paste(picture, (at, 0))
         at += picture.width
-    names = "-".join(name.replace(" ", "") for name, _ in pictures)
+    names = "-".join(name.replace(" ", "") for name in opened)
     wide.save(os.path.join(folder, f"{row.name}{'-new' if row.new else ''}-{size}.png"), pnginfo=_text("contestants", names))
     for _, file in pictures:
         os.remove(file)
+    arrays = {name: np.asarray(picture, np.float64) for name, picture in opened.items()}
+    own = arrays.pop("Echolume", None)
+    return {name: float(np.abs(a - own).mean()) for name, a in arrays.items() if own is not None and a.shape == own.shape}
 
 
 def _text(key, value):
