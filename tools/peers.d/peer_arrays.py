@@ -22,15 +22,15 @@ def version():
 class Each:
     """Every array of a stack, one after another, through `work`."""
 
-    def __init__(self, stack, work, driver="CPU"):
-        self.stack, self.work, self.said = stack, work, driver
+    def __init__(self, stack, work, driver="CPU", array=np.asarray):
+        self.stack, self.work, self.said, self.array = stack, work, driver, array
         self.out = None
 
     def picture(self, n, volume):
         self.out = [self.work(one) for one in self.stack]
 
     def shown(self):
-        one = np.asarray(self.out[len(self.out) // 2], np.float32)
+        one = np.asarray(self.array(self.out[len(self.out) // 2]), np.float32)
         low, high = (0, 255) if one.max() <= 255 and one.min() >= 0 and one.max() > 100 else (one.min(), one.max())
         grey = np.clip((one - low) * 255 / max(high - low, 1e-9), 0, 255).astype(np.uint8)
         return np.repeat(grey[:, :, None], 3, 2)
@@ -94,7 +94,7 @@ def simpleitk(row, arrays):
         made = lambda one: sitk.Bilateral(one, BILATERAL_PIXELS, BILATERAL_MM)
     else:
         raise ValueError(f"SimpleITK has no {row}")
-    return Each(pictures, lambda one: sitk.GetArrayViewFromImage(made(one)), f"CPU, {threads} threads")
+    return Each(pictures, made, f"CPU, {threads} threads", sitk.GetArrayFromImage)
 
 
 def scipy(row, arrays):

@@ -120,7 +120,7 @@ def slices(count, edge, seed=3):
 
 # Polar frames of a curved array that wobbles, mm and deg. SWEEP: an abdominal probe. SCAN: small radius, so that a slice is square.
 SWEEP = {"array": 40.0, "wobble": 25.0, "depth": 120.0, "sector": 68.0, "fan": 61.0, "samples": 512, "lines": 256, "frames": 37}
-SCAN = {"array": 10.0, "wobble": 8.0, "depth": 120.0, "sector": 55.6, "fan": 30.0, "samples": 512, "lines": 256, "frames": 16}
+SCAN = {"array": 10.0, "wobble": 8.0, "depth": 120.0, "sector": 55.6, "fan": 30.0, "samples": 512, "lines": 256, "frames": 17}
 
 
 def polar_places(probe):

@@ -79,12 +79,13 @@ def volume_rows(new):
     ]
 
 
+# The slice that the peers show is cut, though a picture that small is hardly one.
 TINY = ("--size", "16x16", "--mode", "mpr", "--set", "slices.format=r8")
 
 
 def slice_row(name, title, peers, setting, **more):
-    echolume = (*TINY, "--set", setting)
-    return Row(name, title, "slices", peers, echolume, TINY, sizes=(512,), per=16, **more)
+    plain = (*TINY, "--set", "planes.position=[0,0,0]")
+    return Row(name, title, "slices", peers, (*plain, "--set", setting), plain, sizes=(512,), per=16, **more)
 
 
 def distance_row(name, title, peers, setting, **more):
@@ -102,7 +103,7 @@ def other_rows():
     none = {"Echolume": "has no command that writes a Cartesian volume"}
     scan = (*TINY, "--set", "slices.pixels=512")
     return [
-        Row("scan", "scan conversion 256 x 512 -> 512 x 512", "scan", ("OpenCV",), scan, sizes=(512,), per=16),
+        Row("scan", "scan conversion 256 x 512 -> 512 x 512", "scan", ("OpenCV",), scan, sizes=(512,), per=phantom.SCAN["frames"]),
         Row("sweep", "sweep to Cartesian, 512 x 256 x 37", "sweep", ("scipy",), sizes=(128, 256), notes=none),
         slice_row("median3", "median 3x3, slice of 512 x 512, u8", ("OpenCV", "SimpleITK"), "slices.median=true"),
         slice_row("gaussian", "Gaussian of 1.5 pixels, slice of 512 x 512, u8", ("OpenCV", "SimpleITK"), blur),

@@ -20,6 +20,9 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 # The same for Echolume and for what runs on the same driver: what .cargo/config.toml sets.
 DRIVER = {"LP_NATIVE_VECTOR_WIDTH": "256", "GALLIVM_PERF": "no_aos_sampling"}
 
+# The file of the frames: not to be taken for one of another number.
+SCAN = f"scan-{phantom.SCAN['frames']}"
+
 
 class Peer:
     """A worker process; what goes wrong in it becomes `fault`."""
@@ -88,8 +91,8 @@ def inputs(folder, size):
     slices = array("slices", lambda: phantom.slices(16, 512))
     mha("slices", "slices", lambda path: phantom.write_mha(path, slices, [phantom.pitch(512)] * 2 + [2.0], [-50, -50, -16]))
     array("distance", lambda: phantom.distance_map(512)[None])
-    scan = array("scan", lambda: phantom.sweep(phantom.SCAN))
-    mha("scan", "scan", lambda path: phantom.write_sweep(path, scan, phantom.SCAN))
+    scan = array(SCAN, lambda: phantom.sweep(phantom.SCAN))
+    mha("scan", SCAN, lambda path: phantom.write_sweep(path, scan, phantom.SCAN))
     array("sweep", lambda: phantom.sweep(phantom.SWEEP)[None])
     made["distance"] = made.get("volume") if size == 128 else None
     return made
@@ -99,7 +102,7 @@ def arrays_of(row, size):
     if row.kind == "volume":
         kind = "inverted" if row.inverted else "volume"
         return [f"{kind}-{size}-{k}.npy" for k in (1, 2)]
-    return [f"{row.kind}.npy"]
+    return [f"{SCAN if row.kind == 'scan' else row.kind}.npy"]
 
 
 def count_for(seconds, budget):
