@@ -16,6 +16,7 @@ const LONGEST: u64 = 256 << 20;
 #[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
                         echolume profile sweep.mha --preset fetal --json before.json\n  \
                         echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
+                        echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
                         echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)")]
 pub struct Profile {
     #[command(flatten)]
@@ -29,6 +30,10 @@ pub struct Profile {
     /// Send the frames once and measure the picture alone
     #[arg(long)]
     still: bool,
+    /// Turn the view by this much before each volume, so that every picture is from another angle: the camera's azimuth, that
+    /// of the planes where planes are cut
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    turn: f64,
     /// Leave out measuring what bounds the device (copies, samples, fetches)
     #[arg(long)]
     no_ceilings: bool,
@@ -73,6 +78,9 @@ impl Profile {
             self.asked.keep_inputs("output", file)?;
             check_target(file).map_err(failed)?;
         }
+        if !self.turn.is_finite() {
+            return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
+        }
         let context = self.asked.device(false)?;
         // One volume, kept for all repeats.
         let mut frames = Vec::new();
@@ -84,6 +92,7 @@ impl Profile {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
+            turn: self.turn,
             input: self.asked.shown(),
             ceilings: !self.no_ceilings,
         };

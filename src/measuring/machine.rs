@@ -2,6 +2,7 @@
 
 use crate::gpu::Context;
 use crate::report::profile::Device;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -30,6 +31,34 @@ pub fn device(context: &Context) -> Device {
     }
 }
 
+/// CPU time that each thread of this process has had, user and system, ns by thread.
+#[derive(Clone, Debug)]
+pub struct CpuTime(BTreeMap<String, u64>);
+
+impl CpuTime {
+    /// Now. None where the system does not tell: it is Linux' /proc/self/task/*/schedstat, whose first number is the time on a
+    /// CPU in ns (/proc/self/stat counts in hundredths of a second). A thread that is running is told up to its last switch,
+    /// so this one yields first.
+    pub fn now() -> Option<CpuTime> {
+        std::thread::yield_now();
+        let mut threads = BTreeMap::new();
+        for thread in std::fs::read_dir("/proc/self/task").ok()? {
+            let thread = thread.ok()?;
+            // One that has just ended has no file any more.
+            let Ok(text) = std::fs::read_to_string(thread.path().join("schedstat")) else { continue };
+            let on_cpu = text.split_whitespace().next()?.parse().ok()?;
+            threads.insert(thread.file_name().to_string_lossy().into_owned(), on_cpu);
+        }
+        (!threads.is_empty()).then_some(CpuTime(threads))
+    }
+
+    /// ns of all threads since then. What a thread did that has ended is lost; drivers keep theirs.
+    pub fn since(&self, then: &CpuTime) -> f64 {
+        let of = |(name, now): (&String, &u64)| now.saturating_sub(then.0.get(name).copied().unwrap_or(0));
+        self.0.iter().map(of).sum::<u64>() as f64
+    }
+}
+
 /// What the system tells of clocks and power without privileges: of the processor for a software device, of the first display
 /// device that says something otherwise.
 fn clocks(is_software: bool) -> Option<String> {
@@ -54,4 +83,42 @@ fn clocks(is_software: bool) -> Option<String> {
         );
     }
     (!known.is_empty()).then(|| known.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    #[test]
+    fn what_a_thread_works_is_counted_as_its_own() {
+        if !Path::new("/proc/self/task").exists() {
+            assert!(CpuTime::now().is_none());
+            return;
+        }
+        let (go, wait) = mpsc::channel::<()>();
+        let (tell, told) = mpsc::channel::<String>();
+        let worker = std::thread::spawn(move || {
+            let own = std::fs::read_link("/proc/thread-self").unwrap();
+            let own = own.file_name().unwrap().to_string_lossy().into_owned();
+            tell.send(own.clone()).unwrap();
+            wait.recv().unwrap();
+            let product = (0..3_000_000).fold(1.0f64, |x, _| std::hint::black_box(x * 1.000_000_1));
+            assert!(product > 1.0);
+            tell.send(own).unwrap();
+            // Alive until it has been looked at: what has ended is told no more.
+            wait.recv().unwrap();
+        });
+        let name = told.recv().unwrap();
+        let then = CpuTime::now().expect("Linux tells");
+        go.send(()).unwrap();
+        told.recv().unwrap();
+        let now = CpuTime::now().expect("Linux tells");
+        let own = now.0[&name] - then.0[&name];
+        assert!(own > 0, "the thread that worked had no time");
+        assert!(now.since(&then) >= own as f64);
+        assert_eq!(then.since(&now), 0.0);
+        go.send(()).unwrap();
+        worker.join().unwrap();
+    }
 }

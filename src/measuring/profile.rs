@@ -1,9 +1,10 @@
 //! One scene rendered again and again: where the time goes.
 
+use super::machine::CpuTime;
 use super::{ceilings, machine};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Bind, Part, Pass, Span, When};
-use crate::plan::{Plan, Step};
+use crate::plan::{Plan, Rerun, Step};
 use crate::report::profile::trace::{self, Track};
 use crate::report::profile::{Acquisition, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
@@ -18,6 +19,8 @@ pub struct Asked {
     pub warm_up: usize,
     /// The frames go through stage 1 once: only what follows is measured.
     pub still: bool,
+    /// The view turns by this much before each repeat, warm-up included, deg.
+    pub turn: f64,
     /// What the frames came from, in words.
     pub input: String,
     /// Measure what bounds the device, too.
@@ -29,6 +32,8 @@ pub struct Asked {
 pub struct Run {
     context: Arc<Context>,
     renderer: Renderer,
+    /// As it was asked for, before the view turned.
+    scene: Scene,
     asked: Asked,
     began: Instant,
     done: usize,
@@ -60,6 +65,7 @@ impl Run {
         Ok(Run {
             context: context.clone(),
             renderer: Renderer::new(context, scene.clone(), &options)?,
+            scene: scene.clone(),
             asked: asked.clone(),
             began: Instant::now(),
             done: 0,
@@ -74,26 +80,48 @@ impl Run {
 
     /// The volume once more.
     pub fn repeat(&mut self, frames: &[Frame]) -> Result<(), GpuError> {
+        let cpu = CpuTime::now();
         let start = self.began.elapsed();
-        if self.done == 0 || !self.asked.still {
+        let turned = self.turn()?;
+        if self.done == 0 || !self.asked.still || matches!(turned, Some(Rerun::Frames | Rerun::Everything)) {
             for frame in frames {
                 self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
             }
+            self.renderer.show(0)?;
+        } else if turned.is_none() {
+            // Nothing has changed: the picture is asked for anew.
+            self.renderer.show(0)?;
         }
-        self.renderer.show(0)?;
         self.renderer.picture()?;
         let wall = (self.began.elapsed() - start).as_nanos() as f64;
+        let cpu = CpuTime::now().zip(cpu).map(|(now, then)| now.since(&then));
         let spans = self.renderer.take_spans()?;
         self.done += 1;
         if self.done > self.asked.warm_up {
-            self.repeats.push(Repeat { wall, spans });
+            self.repeats.push(Repeat { wall, cpu, spans });
         }
         Ok(())
     }
 
+    /// The scene from the next angle, and what that runs again; None where nothing turns.
+    fn turn(&mut self) -> Result<Option<Rerun>, GpuError> {
+        if self.asked.turn == 0.0 {
+            return Ok(None);
+        }
+        let mut settings = self.scene.settings.clone();
+        let angle = self.asked.turn * self.done as f64;
+        settings.camera.azimuth += angle;
+        if self.scene.cuts_planes() {
+            settings.planes.azimuth += angle;
+        }
+        let scene = Scene::new(self.scene.geometry.clone(), self.scene.input, settings)
+            .map_err(|e| GpuError::Broken(format!("the view turned by {angle} deg: {e}")))?;
+        self.renderer.change(scene).map(Some)
+    }
+
     pub fn finish(self) -> (Profile, Vec<trace::Span>) {
         let device = machine::device(&self.context);
-        let (scene, plan, repeats) = (self.renderer.scene(), self.renderer.plan(), self.repeats);
+        let (scene, plan, repeats) = (&self.scene, self.renderer.plan(), self.repeats);
         let stamped = device.valid_bits > 0;
         let profile = Profile {
             format: FORMAT.into(),
@@ -113,9 +141,11 @@ impl Run {
                 .map(|p| Acquisition { seconds: p.acquisition_time(), sound_speed: p.sound_speed }),
             repeats: repeats.len(),
             warm_up: self.asked.warm_up,
+            turn: self.asked.turn,
             passes: passes(plan, scene, &repeats, stamped),
             host: hosts(&repeats),
             wall_ns: repeats.iter().map(|r| r.wall).collect(),
+            cpu_ns: repeats.iter().map(|r| r.cpu).collect::<Option<_>>().unwrap_or_default(),
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
@@ -129,6 +159,8 @@ impl Run {
 struct Repeat {
     /// From the first frame's arrival to the picture, ns.
     wall: f64,
+    /// CPU time of the process over it, ns; None where the system does not tell.
+    cpu: Option<f64>,
     spans: Vec<Span>,
 }
 

@@ -12,7 +12,7 @@ const SETTINGS: &str = "mode = 'sr'
     post = { sigma = { window = 3, sigma = 0.1 } }";
 
 fn asked(repeats: usize) -> Asked {
-    Asked { repeats, warm_up: 2, still: false, input: "a bumpy wall".into(), ceilings: false }
+    Asked { repeats, warm_up: 2, still: false, turn: 0.0, input: "a bumpy wall".into(), ceilings: false }
 }
 
 #[test]
@@ -108,4 +108,28 @@ fn a_profile_adds_up_and_survives_being_written() {
     let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
     let events = trace["traceEvents"].as_array().expect("events");
     assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), 6 * 15);
+}
+
+/// The picture alone, from another angle each time: what the camera changes runs again and nothing before it.
+#[test]
+fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
+    let _alone = alone();
+    let context = device();
+    let turning = Asked { still: true, turn: 3.0, ..asked(3) };
+    for (mode, ray, tile) in [("sr", "raycast_surface", false), ("mpr", "raycast_planes", true)] {
+        let scene = scene(&SETTINGS.replace("mode = 'sr'", &format!("mode = '{mode}'")));
+        assert_eq!(scene.cuts_planes(), tile);
+        let (profile, _) = run(&context, &scene, &frames(), &turning).expect("profile");
+        profile.check().expect("consistent");
+        let of = |name: &str| profile.passes.iter().find(|p| p.name == name);
+        assert_eq!(of(ray).expect("cast again").runs_per_picture, 1, "{mode}");
+        assert!(of(ray).expect("cast again").samples_ns.iter().all(|ns| *ns > 0.0), "{mode}: {profile:?}");
+        assert!(of("scan_convert").is_none_or(|p| p.runs_per_picture == 0), "{mode}");
+        assert_eq!(profile.turn, 3.0);
+        // What was asked for, not where the view has turned to.
+        assert_eq!(profile.scene, toml::to_string(&scene.settings).expect("settings"));
+        if cfg!(target_os = "linux") {
+            assert_eq!(profile.cpu_ns.len(), 3);
+        }
+    }
 }

@@ -25,6 +25,8 @@ fn json_comes_back_as_it_went() {
     // Fractions that are off by one bit when a reader rounds carelessly.
     odd.passes[0].samples_ns.iter_mut().for_each(|ns| *ns = random.between(0.0, 1e7));
     odd.passes[1].filtered = None;
+    odd.cpu_ns = Vec::new();
+    odd.turn = -2.5;
     odd.ceilings = None;
     odd.acquisition = None;
     odd.device.clocks = None;
@@ -39,10 +41,10 @@ fn json_comes_back_as_it_went() {
 fn other_versions_other_files_and_contradictions_are_refused() {
     let good = to_json(&measured()).expect("JSON");
     let error = |text: &str| from_json(text).expect_err("refused").to_string();
-    let other = good.replace("echolume-profile-1", "echolume-profile-9");
+    let other = good.replace("echolume-profile-2", "echolume-profile-9");
     assert_eq!(
         error(&other),
-        "format is \"echolume-profile-9\", this program reads \"echolume-profile-1\"; profile again with it"
+        "format is \"echolume-profile-9\", this program reads \"echolume-profile-2\"; profile again with it"
     );
     for text in
         ["", "[]", "{}", "{\"format\": 3}", "nonsense", &good[..good.len() / 2], &good.replace("warm_up", "warm")]
@@ -61,6 +63,28 @@ fn other_versions_other_files_and_contradictions_are_refused() {
     assert!(broken(|p| p.passes[0].samples_ns[2] = -1.0).starts_with("pass 0: time 2 is -1 ns"));
     assert!(broken(|p| p.device.timestamp_period_ns = f64::NAN).contains("NaN is not finite"));
     assert!(broken(|p| p.ceilings.as_mut().unwrap().fetch.low = f64::INFINITY).starts_with("fetch: ceiling"));
+}
+
+/// A file of the version before has neither CPU time nor a camera that turns.
+#[test]
+fn a_profile_of_the_version_before_is_read() {
+    let mut before = measured();
+    before.cpu_ns.clear();
+    let text = to_json(&before).expect("JSON").replace("echolume-profile-2", "echolume-profile-1");
+    let without: Vec<&str> = text.lines().filter(|l| !l.contains("\"cpu_ns\"") && !l.contains("\"turn\"")).collect();
+    assert_eq!(text.lines().count() - without.len(), 2);
+    assert_eq!(from_json(&without.join("\n")).expect("profile"), before);
+}
+
+#[test]
+fn cpu_time_is_shown_and_written_where_it_is_known() {
+    let known = measured();
+    assert!(table::profile(&known).contains("CPU, all threads"));
+    assert!(csv(&known).lines().any(|l| l.starts_with("cpu,,cpu,1,30,3000000,")), "{}", csv(&known));
+    let unknown = Profile { cpu_ns: Vec::new(), ..measured() };
+    assert!(!table::profile(&unknown).contains("CPU, all threads") && !csv(&unknown).contains("cpu,"));
+    let short = Profile { cpu_ns: vec![1.0; 29], ..measured() };
+    assert_eq!(to_json(&short).expect_err("refused").to_string(), "cpu_ns: has 29 times for 30 repeats");
 }
 
 #[test]
@@ -141,7 +165,7 @@ fn csv_has_as_many_fields_as_its_head_and_the_tables_numbers() {
     profile.passes[3].stage = "ray, cast".into();
     let text = csv(&profile);
     let rows: Vec<Vec<String>> = text.lines().map(fields).collect();
-    assert_eq!(rows.len(), 1 + 4 + 1 + 2);
+    assert_eq!(rows.len(), 1 + 4 + 1 + 3);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
     let column = |name: &str| rows[0].iter().position(|c| c == name).expect("column");
     let sample = profile.passes[3].sample().expect("times");
@@ -154,7 +178,7 @@ fn csv_has_as_many_fields_as_its_head_and_the_tables_numbers() {
     assert_eq!(rows[5][column("share_of_passes")], "", "a host span has no share of the passes");
 
     let long = csv_samples(&profile);
-    assert_eq!(long.lines().count(), 1 + 30 * (4 + 1 + 2));
+    assert_eq!(long.lines().count(), 1 + 30 * (4 + 1 + 3));
     let line = long.lines().find(|l| l.starts_with("pass,raycast,pass 2,17,")).expect("line");
     assert_eq!(line.rsplit(',').next().map(str::parse), Some(Ok(profile.passes[2].samples_ns[17])));
 }

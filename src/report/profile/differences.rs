@@ -23,6 +23,7 @@ impl Differences {
             ("frame", sizes.map(|s| format!("{} x {} samples", s.frame[0], s.frame[1]))),
             ("slices", sizes.map(|s| s.slices.to_string())),
             ("volume", sizes.map(|s| format!("{} x {} x {} texels", s.volume[0], s.volume[1], s.volume[2]))),
+            ("turn", [old, new].map(|p| format!("{} deg", p.turn))),
             ("picture", sizes.map(|s| format!("{} x {} pixels", s.picture[0], s.picture[1]))),
         ];
         let devices = [&old.device, &new.device];

@@ -1,7 +1,7 @@
 //! Profiles as JSON, which comes back as it went, and as CSV for other programs.
 
 use super::statistics::Sample;
-use super::{FORMAT, LEVEL, PassProfile, Profile, ProfileError};
+use super::{FORMAT, FORMAT_BEFORE, LEVEL, PassProfile, Profile, ProfileError};
 use serde::Deserialize;
 use std::fmt::Write as _;
 
@@ -21,16 +21,17 @@ pub fn from_json(text: &str) -> Result<Profile, ProfileError> {
         format: String,
     }
     let version: Version = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
-    if version.format != FORMAT {
+    if ![FORMAT, FORMAT_BEFORE].contains(&version.format.as_str()) {
         return Err(ProfileError::Format { found: version.format });
     }
-    let profile: Profile = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
+    let mut profile: Profile = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
+    profile.format = FORMAT.into();
     profile.check()?;
     Ok(profile)
 }
 
-/// One line a pass, then the host's spans, `device` (first begin to last end) and `wall`. Without time stamps the columns of
-/// passes that tell times are empty.
+/// One line a pass, then the host's spans, `device` (first begin to last end), `wall` and `cpu` (of the process, where the
+/// system tells). Without time stamps the columns of passes that tell times are empty.
 pub fn csv(profile: &Profile) -> String {
     let mut text = String::from(
         "kind,stage,name,runs_per_picture,repeats,min_ns,p5_ns,median_ns,p95_ns,max_ns,mad_ns,ci_low_ns,ci_high_ns,\
@@ -56,7 +57,7 @@ pub fn csv(profile: &Profile) -> String {
             let _ = writeln!(text, "{}", fields.join(","));
         }
     }
-    for (kind, list) in [("device", &profile.device_ns), ("wall", &profile.wall_ns)] {
+    for (kind, list) in whole(profile) {
         let mut fields = vec![kind.to_string(), String::new(), kind.into(), "1".into(), list.len().to_string()];
         fields.extend(times(Sample::new(list).ok().as_ref()));
         fields.resize(text.lines().next().map_or(0, |l| l.split(',').count()), String::new());
@@ -72,13 +73,19 @@ pub fn csv_samples(profile: &Profile) -> String {
     let spans = lists.iter().flat_map(|(kind, list)| {
         list.iter().map(move |span| (*kind, span.stage.as_str(), span.name.as_str(), &span.samples_ns))
     });
-    let whole = [("device", "", "device", &profile.device_ns), ("wall", "", "wall", &profile.wall_ns)];
+    let whole = whole(profile).map(|(name, list)| (name, "", name, list));
     for (kind, stage, name, samples) in spans.chain(whole) {
         for (repeat, ns) in samples.iter().enumerate() {
             let _ = writeln!(text, "{kind},{},{},{repeat},{ns}", quoted(stage), quoted(name));
         }
     }
     text
+}
+
+/// What is not one pass or span.
+fn whole(profile: &Profile) -> impl Iterator<Item = (&'static str, &Vec<f64>)> {
+    let cpu = (!profile.cpu_ns.is_empty()).then_some(("cpu", &profile.cpu_ns));
+    [("device", &profile.device_ns), ("wall", &profile.wall_ns)].into_iter().chain(cpu)
 }
 
 /// Median times of those that have times, ns.

@@ -14,7 +14,9 @@ use serde::{Deserialize, Serialize};
 use statistics::Sample;
 
 /// Version of the JSON; another layout gets another name.
-pub const FORMAT: &str = "echolume-profile-1";
+pub const FORMAT: &str = "echolume-profile-2";
+/// Still read: knows no CPU time, and no camera that turns.
+pub const FORMAT_BEFORE: &str = "echolume-profile-1";
 
 /// Coverage that intervals aim at.
 pub const LEVEL: f64 = 0.95;
@@ -54,12 +56,19 @@ pub struct Profile {
     pub repeats: usize,
     /// Pictures rendered before them, not measured.
     pub warm_up: usize,
+    /// How far the view turned from each repeat to the next, deg.
+    #[serde(default)]
+    pub turn: f64,
     /// In running order.
     pub passes: Vec<PassProfile>,
     /// What the CPU did: submit, upload, wait, whole. They may lie within each other and do not add up.
     pub host: Vec<PassProfile>,
     /// From submit to the device being idle again, by the host's clock.
     pub wall_ns: Vec<f64>,
+    /// CPU time of the process over the same stretch, all threads, user and system: on a software device what the work costs
+    /// whatever else the machine does. Empty where the system does not tell.
+    #[serde(default)]
+    pub cpu_ns: Vec<f64>,
     /// From the first pass' begin to the last one's end, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     pub ceilings: Option<Ceilings>,
@@ -232,7 +241,12 @@ impl Profile {
             return fault("repeats", "is 0; at least one picture must be measured".into());
         }
         let stamped = if self.has_time_stamps() { self.repeats } else { 0 };
-        let mut lists = vec![("wall_ns", self.repeats, &self.wall_ns), ("device_ns", stamped, &self.device_ns)];
+        let told = if self.cpu_ns.is_empty() { 0 } else { self.repeats };
+        let mut lists = vec![
+            ("wall_ns", self.repeats, &self.wall_ns),
+            ("cpu_ns", told, &self.cpu_ns),
+            ("device_ns", stamped, &self.device_ns),
+        ];
         for (kind, expected, spans) in [("passes", stamped, &self.passes), ("host", self.repeats, &self.host)] {
             for (i, span) in spans.iter().enumerate() {
                 if spans[..i].iter().any(|s| s.name == span.name) {
@@ -259,8 +273,8 @@ impl Profile {
             }
         }
         let rest = self.acquisition.iter().flat_map(|a| [a.seconds, a.sound_speed]);
-        match rest.chain([self.device.timestamp_period_ns]).find(|v| !v.is_finite()) {
-            Some(value) => fault("acquisition or timestamp_period_ns", format!("{value} is not finite")),
+        match rest.chain([self.device.timestamp_period_ns, self.turn]).find(|v| !v.is_finite()) {
+            Some(value) => fault("acquisition, timestamp_period_ns or turn", format!("{value} is not finite")),
             None => Ok(()),
         }
     }

@@ -82,6 +82,8 @@ fn conditions(profile: &Profile) -> String {
         sizes.picture[1],
         profile.settings_hash
     );
+    let turned =
+        if profile.turn == 0.0 { String::new() } else { format!(", the view turned by {} deg each", profile.turn) };
     let mut rows = vec![
         ("device", format!("{}{software}, {}, Vulkan {}", device.name, device.driver, device.api)),
         ("time stamps", clock),
@@ -89,7 +91,7 @@ fn conditions(profile: &Profile) -> String {
         ("program", format!("{}, {}", profile.program, profile.date)),
         ("input", profile.input.clone()),
         ("sizes", sizes),
-        ("repeats", format!("{} after {} to warm up", profile.repeats, profile.warm_up)),
+        ("repeats", format!("{} after {} to warm up{turned}", profile.repeats, profile.warm_up)),
     ];
     if let Some(sampling) = &profile.sampling {
         rows.push(("samples", sampling.clone()));
@@ -172,6 +174,7 @@ fn whole(profile: &Profile) -> Vec<Vec<String>> {
         add(&format!("host: {name}"), samples_ns);
     }
     add("wall, submit to idle", &profile.wall_ns);
+    add("CPU, all threads", &profile.cpu_ns);
     rows
 }
 
