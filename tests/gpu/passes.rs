@@ -139,18 +139,14 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).expect("made")
 }
 
-fn run_one(
-    single: &mut Single,
-    scene: &Scene,
-    pass: &'static Pass,
-    iteration: u32,
-    kind: &str,
-    seed: u64,
-) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
-    let turn = Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 };
+fn turn_of(scene: &Scene, iteration: u32) -> Turn {
+    Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 }
+}
+
+fn inputs_of(scene: &Scene, pass: &Pass, turn: &Turn, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
-    let reads = (pass.reads)(scene, &turn);
+    let reads = (pass.reads)(scene, turn);
     for (n, bind) in reads.iter().enumerate() {
         // One image bound under two names has one content.
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
@@ -161,6 +157,19 @@ fn run_one(
         let leaps = leaps_of(scene, bricks.slot, inputs.get("volume"));
         inputs.insert("bricks", leaps);
     }
+    inputs
+}
+
+fn run_one(
+    single: &mut Single,
+    scene: &Scene,
+    pass: &'static Pass,
+    iteration: u32,
+    kind: &str,
+    seed: u64,
+) -> (Arrays, Arrays, Arrays, Vec<Bind>) {
+    let turn = turn_of(scene, iteration);
+    let inputs = inputs_of(scene, pass, &turn, kind, seed);
     let writes = (pass.writes)(scene, &turn);
     let mut expected = Arrays::default();
     for bind in &writes {
@@ -217,12 +226,14 @@ fn texels_loaded_are_the_texels_fetched() {
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             let reads: Vec<_> = (pass.reads)(&scene, &Turn::default()).iter().map(|b| b.slot.format(&scene)).collect();
-            // Once with each shader, the formats of what it reads, and what is special about it.
-            let shader = (pass.shader)(&scene, &Turn::default());
-            if !seen.insert((shader, reads, (pass.constants)(&scene, &Turn::default()))) {
+            // Once with each shader and the formats of what it reads: that is what is rewritten.
+            if !seen.insert(((pass.shader)(&scene, &Turn::default()), reads)) {
                 continue;
             }
-            let [fetched, stored] = singles.each_mut().map(|s| run_one(s, &scene, pass, 0, "noise", 3).2);
+            let turn = turn_of(&scene, 0);
+            let inputs = inputs_of(&scene, pass, &turn, "noise", 3);
+            let [fetched, stored] =
+                singles.each_mut().map(|s| s.run(&scene, pass, &turn, &inputs, POISON).expect("dispatch"));
             for ((name_of, fetched), (_, stored)) in fetched.iter().zip(stored.iter()) {
                 let differ = fetched.values.iter().zip(&stored.values).filter(|(a, b)| a.to_bits() != b.to_bits());
                 assert_eq!(differ.count(), 0, "texels of '{name_of}' by {} in '{name}'", pass.name);
@@ -230,7 +241,7 @@ fn texels_loaded_are_the_texels_fetched() {
             loaded += 1;
         }
     }
-    assert!(loaded > 100, "{loaded} passes were held against each other");
+    assert!(loaded > 50, "{loaded} passes were held against each other");
 }
 
 #[test]
