@@ -124,7 +124,7 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
             (
                 "transfer function",
                 |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
-                from(&["classify_volume"]),
+                if base.composites() { from(&["classify_volume"]) } else { vec![] },
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
             ("contrast", |s| s.settings.post.contrast = 1.5, vec!["tone"]),
