@@ -3,6 +3,10 @@ layout(constant_id = 23) const int SKIP = 0; // 0 every sample is taken; 1 by th
 
 uniform texture3D bricks;
 
+// Samples taken before bricks are looked at again: as many on all rays, whatever each one's brick asks for, since rays that run side
+// by side on one unit wait for the one that takes most.
+const int BLOCK = 16;
+
 const int WANTED = 0, NOTHING = 1, KNOWN = 2; // kinds, as classify.comp has them
 
 // What a sample meets, and the first sample behind it that may meet something else.

@@ -50,7 +50,7 @@ void main() {
                     i = to;
                     here = stretch_at(ray, i, SAMPLE_AT);
                 }
-                if (i < last) stop = here.stop;
+                if (i < last) stop = min(stop, i + BLOCK);
             }
             for (; i < stop; ++i) {
                 float from = offset_of(ray, float(i));

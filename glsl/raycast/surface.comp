@@ -34,7 +34,6 @@ void main() {
     segment = first;
     bool goes_on = true;
     for (int i = first; goes_on && (i < end || look_again(i));) {
-        int stop = end;
         if (SKIP == 1) {
             Stretch here = stretch_at(ray, i, SAMPLE_AT);
             while (here.kind == NOTHING && state == START && !again && i < end) {
@@ -43,28 +42,22 @@ void main() {
                 restart(i);
                 here = stretch_at(ray, i, SAMPLE_AT);
             }
-            stop = min(here.stop, end);
-            if (here.kind == KNOWN && DETECTOR == 0 && state == START && !again) {
+            if (here.kind == KNOWN && DETECTOR == 0 && state == START && !again && filled >= RING) {
                 vec4 most = max(older, newer);
-                bool calm = filled >= RING && max(max(most.x, most.y), max(most.z, most.w)) <= silence;
+                bool calm = max(max(most.x, most.y), max(most.z, most.w)) <= silence;
                 // The ring is filled anew with the last samples of the stretch: what follows finds it as it would have been.
+                int stop = min(here.stop, end);
                 int steps = (stop - i + stride - 1) / stride, left = stop == end ? 0 : RING;
                 if (calm && steps > left) {
                     i += (steps - left) * stride;
                     filled = 0;
                 }
-                if (!calm) stop = min(stop, i + RING * stride);
             }
         }
-        while (i < stop) {
+        for (int n = SKIP == 1 ? BLOCK : NEVER; n > 0 && i < end; --n) {
             vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT));
             vec3 texel;
-            if (locate(p, texel)) {
-                float value = sample_along(ray, i, SAMPLE_AT, texel, slices);
-                goes_on = take_sample(value, i);
-            } else {
-                goes_on = skip_sample(i);
-            }
+            goes_on = locate(p, texel) ? take_sample(sample_along(ray, i, SAMPLE_AT, texel, slices), i) : skip_sample(i);
             if (!goes_on) break;
         }
     }

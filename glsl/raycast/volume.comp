@@ -89,16 +89,17 @@ void main() {
                     to = min(here.stop, last);
                     here = stretch_at(ray, to, place);
                 }
-                if (to < last) stop = here.stop;
+                bool more = to < last;
                 if (COMPOSITING != 2) {
                     i = to;
                 } else if (to > i) {
                     // A step sees the sample in front of it, too: the first one behind what is seen is taken, the last one fetches
                     // the front of what follows.
                     known = front_inside;
-                    if (known) stop = i + 1;
-                    else i = to - 1;
+                    if (!known) i = to - 1;
                 }
+                if (more) stop = min(stop, i + (known ? 1 : BLOCK));
+                else if (known) stop = i + 1;
             }
             for (; i < stop; ++i) {
                 // Midpoints of the steps, or their ends; the last step is as long as what is left.

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub struct Error {
     #[command(flatten)]
     asked: Asked,
-    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, or
+    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick, or
     /// all; may be given again
     #[arg(long, value_name = "NAME", default_value = "all")]
     dial: Vec<String>,

@@ -40,6 +40,7 @@ pub const NAMES: &[&str] = &[
     "rays",
     "lut",
     "half",
+    "brick",
 ];
 
 /// The dial of that name, or why this scene has none.
@@ -238,6 +239,16 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 &["ray.entries=65536".into()],
                 &["ray.entries=16385".into()],
             )
+        }
+        "brick" => {
+            need(marches && s.ray.sliding == 0, "leaps over nothing")?;
+            let now = s.ray.brick;
+            let word = |n: u32| if n == 0 { "none".to_string() } else { format!("{n} texels") };
+            let others = [0, 4, 8, 16, 32].into_iter().filter(|n| *n != now);
+            let others = others.map(|n| at(word(n), &[format!("ray.brick={n}")], f64::from(n)));
+            // Held against every sample.
+            let all = ["ray.brick=0".to_string()];
+            made("brick", "texels", is(word(now), f64::from(now)), others.collect(), &all, &all)
         }
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;

@@ -150,11 +150,10 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let probe = sweep::probe(conditions.frames, conditions.lines);
     let (low, high) = probe.plane_bounds();
-    let mut scene = Scene::new(Geometry::Sweep(probe), input, settings)?;
+    let scene = Scene::new(Geometry::Sweep(probe), input, settings)?;
     // A slice's pixels are square otherwise, and a sector is wider than deep: n x n are denser in depth.
     let pitch = [0, 1].map(|i| (high[i] - low[i]) / f64::from(n - 1));
-    scene.grid = SliceGrid { size: [n, n], origin: low, pitch };
-    Ok(scene)
+    Ok(scene.on_grid(SliceGrid { size: [n, n], origin: low, pitch }))
 }
 
 /// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).

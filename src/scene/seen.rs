@@ -1,7 +1,7 @@
 //! What of the volume can be seen: the texels that any sample of stage 2 may touch. Stage 1 makes no others (after Solteszova
 //! and others 2017, who filter only what a picture shows). The camera does not enter: it may turn at any time.
 
-use super::{Layout, Mode, RING, Scene};
+use super::{Layout, Mode, RING, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
@@ -56,6 +56,13 @@ struct Look {
 }
 
 impl Scene {
+    /// The same scene with slices on another lattice.
+    pub fn on_grid(mut self, grid: SliceGrid) -> Scene {
+        self.grid = grid;
+        self.seen = seen(&self);
+        self
+    }
+
     /// The frames that stage 1 needs: what is seen, and the slices that smoothing across slices reaches.
     pub fn frames_seen(&self) -> Range<u32> {
         let reach = self.smoothing_radius()[2];

@@ -170,7 +170,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
         for plane in ["", "plane = 'b'", "plane = 'c'", "azimuth = 30, tilt = 20, roll = -25"] {
             let toml = format!(
                 "mode = 'plane'\nplanes = {{ position = [{x}, {depth}, {z}], {plane} }}\npicture = {{ size = [160, 160] }}
-                 slices = {{ format = 'r32f', pixels = 700 }}\nray = {{ sampling = 'exact' }}
+                 slices = {{ format = 'r32f', pixels = 700, everything = true }}\nray = {{ sampling = 'exact' }}
                  region = {{ lateral = [{}, {}], depth = [{}, {}], elevation = [{}, {}] }}",
                 x - 5.0, x + 5.0, depth - 5.0, depth + 5.0, z - 5.0, z + 5.0
             );

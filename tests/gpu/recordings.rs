@@ -13,12 +13,12 @@ use glam::DVec3;
 fn plus_scene(recording: &Recording) -> Scene {
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let settings: Settings =
-        toml::from_str("mode = 'vr'\nslices = { format = 'r32f' }\npicture = { size = [8, 8] }").unwrap();
+        toml::from_str("mode = 'vr'\nslices = { format = 'r32f', everything = true }\npicture = { size = [8, 8] }")
+            .unwrap();
     let mut scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
-    scene.grid =
-        SliceGrid { size: [820, 616], origin: [-(410.0 - 0.5) * 0.15, 10.0 - 87.0 * 0.15], pitch: [0.15, 0.15] };
     scene.apron = 0.0;
-    scene
+    let origin = [-(410.0 - 0.5) * 0.15, 10.0 - 87.0 * 0.15];
+    scene.on_grid(SliceGrid { size: [820, 616], origin, pitch: [0.15, 0.15] })
 }
 
 fn frames_of(name: &str) -> (Recording, Vec<Vec<u8>>) {
