@@ -197,7 +197,7 @@ fn later_layers_are_not_overridden_by_earlier_ones() {
     let folder = Folder::new("layers");
     let scene = folder.write("scene.toml", "mode = 'vr'\n[picture]\nsize = [40, 30]\n[distance]\nmedian = 0\n");
     let preset = ["--preset", "bone", "--mode", "sr"];
-    assert!(explain(BONE, &preset).contains("+ median_distance     512 x 512 x 1"));
+    assert!(explain(BONE, &preset).contains("+ median_distance     512 x 128 x 1"));
     let over_preset = explain(BONE, &[&preset[..], &["--scene", &scene]].concat());
     assert!(over_preset.contains("- median_distance") && over_preset.contains("40 x 30 x 1"), "{over_preset}");
     assert!(explain(BONE, &["--scene", &scene]).contains("+ raycast_volume      40 x 30 x 1"));
