@@ -100,9 +100,9 @@ fn check(scene: &Scene, shares: &[[f64; 3]]) {
         if !is_inside {
             continue;
         }
-        for axis in 0..3 {
-            let last = f64::from(scene.volume_size()[axis] - 1);
-            let (from, to) = (texel[axis].clamp(0.0, last).floor() as u32, texel[axis].clamp(0.0, last).ceil() as u32);
+        for (axis, at) in texel.into_iter().enumerate() {
+            let at = at.clamp(0.0, f64::from(scene.volume_size()[axis] - 1));
+            let (from, to) = (at.floor() as u32, at.ceil() as u32);
             let [first, last] = if axis < 2 { reach.tiles[axis] } else { reach.slices };
             let [from, to] = if axis < 2 { [from / TILE, to / TILE] } else { [from, to] };
             assert!(first <= from && to <= last, "axis {axis} at {p}: {from}..={to} of {first}..={last}");
