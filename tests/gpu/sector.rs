@@ -15,8 +15,9 @@ fn no_filter_draws_the_rim_of_the_sector_towards_nothing() {
         ("blur = true", 0.0),
         // Diffusion without edges has no end: three standard deviations out of it 0.13 % is drawn from beyond.
         ("perona_malik = { edge = inf, step = 0.25, repeat = 40 }", 0.6 * 0.0014),
-        ("perona_malik = { edge = inf, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.0014),
-        ("perona_malik = { edge = 0.1, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.0014),
+        // An implicit step spreads as a two-sided exponential does: the sum of eight has an excess kurtosis of 3/8, and 0.19 % there.
+        ("perona_malik = { edge = inf, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.002),
+        ("perona_malik = { edge = 0.1, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.002),
     ] {
         let toml = format!(
             "mode = 'vr'\npicture = {{ size = [8, 8] }}\nslices = {{ pixels = 180, format = 'r32f', {filters} }}\nray = {{ sampling = 'exact' }}"
