@@ -139,6 +139,8 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     settings.region.elevation = Some([-HALF_REGION, HALF_REGION]);
     settings.region.depth = Some([0.0, DEPTH]);
     settings.ray.step = Some(DEPTH / f64::from(n));
+    // The thesis takes every sample.
+    settings.ray.brick = 0;
     settings.surface.rough = 1;
     settings.surface.place = Place::FirstCrossing;
     settings.distance.sigma = Some(Sigma { window: conditions.filter_2d, sigma: SIGMA, ..Sigma::default() });
