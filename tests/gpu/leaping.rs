@@ -115,7 +115,10 @@ fn leaping_changes_no_bit_of_any_mode() {
     let (mut tried, mut leapt_far) = (0, 0);
     for (g, (name, geometry)) in geometries().iter().enumerate() {
         for (m, mode) in MODES.iter().enumerate() {
-            // Every mode meets every geometry; rays and cameras take turns.
+            // Every mode meets every second geometry, a fan and a Cartesian volume in any case; rays and cameras take turns.
+            if (1..7).contains(&g) && (g + m) % 2 == 1 {
+                continue;
+            }
             let (ray, camera) = (RAYS[(g + m) % RAYS.len()], CAMERAS[(g + m / 2) % CAMERAS.len()]);
             let toml = |brick: u32| {
                 let more =
