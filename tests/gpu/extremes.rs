@@ -29,7 +29,7 @@ impl Medium {
     /// Colour and opacity of the middle ray for a colour of the medium.
     fn seen(&self, device: &Device, colour: [f64; 3]) -> Vec<f64> {
         let toml = format!(
-            "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {}, early_end = 0.0 }}\n\
+            "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {}, early_end = 0.0, brick = 0 }}\n\
              [volume]\ntransfer = [{{ at = 0.0, colour = {colour:?}, opacity = {:?} }}]",
             0.5 * self.step,
             self.opacity
