@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+pub mod hoisted;
 pub mod stored;
 pub mod tables;
 

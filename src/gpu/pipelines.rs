@@ -114,7 +114,7 @@ impl Pipelines {
                 Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
                 _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
             };
-            words = contract::with_storage(pass, scene, turn, &words, stores).map_err(at_fault)?;
+            words = contract::for_cpu(pass, scene, turn, &words, stores).map_err(at_fault)?;
         }
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         contract::check(pass, scene, turn, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;

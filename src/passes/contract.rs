@@ -3,16 +3,17 @@
 use super::slots::{Format, Shape};
 use super::{Bind, Params, Part, Pass, Slot, Turn, Value};
 use crate::scene::Scene;
+use crate::spirv::hoisted::hoisted;
 use crate::spirv::stored::{ImageFormat, as_storage};
 use crate::spirv::tables::as_texels;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// A pass's shader, with what it only fetches texels of as storage images, and its tables as storage texel buffers, where
-/// `stores` says that the slot can be one.
+/// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
+/// tables as storage texel buffers, where `stores` says that the slot can be one.
 ///
 /// # Errors
 /// A module that breaks the format.
-pub fn with_storage(
+pub fn for_cpu(
     pass: &Pass,
     scene: &Scene,
     turn: &Turn,
@@ -29,7 +30,7 @@ pub fn with_storage(
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
         .collect();
-    let words = as_storage(words, &textures).map_err(|e| e.to_string())?;
+    let words = hoisted(words).and_then(|words| as_storage(&words, &textures)).map_err(|e| e.to_string())?;
     let reads = (pass.reads)(scene, turn);
     as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
 }
