@@ -34,16 +34,26 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
 Slices no_slices() { return Slices(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), -0x40000000); }
 
 // The filtered sample i of a ray. Steps may be skipped or taken back: what is missing is summed anew.
+//
+// Slices move to their places before the loop, and the loop only fills places. A loop that hands each slice on to the next
+// place, as `a = b; b = c; ...`, and that rays leave after different numbers of rounds, is compiled wrongly by llvmpipe
+// (Mesa 22.3): what is in use behind a loop without having been computed in it is copied at the start of every round,
+// whether a ray is still in the loop or not, and by then the place it is copied from holds the next slice.
 float slid(Ray ray, int i, float sample_at, inout Slices s) {
     const int half_width = SLIDING / 2;
-    if (s.newest > i + half_width || s.newest < i - half_width - 1) s.newest = i - half_width - 1;
-    while (s.newest < i + half_width) {
-        ++s.newest;
-        s.a = s.b;
-        s.b = s.c;
-        s.c = s.d;
-        s.d = s.e;
-        s.e = front_slice(ray, s.newest, sample_at);
+    int missing = i + half_width - s.newest;
+    if (missing < 0 || missing > SLIDING) missing = SLIDING;
+    if ((missing & 1) != 0) s = Slices(s.b, s.c, s.d, s.e, s.e, 0);
+    if ((missing & 2) != 0) s = Slices(s.c, s.d, s.e, s.e, s.e, 0);
+    if ((missing & 4) != 0) s.a = s.e;
+    s.newest = i + half_width;
+    for (int away = missing - 1; away >= 0; --away) {
+        vec2 sum = front_slice(ray, s.newest - away, sample_at);
+        s.a = away == 4 ? sum : s.a;
+        s.b = away == 3 ? sum : s.b;
+        s.c = away == 2 ? sum : s.c;
+        s.d = away == 1 ? sum : s.d;
+        s.e = away == 0 ? sum : s.e;
     }
     float near = tap_weight(1), far = SLIDING == 5 ? tap_weight(2) : 0.0;
     vec2 sum = SLIDING == 5 ? s.c + near * (s.b + s.d) + far * (s.a + s.e) : s.d + near * (s.c + s.e);

@@ -28,6 +28,7 @@ mod scenes;
 mod sector;
 mod seen;
 mod shading;
+mod sliding;
 mod tiles;
 mod timing;
 mod truth;
