@@ -12,6 +12,7 @@ layout(constant_id = 2) const int ENTRIES = 256;
 layout(scalar) uniform Params {
     float window_low;
     float window_scale;
+    float beyond; // how many times its largest texel a sample may be, by rounding: more than 1 where it is a weighted mean
 #ifndef TRANSPARENT
     float quiet; // what no sample of a quiet brick exceeds
 #endif
@@ -30,6 +31,7 @@ void main() {
     if (any(greaterThanEqual(at, size))) return;
     int side = int(brick_table.entry[(at.z * size.y + at.y) * size.x + at.x].w);
     vec2 range = texelFetch(brick_ranges, at, 0).xy;
+    range = vec2(range.x / beyond, range.y * beyond);
     // Interpolated samples may lie beyond their neighbours by rounding.
     float low = windowed(range.x) - 1e-6, high = windowed(range.y) + 1e-6;
 #ifdef TRANSPARENT

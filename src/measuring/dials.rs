@@ -241,7 +241,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             )
         }
         "brick" => {
-            need(marches && s.ray.sliding == 0, "leaps over nothing")?;
+            need(marches, "leaps over nothing")?;
             let now = s.ray.brick;
             let word = |n: u32| if n == 0 { "none".to_string() } else { format!("{n} texels") };
             let others = [0, 4, 8, 16, 32].into_iter().filter(|n| *n != now);

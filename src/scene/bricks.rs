@@ -4,6 +4,7 @@
 
 use super::Scene;
 use super::region::insonified_box;
+use super::seen::reach;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use glam::DVec3;
 
@@ -72,9 +73,7 @@ impl Scene {
     pub fn skips(&self) -> bool {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
-        // The filter that slides along the ray looks across bricks.
-        let slides = self.settings.ray.sliding > 0;
-        if !casts || slides || self.settings.ray.brick == 0 || (swept && self.settings.ray.entries < FEWEST_ENTRIES) {
+        if !casts || self.settings.ray.brick == 0 || (swept && self.settings.ray.entries < FEWEST_ENTRIES) {
             return false;
         }
         // Where f32 cannot tell places within a brick's margin, as from a camera in another town.
@@ -114,7 +113,12 @@ impl Scene {
     pub fn reach(&self, bricks: &Bricks, cell: [u32; 3]) -> Reach {
         let margin = bricks.edge * MARGIN;
         let (low, high) = (bricks.place(cell) - margin, bricks.place(cell) + bricks.edge + margin);
-        let seen = Extent::of(self, low, high);
+        let mut seen = Extent::of(self, low, high);
+        let taps = self.tap_reach();
+        if taps > 0.0 {
+            // A sample has a side by its own place, its value by its taps.
+            seen.texels = Extent::of(self, low - taps, high + taps).texels;
+        }
         let [columns, rows, slices] = std::array::from_fn(|axis| {
             let last = f64::from(self.volume_size()[axis] - 1);
             let [from, to] = seen.texels[axis];
@@ -123,9 +127,15 @@ impl Scene {
         Reach { tiles: [columns, rows].map(|r| r.map(|n| n / TILE)), slices, side: seen.side }
     }
 
+    /// How far from a sample's place the filter that slides along the ray looks, mm: so many steps along the ray, and as far to
+    /// both sides.
+    fn tap_reach(&self) -> f64 {
+        reach(self, self.settings.ray.sliding / 2) * 3f64.sqrt()
+    }
+
     /// All that bricks and what they look at follow from, beside the geometry: equal numbers make equal tables.
     pub fn brick_basis(&self) -> impl PartialEq + use<> {
-        (self.bricks(), self.grid)
+        (self.bricks(), self.grid, self.tap_reach())
     }
 }
 

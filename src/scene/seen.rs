@@ -120,7 +120,7 @@ fn looks(scene: &Scene) -> Vec<Look> {
 }
 
 /// How far that many steps of a ray lead at most, mm. Steps that grow go on growing outside of the region.
-fn reach(scene: &Scene, steps: u32) -> f64 {
+pub(super) fn reach(scene: &Scene, steps: u32) -> f64 {
     let steps = f64::from(steps);
     let (mut widest, mut growth) = (1.0, 0.0);
     if let Some(probe) = scene.probe().filter(|_| scene.spreads()) {

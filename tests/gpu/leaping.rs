@@ -75,11 +75,14 @@ const MODES: [&str; 22] = [
     "mode = 'mixed'\nsurface = { threshold = 0.2, sign = 'dark' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
 ];
 
-const RAYS: [&str; 4] = [
+const RAYS: [&str; 7] = [
     "sampling = 'exact', step = 0.4",
     "sampling = 'hardware', step = 0.55, early_end = 0.0",
     "sampling = 'hardware', step = 0.4, spread = 1.0",
     "sampling = 'hardware', step = 0.13",
+    "sampling = 'exact', step = 0.4, sliding = 3",
+    "sampling = 'hardware', step = 0.25, sliding = 5",
+    "sampling = 'exact', step = 0.3, sliding = 5, spread = 0.5",
 ];
 
 const CAMERAS: [&str; 3] =

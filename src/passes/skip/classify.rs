@@ -20,7 +20,7 @@ pub const SURFACE: Pass = Pass {
     writes: |_, _| vec![whole("kinds", Slot::BrickKinds)],
     extent: |s, _| s.bricks().count,
     repeat: once,
-    params: |s, _| window(s.surface_view()).f32("quiet", quiet(s)),
+    params: |s, _| window(s, s.surface_view()).f32("quiet", quiet(s)),
     constants: |_, _| vec![("FARTHEST", FARTHEST as i32)],
     tolerance: Tolerance {
         absolute: 0.0,
@@ -54,8 +54,8 @@ pub const VOLUME: Pass = Pass {
         reads
     },
     params: |s, _| match s.composites() {
-        true => window(s.volume_view()),
-        false => window(s.projection_view()).f32("quiet", 0.0),
+        true => window(s, s.volume_view()),
+        false => window(s, s.projection_view()).f32("quiet", 0.0),
     },
     constants: |s, _| {
         let mut constants = vec![("FARTHEST", FARTHEST as i32)];
@@ -100,9 +100,14 @@ fn between_samples(scene: &Scene) -> bool {
     scene.settings.volume.compositing == Compositing::PreIntegrated
 }
 
-fn window(view: View) -> Params {
+/// How many times its largest texel a sample may be, by rounding: of a weighted mean, some ulps.
+fn beyond(scene: &Scene) -> f64 {
+    if scene.settings.ray.sliding > 0 { 1.0 + 1e-5 } else { 1.0 }
+}
+
+fn window(scene: &Scene, view: View) -> Params {
     let [low, high] = view.window;
-    Params::default().f32("window_low", low).f32("window_scale", 1.0 / (high - low))
+    Params::default().f32("window_low", low).f32("window_scale", 1.0 / (high - low)).f32("beyond", beyond(scene))
 }
 
 fn reference(scene: &Scene, view: View, reads: &Arrays, writes: &mut Arrays, kind: impl Fn(Side, [f64; 2]) -> u32) {
@@ -111,7 +116,8 @@ fn reference(scene: &Scene, view: View, reads: &Arrays, writes: &mut Arrays, kin
     let [low, high] = view.window;
     let windowed = |v: f64| ((v - low) / (high - low)).clamp(0.0, 1.0);
     for (n, reach) in reaches(scene, &scene.bricks()).into_iter().enumerate() {
-        let kind = kind(reach.side, [ranges.values[2 * n], ranges.values[2 * n + 1]].map(windowed));
+        let range = [ranges.values[2 * n] / beyond(scene), ranges.values[2 * n + 1] * beyond(scene)];
+        let kind = kind(reach.side, range.map(windowed));
         target.values[n] = f64::from(kind * 64 + FARTHEST) / 255.0;
     }
 }
