@@ -39,6 +39,7 @@
     ("preprocess/condition.gained", include_bytes!("preprocess/condition.gained.spv")),
     ("preprocess/load_slice.plane", include_bytes!("preprocess/load_slice.plane.spv")),
     ("preprocess/load_slice.slice", include_bytes!("preprocess/load_slice.slice.spv")),
+    ("preprocess/quads.plain", include_bytes!("preprocess/quads.plain.spv")),
     ("preprocess/scan_convert.plane", include_bytes!("preprocess/scan_convert.plane.spv")),
     ("preprocess/scan_convert.slice", include_bytes!("preprocess/scan_convert.slice.spv")),
     ("raycast/cube.plain", include_bytes!("raycast/cube.plain.spv")),

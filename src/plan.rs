@@ -1,7 +1,7 @@
 //! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
 
 use crate::passes::slots::Filled;
-use crate::passes::{PASSES, Part, Pass, Slot, Turn, When};
+use crate::passes::{PASSES, Part, Pass, Slot, Turn, When, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -123,6 +123,7 @@ impl Plan {
         // What frames leave behind; whatever follows from a volume can be made again from it.
         let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
             let slots = plan.steps.iter().filter(|s| s.pass.when == When::Frame).flat_map(|s| s.slots(scene));
+            let slots = slots.chain(chain::copied(scene));
             slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
         };
         if stored(&before, old) != stored(self, new) || old.geometry != new.geometry || old.input != new.input {

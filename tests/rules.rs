@@ -144,6 +144,7 @@ fn scenes() -> Vec<Scene> {
         "slices = { perona_malik = { scheme = 'aos', repeat = 2 } }\npost = { perona_malik = { scheme = 'aos' } }",
         "slices = { smooth = { lateral = 1.0 } }",
         "ray = { rays = 2 }",
+        "ray = { sampling = 'quads' }",
     ];
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let mut scenes = Vec::new();
@@ -189,7 +190,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
                 // As it is compiled, and with its textures as storage images.
                 let words = spirv::words(bytes);
-                let stored = contract::with_storage(pass, &scene, &turn, &words, |_| true);
+                let stored = contract::for_cpu(pass, &scene, &turn, &words, |_| true);
                 let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
                 for words in [&words, &stored] {
                     let module = spirv::reflect(words).expect("reflection");

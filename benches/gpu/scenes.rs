@@ -97,6 +97,7 @@ pub const SCENES: &[Stated] = &[
     sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
     sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
     sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
+    sweep("quads", &["ray.sampling=quads"], &["quads", "raycast_surface"]),
     sweep("hardware sampling", &["ray.sampling=hardware"], &["raycast_surface"]),
     sweep("corrected", &["mode=vr"], &["classify_volume", "leap_volume", "raycast_volume"]),
     sweep("every sample", &["mode=vr", "ray.brick=0"], &["raycast_volume"]),

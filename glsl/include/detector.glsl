@@ -77,17 +77,20 @@ bool skip_sample(inout int i) {
     return true;
 }
 
-// The sample at i; moves i to the next one wanted. False: the ray is done.
-bool take_sample(float value, inout int i) {
+// The ring with another sample, and the difference then.
+float push_sample(float value) {
     older = vec4(older.yzw, newer.x);
     newer = vec4(newer.yzw, value);
     ++filled;
-    float difference = polarity * dot(newer - older, QUARTER);
-    bool ready = filled >= RING;
-    // What an edge must exceed to stand out. Few samples say less of the noise than many; while there are none, the scatter
-    // within the newer half stands for it.
+    return polarity * dot(newer - older, QUARTER);
+}
+
+// What an edge must exceed to stand out, once the sample at i is in the ring. Few samples say less of the noise than many; while
+// there are none, the scatter within the newer half stands for it.
+float doubt_at(int i, float difference) {
     float doubt = 0.0;
     if (DETECTOR > 0 && !again) {
+        bool ready = filled >= RING;
         bool searches = ready && state == START;
         // Before a Cartesian region lies the repeated border: that it is even says nothing.
         if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
@@ -102,6 +105,17 @@ bool take_sample(float value, inout int i) {
             weak_level = polarity * (knows ? quiet : dot(older, QUARTER)) + 0.5 * deviation;
         }
     }
+    return doubt;
+}
+
+// Whether a difference may end the search that a ray begins with; whatever does not is only remembered.
+bool is_event(float difference, float doubt) {
+    return filled >= RING && difference > max(START == SEARCH_ROUGH ? rough_threshold : threshold, doubt);
+}
+
+// What the ring says at the sample i that is the last in it; moves i to the next one wanted. False: the ray is done.
+bool judge(float difference, float doubt, inout int i) {
+    bool ready = filled >= RING;
     if (ROUGH > 1 && state == SEARCH_ROUGH) {
         if (ready && difference > max(rough_threshold, doubt)) {
             limit = i + RING;

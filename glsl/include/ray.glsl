@@ -6,12 +6,14 @@
 
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved
-layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches
+layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two of four neighbours
+                                                // each: 2 bytes, 3 16 bits of 0..1, 4 half floats
 layout(constant_id = 20) const int CLIPS = 0;   // planes that cut
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the samples of a convex sweep do
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 uniform sampler3D volume;
+uniform utexture3D quads;
 #ifdef SWEPT
 readonly buffer SweepLut { float entry[]; } sweep_lut;
 #endif
@@ -21,6 +23,9 @@ readonly buffer LineLut { float entry[]; } line_lut;
 #ifdef UNEVEN
 readonly buffer SliceTable { vec2 entry[]; } slice_table; // position and advance, in mean pitches
 #endif
+
+// Asked once: every sample needs it.
+ivec3 volume_last = textureSize(volume, 0) - 1;
 
 struct Ray {
     vec3 origin;
@@ -151,7 +156,7 @@ bool locate(vec3 p, out vec3 texel) {
     float final_slice = float(slices - 1);
 #else
     k -= advance * share;
-    float final_slice = float(textureSize(volume, 0).z - 1);
+    float final_slice = float(volume_last.z);
 #endif
     // An index that is off by rounding at the outermost frame is still inside.
     inside = inside && k >= -1e-4 && k <= final_slice + 1e-4;
@@ -162,20 +167,32 @@ bool locate(vec3 p, out vec3 texel) {
 
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 
+// A texel, the next column's, the next row's, and that of both, in units of QUAD_UNIT.
+const float QUAD_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
+vec4 quad_at(ivec3 at) {
+    uvec2 bits = texelFetch(quads, at, 0).xy;
+    if (SAMPLING == 2) return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255);
+    if (SAMPLING == 3) return vec4(ivec4(bits.xxyy >> uvec4(0, 16, 0, 16)) & 65535);
+    return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
+}
+
 // The volume at texture indices; beyond the border the nearest texel.
 float raw_volume(vec3 texel) {
-    ivec3 size = textureSize(volume, 0);
-    if (SAMPLING == 1) {
-        vec3 at = clamp(texel, vec3(0.0), vec3(size - 1));
-        ivec3 low = ivec3(at), high = min(low + 1, size - 1);
-        vec3 w = at - vec3(low);
-        vec4 near = vec4(fetch(low), fetch(ivec3(high.x, low.yz)), fetch(ivec3(low.x, high.y, low.z)), fetch(ivec3(high.xy, low.z)));
-        vec4 far = vec4(fetch(ivec3(low.xy, high.z)), fetch(ivec3(high.x, low.y, high.z)), fetch(ivec3(low.x, high.yz)), fetch(high));
-        vec4 plane = mix(near, far, w.z);
-        vec2 row = mix(plane.xz, plane.yw, w.x);
-        return mix(row.x, row.y, w.y);
+    if (SAMPLING == 0) return textureLod(volume, (texel + 0.5) / vec3(volume_last + 1), 0.0).x;
+    vec3 at = clamp(texel, vec3(0.0), vec3(volume_last));
+    ivec3 low = ivec3(at), high = min(low + 1, volume_last);
+    vec3 w = at - vec3(low);
+    vec4 near, far;
+    if (SAMPLING > 1) {
+        near = quad_at(low);
+        far = quad_at(ivec3(low.xy, high.z));
+    } else {
+        near = vec4(fetch(low), fetch(ivec3(high.x, low.yz)), fetch(ivec3(low.x, high.y, low.z)), fetch(ivec3(high.xy, low.z)));
+        far = vec4(fetch(ivec3(low.xy, high.z)), fetch(ivec3(high.x, low.y, high.z)), fetch(ivec3(low.x, high.yz)), fetch(high));
     }
-    return textureLod(volume, (texel + 0.5) / vec3(size), 0.0).x;
+    vec4 plane = mix(near, far, w.z);
+    vec2 row = mix(plane.xz, plane.yw, w.x);
+    return mix(row.x, row.y, w.y) * QUAD_UNIT;
 }
 
 float windowed(float value) { return clamp((value - window_low) * window_scale, 0.0, 1.0); }

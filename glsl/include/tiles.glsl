@@ -1,15 +1,19 @@
-// The grid of tiles that a picture of planes is divided into, as scene::planes lays it out.
-struct Tile {
-    vec4 corner; // place of the upper left corner, mm
-    vec4 dx;     // one pixel to the right
-    vec4 dy;     // one pixel down
-    vec4 slab;   // from the slab's near face to its far one
-    vec4 frame;  // colour; w 0 none, 1 around the tile, 2 towards the tiles above and to the left
-    vec4 line[2]; // where another plane cuts: dot(xy, pixel) + z is the distance in pixels; w 0 nowhere
-    vec4 line_colour[2];
-};
-readonly buffer Tiles { Tile entry[]; } tiles;
+// The grid of tiles that a picture of planes is divided into, as scene::planes lays it out: so many vectors a tile.
+const int TILE_VECTORS = 9;
+readonly buffer Tiles { vec4 entry[]; } tiles;
 
-// Column and row of the cell that holds a pixel: the largest n with floor(n size / cells) <= pixel.
-ivec2 cell_of(ivec2 pixel, ivec2 size, ivec2 cells) { return ((pixel + 1) * cells - 1) / size; }
-ivec2 cell_corner(ivec2 cell, ivec2 size, ivec2 cells) { return cell * size / cells; }
+int tile_count() { return tiles.entry.length() / TILE_VECTORS; }
+vec3 tile_corner(int tile) { return tiles.entry[tile * TILE_VECTORS].xyz; } // place of the upper left corner, mm
+vec3 tile_dx(int tile) { return tiles.entry[tile * TILE_VECTORS + 1].xyz; } // one pixel to the right
+vec3 tile_dy(int tile) { return tiles.entry[tile * TILE_VECTORS + 2].xyz; } // one pixel down
+vec3 tile_slab(int tile) { return tiles.entry[tile * TILE_VECTORS + 3].xyz; } // from the slab's near face to its far one
+// Colour; w 0 none, 1 around the tile, 2 towards the tiles above and to the left.
+vec4 tile_frame(int tile) { return tiles.entry[tile * TILE_VECTORS + 4]; }
+// Where another plane cuts: dot(xy, pixel) + z is the distance in pixels; w 0 nowhere.
+vec4 tile_line(int tile, int n) { return tiles.entry[tile * TILE_VECTORS + 5 + n]; }
+vec4 tile_line_colour(int tile, int n) { return tiles.entry[tile * TILE_VECTORS + 7 + n]; }
+
+// Column and row of the cell that holds a pixel: the largest n with floor(n size / cells) <= pixel. In floats, since integers are
+// divided lane by lane on a CPU: both are exact up to 2^24, and half a unit keeps quotients off the integers.
+ivec2 cell_of(ivec2 pixel, ivec2 size, ivec2 cells) { return ivec2((vec2((pixel + 1) * cells) - 0.5) / vec2(size)); }
+ivec2 cell_corner(ivec2 cell, ivec2 size, ivec2 cells) { return ivec2((vec2(cell * size) + 0.5) / vec2(cells)); }

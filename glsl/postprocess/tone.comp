@@ -4,6 +4,7 @@
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int COLOUR_MAP = 0; // 1: brightness through the map below
+layout(constant_id = 2) const int GAMMA = 1;      // 0: none, and no power is taken
 #ifdef LINES
 layout(constant_id = 1) const int CROSSING = 2; // planes whose lines cross each tile
 #endif
@@ -27,6 +28,7 @@ uniform writeonly image2D screen;
 
 vec3 toned(vec3 c) {
     c = clamp((c - 0.5) * contrast + 0.5 + brightness, 0.0, 1.0);
+    if (GAMMA == 0) return c;
     // pow(0, x) of a driver may be anything that log2(0) * x makes.
     return mix(pow(max(c, vec3(1e-8)), vec3(exponent)), vec3(0.0), lessThanEqual(c, vec3(1e-8)));
 }
@@ -37,16 +39,16 @@ vec3 toned(vec3 c) {
 vec3 with_lines(vec3 c, ivec2 pixel, ivec2 size) {
     ivec2 cells = ivec2(columns, rows), cell = cell_of(pixel, size, cells);
     int n = cell.y * columns + cell.x;
-    if (n >= tiles.entry.length()) return c;
+    if (n >= tile_count()) return c;
     ivec2 corner = cell_corner(cell, size, cells), end = cell_corner(cell + 1, size, cells);
     vec2 at = vec2(pixel - corner) + 0.5;
     for (int i = 0; i < CROSSING; ++i) {
-        vec4 line = tiles.entry[n].line[i];
+        vec4 line = tile_line(n, i);
         // As much of the pixel as a line one pixel wide covers.
         float cover = clamp(1.0 - abs(dot(line.xy, at) + line.z), 0.0, 1.0) * line.w;
-        c = mix(c, tiles.entry[n].line_colour[i].rgb, line_strength * cover);
+        c = mix(c, tile_line_colour(n, i).rgb, line_strength * cover);
     }
-    vec4 frame = tiles.entry[n].frame;
+    vec4 frame = tile_frame(n);
     bool around = any(equal(pixel, corner)) || any(equal(pixel, end - 1));
     bool between = (pixel.x == corner.x && corner.x > 0) || (pixel.y == corner.y && corner.y > 0);
     if ((frame.w == 1.0 && around) || (frame.w == 2.0 && between)) c = frame.rgb;

@@ -31,12 +31,12 @@ void main() {
     int n = cell.y * columns + cell.x;
     float value = SLAB == 2 ? 1.0 : 0.0;
     int count = 0;
-    if (n < tiles.entry.length()) {
+    if (n < tile_count()) {
         vec2 at = vec2(pixel - cell_corner(cell, size, cells)) + 0.5;
-        vec3 middle = tiles.entry[n].corner.xyz + tiles.entry[n].dx.xyz * at.x + tiles.entry[n].dy.xyz * at.y;
+        vec3 middle = tile_corner(n) + tile_dx(n) * at.x + tile_dy(n) * at.y;
         for (int i = 0; i < SAMPLES; ++i) {
             float through = SAMPLES > 1 ? float(i) / float(max(SAMPLES - 1, 1)) - 0.5 : 0.0;
-            vec3 p = middle + tiles.entry[n].slab.xyz * through;
+            vec3 p = SAMPLES > 1 ? middle + tile_slab(n) * through : middle;
             vec3 texel;
             if (!is_kept(p) || !locate(p, texel)) continue;
             float v = sample_volume(texel);

@@ -58,7 +58,9 @@ void main() {
                 float from = offset_of(ray, float(i));
                 float length = min(length_of(ray, float(i)), path - from);
                 vec3 texel;
-                if (length <= 0.0 || !locate(ray.origin + ray.direction * (ray.enter + from + 0.5 * length), texel)) continue;
+                // No short circuit: a place that need not be known costs less than a branch about it.
+                bool inside = locate(ray.origin + ray.direction * (ray.enter + from + 0.5 * length), texel);
+                if (length <= 0.0 || !inside) continue;
                 float value = sample_along(ray, i, SAMPLE_AT, texel, slices);
                 if (KEPT == 2) {
                     some += value * length;

@@ -20,6 +20,11 @@ layout(scalar) uniform Params {
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
+// Samples of one search, where nothing is leapt over.
+const int LONGEST = 64;
+
+vec3 place_of(Ray ray, int i) { return ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT)); }
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
@@ -54,10 +59,40 @@ void main() {
                 }
             }
         }
-        for (int n = SKIP == 1 ? BLOCK : NEVER; n > 0 && i < end; --n) {
-            vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT));
+        // The search that a ray begins with, by itself: on a device that runs rays side by side under masks each sample would else pay for
+        // every state that it is not in. What ends it is left in the ring for the other loop.
+        int n = SKIP == 1 ? BLOCK : LONGEST;
+        bool waits = false;
+        float difference = 0.0, doubt = 0.0;
+        for (bool searches = state == START && !again && !anew; searches && n > 0 && i < end; --n) {
             vec3 texel;
-            goes_on = locate(p, texel) ? take_sample(sample_along(ray, i, SAMPLE_AT, texel, slices), i) : skip_sample(i);
+            if (locate(place_of(ray, i), texel)) {
+                difference = push_sample(sample_along(ray, i, SAMPLE_AT, texel, slices));
+                doubt = doubt_at(i, difference);
+                if (is_event(difference, doubt)) {
+                    waits = true;
+                    searches = false;
+                } else {
+                    previous = difference;
+                    i += stride;
+                }
+            } else {
+                i += ROUGH;
+                restart(i);
+            }
+        }
+        for (; waits || ((state != START || again || anew) && n > 0 && i < end); --n) {
+            vec3 texel;
+            if (waits || locate(place_of(ray, i), texel)) {
+                if (!waits) {
+                    difference = push_sample(sample_along(ray, i, SAMPLE_AT, texel, slices));
+                    doubt = doubt_at(i, difference);
+                }
+                waits = false;
+                goes_on = judge(difference, doubt, i);
+            } else {
+                goes_on = skip_sample(i);
+            }
             if (!goes_on) break;
         }
     }

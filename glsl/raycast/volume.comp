@@ -107,8 +107,8 @@ void main() {
                 float length = min(length_of(ray, float(i)), path - from);
                 vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
                 vec3 texel;
-                if (length <= 0.0) continue;
                 bool inside = locate(p, texel);
+                if (length <= 0.0) continue;
                 vec4 entry;
                 if (COMPOSITING == 2) {
                     float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;

@@ -72,7 +72,8 @@ impl Profile {
     }
 
     fn measure(&self) -> Result<(), Failure> {
-        let (mut source, scene) = self.asked.open()?;
+        let (mut source, mut scene) = self.asked.open()?;
+        scene.settings.slices.still |= self.still;
         let files = [&self.json, &self.csv, &self.csv_samples, &self.trace];
         for file in files.into_iter().flatten() {
             self.asked.keep_inputs("output", file)?;

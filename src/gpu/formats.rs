@@ -16,6 +16,8 @@ pub fn vulkan(format: Format) -> vk::Format {
         Format::Rg16 => vk::Format::R16G16_UNORM,
         Format::Rg16f => vk::Format::R16G16_SFLOAT,
         Format::Rg32f => vk::Format::R32G32_SFLOAT,
+        Format::R32u => vk::Format::R32_UINT,
+        Format::Rg32u => vk::Format::R32G32_UINT,
         Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
         Format::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba8 => vk::Format::R8G8B8A8_UNORM,
@@ -49,7 +51,11 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 pub fn suited(context: &Context, fetch: Fetch, scene: Scene) -> Scene {
     let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
     let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
-    scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact })
+    let scene = scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact });
+    let format = vulkan(Slot::Quads.format(&scene));
+    let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::Quads));
+    let fits = fits.is_ok_and(|l| Slot::Quads.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
+    if fits { scene } else { scene.without_quads() }
 }
 
 /// Refuses a plan whose slots the device cannot hold, before anything is allocated.

@@ -42,7 +42,7 @@ impl Fetch {
 
     /// What `auto` sampling is then.
     pub fn sampling(self) -> Sampling {
-        if self == Fetch::Storage { Sampling::Exact } else { Sampling::Hardware }
+        if self == Fetch::Storage { Sampling::Quads } else { Sampling::Hardware }
     }
 
     pub fn words(self) -> &'static str {

@@ -13,6 +13,7 @@ use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timeline;
+use crate::passes::chain;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Span, Texels, Turn, When};
 use crate::picture::Picture;
@@ -220,9 +221,12 @@ impl Renderer {
         recorder.collect(&self.timeline, &mut self.measured)?;
         recorder.begin(&mut self.order, &self.timeline)?;
         self.measured.host("stage", || staging.bytes_mut().copy_from_slice(bytes));
-        if let Some(frames) = self.slots.image(Slot::Frames, 0) {
-            let place = Place { slot: Slot::Frames, copy: 0, parts: layer as u32..layer as u32 + 1 };
-            recorder.copy_in(&mut self.order, staging, frames, place);
+        let (slot, copy, part) = match chain::copied(&self.scene) {
+            Some(slot) => (slot, image, slice),
+            None => (Slot::Frames, 0, layer as u32),
+        };
+        if let Some(target) = self.slots.image(slot, copy) {
+            recorder.copy_in(&mut self.order, staging, target, Place { slot, copy, parts: part..part + 1 });
             recorder.stamp("upload");
         }
         for (i, step) in self.plan.steps_of(When::Frame) {

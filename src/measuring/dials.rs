@@ -94,11 +94,11 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             made("format", "bits", is(serde_word(&now), bits(now)), others.collect(), &best, &nearly)
         }
         "sampling" => {
-            let all = [Sampling::Hardware, Sampling::Exact];
+            let all = [Sampling::Hardware, Sampling::Exact, Sampling::Quads];
             let others = all.iter().enumerate().filter(|(_, w)| **w != s.ray.sampling);
             let set = |w: &Sampling| [format!("ray.sampling={}", serde_word(w))];
             let others = others.map(|(n, w)| at(serde_word(w), &set(w), n as f64));
-            // `auto` is one of the two.
+            // `auto` is one of them.
             let value = all.iter().position(|w| *w == scene.sampling).unwrap_or(0) as f64;
             let exact = set(&Sampling::Exact);
             made("sampling", "", is(serde_word(&s.ray.sampling), value), others.collect(), &exact, &exact)

@@ -110,9 +110,11 @@ impl Run {
         }
         let mut settings = self.scene.settings.clone();
         let angle = self.asked.turn * self.done as f64;
-        settings.camera.azimuth += angle;
+        // As many turns as it takes.
+        let turned = |azimuth: f64| (azimuth + angle) % 360.0;
+        settings.camera.azimuth = turned(settings.camera.azimuth);
         if self.scene.cuts_planes() {
-            settings.planes.azimuth += angle;
+            settings.planes.azimuth = turned(settings.planes.azimuth);
         }
         let scene = Scene::new(self.scene.geometry.clone(), self.scene.input, settings)
             .map_err(|e| GpuError::Broken(format!("the view turned by {angle} deg: {e}")))?;

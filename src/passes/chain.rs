@@ -2,8 +2,10 @@
 //! the last, and a filter that is not needed leaves no copy behind.
 
 use super::filter::aos;
+use super::slots::Format;
 use super::{PASSES, Pass, RUN, Slot, Turn};
 use crate::scene::{Estimator, Layout, Scene};
+use crate::source::StoredType;
 
 /// The slices of stage 1, the distance maps of stage 3, and the pictures of stage 4.
 struct Chain {
@@ -98,6 +100,19 @@ impl Chain {
     }
 }
 
+/// Where frames are copied as they arrive, if there is nothing to do to them: slices of a Cartesian volume whose stored values are what
+/// the texture stores, and no filter looks at them. Floats may be beyond 0..1, so they go through a pass.
+pub fn copied(scene: &Scene) -> Option<Slot> {
+    let last = SLICES.last?(scene);
+    let same = match scene.input.stored {
+        StoredType::U8 => last.format(scene) == Format::R8 && scene.input.range == [0.0, 255.0],
+        StoredType::U16 => last.format(scene) == Format::R16 && scene.input.range == [0.0, 65535.0],
+        StoredType::F32 => false,
+    };
+    let is_filtered = SLICES.needed().any(|pass| pass.name != "load_slice" && pass.is_needed(scene));
+    (same && scene.probe().is_none() && !is_filtered).then_some(last)
+}
+
 /// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or one makes four, or planes stand beside it.
 pub fn rendered(scene: &Scene) -> Slot {
     let is_picture =
@@ -121,6 +136,9 @@ pub struct Rectangle {
 /// with whole ones, or at the slice's border.
 const WORKGROUP: u32 = 8 * RUN;
 
+/// Passes over the slices of the volume, behind those that run on each frame: nothing looks further than what they make.
+const BEHIND: [&str; 2] = ["gaussian_elevation", "quads"];
+
 /// What a pass over slices has to make of each: what is seen, and as far around it as the filters behind it look. None for
 /// passes that are not cut: lines of a frame, and the rows and columns of AOS, each of which depends on all of its own.
 pub fn rectangle(scene: &Scene, pass: &str, turn: &Turn) -> Option<Rectangle> {
@@ -128,14 +146,14 @@ pub fn rectangle(scene: &Scene, pass: &str, turn: &Turn) -> Option<Rectangle> {
     match pass {
         "growth_slice" => return Some(whole),
         "aos_slice" => return None,
-        "gaussian_elevation" => {}
+        _ if BEHIND.contains(&pass) => {}
         _ if !SLICES.passes.contains(&pass) => return None,
         _ => {}
     }
     let (link, _) = SLICES.position(scene, pass, turn);
     let mut around = [0, 0];
     let mut before = 0;
-    for filter in SLICES.needed().filter(|p| p.is_needed(scene) && pass != "gaussian_elevation") {
+    for filter in SLICES.needed().filter(|p| p.is_needed(scene) && !BEHIND.contains(&pass)) {
         let links = (filter.repeat)(scene) / dispatches(filter.name);
         let behind = (before + links).saturating_sub((link + 1).max(before));
         before += links;

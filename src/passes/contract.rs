@@ -44,6 +44,8 @@ fn image_format(format: Format) -> Option<ImageFormat> {
         Format::Rg16 => ImageFormat::Rg16,
         Format::Rg16f => ImageFormat::Rg16f,
         Format::Rg32f => ImageFormat::Rg32f,
+        Format::R32u => ImageFormat::R32ui,
+        Format::Rg32u => ImageFormat::Rg32ui,
         Format::Rgba16f => ImageFormat::Rgba16f,
         Format::Rgba32f => ImageFormat::Rgba32f,
         Format::Rgba8 => ImageFormat::Rgba8,

@@ -3,7 +3,9 @@
 
 pub mod chain;
 pub mod contract;
+mod format;
 pub mod measure;
+mod params;
 pub mod slots;
 pub mod tables;
 pub mod texels;
@@ -11,6 +13,7 @@ pub mod texels;
 pub mod preprocess {
     pub mod condition;
     pub mod load_slice;
+    pub mod quads;
     pub mod scan_convert;
 }
 pub mod filter {
@@ -42,11 +45,11 @@ pub mod postprocess {
     pub mod tone;
 }
 
+pub use params::{Params, Value, ray_params};
 pub use slots::Slot;
 pub use texels::{Arrays, Texels};
 
 use crate::scene::Scene;
-use glam::DVec3;
 
 /// A distance that hit nothing: the largest finite float, so that no shader has to keep infinities.
 pub const MISS: f64 = f32::MAX as f64;
@@ -70,6 +73,7 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
+    preprocess::quads::PASS,
     skip::tile_ranges::PASS,
     skip::brick_ranges::PASS,
     skip::classify::SURFACE,
@@ -191,63 +195,6 @@ pub struct Tolerance {
     /// Share of texels that may be further off, where a branch flips.
     pub outliers: f64,
     pub why: &'static str,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
-    F32(f32),
-    I32(i32),
-    Vec2([f32; 2]),
-    Vec3([f32; 3]),
-    Vec4([f32; 4]),
-}
-
-/// Numbers of one dispatch, by the names that the shader gives them.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Params(pub Vec<(&'static str, Value)>);
-
-fn finite(value: f64) -> f32 {
-    value.clamp(-f64::from(f32::MAX), f64::from(f32::MAX)) as f32
-}
-
-impl Params {
-    /// Clamped to what is finite: shaders need not keep infinities.
-    pub fn f32(mut self, name: &'static str, value: f64) -> Params {
-        self.0.push((name, Value::F32(finite(value))));
-        self
-    }
-
-    pub fn i32(mut self, name: &'static str, value: u32) -> Params {
-        self.0.push((name, Value::I32(value as i32)));
-        self
-    }
-
-    pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
-        self.0.push((name, Value::Vec2(value.map(finite))));
-        self
-    }
-
-    pub fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
-        self.0.push((name, Value::Vec4(value.map(finite))));
-        self
-    }
-
-    pub fn vec3(mut self, name: &'static str, value: impl Into<DVec3>) -> Params {
-        self.0.push((name, Value::Vec3(value.into().to_array().map(finite))));
-        self
-    }
-}
-
-/// The rays of a scene, as every shader that casts or retraces them names them.
-pub fn ray_params(scene: &Scene) -> Params {
-    let rays = &scene.rays;
-    Params::default()
-        .vec3("origin", rays.origin)
-        .vec3("origin_dx", rays.origin_dx)
-        .vec3("origin_dy", rays.origin_dy)
-        .vec3("direction", rays.direction)
-        .vec3("direction_dx", rays.direction_dx)
-        .vec3("direction_dy", rays.direction_dy)
 }
 
 /// One compute dispatch: the only place where it is described.

@@ -1,6 +1,7 @@
 //! Slots: the GPU resources that passes read and write. A slot's shape and format follow from the scene; a slot that no pass
 //! of a plan names does not exist.
 
+pub use super::format::{Format, Shape};
 use super::{skip, tables};
 use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
@@ -33,6 +34,8 @@ pub enum Slot {
     SharpVolume,
     /// The 3D texture that rays are cast through.
     Volume,
+    /// Each texel of it with its neighbours one column and one row on, as their bits; a single one where no ray loads them.
+    Quads,
     /// Smallest and largest value of every tile of every slice.
     TileRanges,
     /// What each brick looks at of the tiles, and where it lies to the sector.
@@ -87,71 +90,6 @@ pub enum Slot {
     Screen,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Shape {
-    Two([u32; 2]),
-    Layers([u32; 3]),
-    Three([u32; 3]),
-    /// Bytes.
-    Buffer(u32),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Format {
-    R8,
-    R16,
-    R16f,
-    R32f,
-    Rg16,
-    Rg16f,
-    Rg32f,
-    Rgba16f,
-    Rgba32f,
-    Rgba8,
-    /// 32-bit floats of a buffer.
-    Floats,
-}
-
-impl Format {
-    pub fn channels(self) -> usize {
-        match self {
-            Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::Floats => 1,
-            Format::Rg16 | Format::Rg16f | Format::Rg32f => 2,
-            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 => 4,
-        }
-    }
-
-    pub fn channel_bytes(self) -> usize {
-        match self {
-            Format::R8 | Format::Rgba8 => 1,
-            Format::R16 | Format::R16f | Format::Rg16 | Format::Rg16f | Format::Rgba16f => 2,
-            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => 4,
-        }
-    }
-
-    pub fn texel_bytes(self) -> usize {
-        self.channels() * self.channel_bytes()
-    }
-}
-
-impl Shape {
-    pub fn texels(self) -> u64 {
-        match self {
-            Shape::Two([w, h]) => u64::from(w) * u64::from(h),
-            Shape::Layers(n) | Shape::Three(n) => n.iter().map(|n| u64::from(*n)).product(),
-            Shape::Buffer(bytes) => u64::from(bytes) / 4,
-        }
-    }
-
-    /// Slices of a 3D image, layers of an array, 1 otherwise: what a barrier tells apart.
-    pub fn parts(self) -> u32 {
-        match self {
-            Shape::Layers(n) | Shape::Three(n) => n[2],
-            _ => 1,
-        }
-    }
-}
-
 /// Who writes a slot first.
 #[derive(Clone, Copy)]
 pub enum Filled {
@@ -175,6 +113,7 @@ impl Slot {
         Slot::SliceRows,
         Slot::SharpVolume,
         Slot::Volume,
+        Slot::Quads,
         Slot::TileRanges,
         Slot::BrickTable,
         Slot::BrickRanges,
@@ -224,6 +163,7 @@ impl Slot {
             Slot::SliceRows => "slice_rows",
             Slot::SharpVolume => "sharp_volume",
             Slot::Volume => "volume",
+            Slot::Quads => "quads",
             Slot::TileRanges => "tile_ranges",
             Slot::BrickTable => "brick_table",
             Slot::BrickRanges => "brick_ranges",
@@ -267,7 +207,8 @@ impl Slot {
             Slot::Conditioned => Shape::Two(scene.line_lattice()),
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
             Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
-            Slot::SharpVolume | Slot::Volume => Shape::Three(scene.volume_size()),
+            Slot::Quads if !scene.packs() => Shape::Three([1; 3]),
+            Slot::SharpVolume | Slot::Volume | Slot::Quads => Shape::Three(scene.volume_size()),
             Slot::TileRanges => Shape::Three(scene.tile_counts()),
             Slot::BrickTable => Shape::Buffer(16 * scene.bricks().total() as u32),
             Slot::BrickRanges | Slot::BrickKinds | Slot::LeapsX | Slot::LeapsXy => Shape::Three(scene.bricks().count),
@@ -305,6 +246,8 @@ impl Slot {
                 VolumeFormat::R16f => Format::R16f,
                 VolumeFormat::R32f => Format::R32f,
             },
+            Slot::Quads if scene.settings.slices.format == VolumeFormat::R8 => Format::R32u,
+            Slot::Quads => Format::Rg32u,
             Slot::Tgc | Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => {
                 Format::Floats
             }
@@ -341,7 +284,7 @@ impl Slot {
 
     /// Whether each of the volume images that take turns has its own.
     pub fn takes_turns(self) -> bool {
-        matches!(self, Slot::SharpVolume | Slot::Volume | Slot::TileRanges | Slot::BrickRanges)
+        matches!(self, Slot::SharpVolume | Slot::Volume | Slot::Quads | Slot::TileRanges | Slot::BrickRanges)
     }
 
     /// Written and read by different queues where the device has several: created CONCURRENT then.

@@ -88,6 +88,7 @@ impl Texels {
                 Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
                     bytes.extend((v as f32).to_le_bytes())
                 }
+                Format::R32u | Format::Rg32u => bytes.extend((v as u32).to_le_bytes()),
             }
         }
         bytes
@@ -102,6 +103,7 @@ impl Texels {
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => {
                 f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
             }
+            Format::R32u | Format::Rg32u => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         });
         Texels { size, channels: format.channels(), values: values.collect() }
     }
@@ -110,6 +112,7 @@ impl Texels {
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 => 1.0 / 255.0,
+            Format::R32u | Format::Rg32u => 1.0,
             Format::R16 | Format::Rg16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,

@@ -2,7 +2,7 @@
 //! and what error is measured against where it is fast enough.
 
 use crate::passes::slots::{Filled, Shape};
-use crate::passes::{Arrays, Slot, Texels, Turn, When};
+use crate::passes::{Arrays, Slot, Texels, Turn, When, chain};
 use crate::plan::{Plan, Step};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -12,6 +12,11 @@ pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     let plan = Plan::new(scene);
     let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
     for (slice, frame) in frames.iter().enumerate() {
+        if let Some(volume) = chain::copied(scene).and_then(|slot| slots.get_mut(&slot)) {
+            for (x, y) in (0..frame.size[1]).flat_map(|y| (0..frame.size[0]).map(move |x| (x, y))) {
+                volume.set([x, y, slice], frame.get([x, y, 0]));
+            }
+        }
         slots.insert(Slot::Frames, frame.clone());
         for (_, step) in plan.steps_of(When::Frame) {
             run(scene, step, &Turn { slice: slice as u32, ..step.turn() }, &mut slots);

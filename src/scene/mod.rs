@@ -9,6 +9,7 @@ pub mod cube;
 pub mod load;
 pub mod planes;
 mod region;
+mod sampling;
 pub mod seen;
 pub mod settings;
 pub mod transfer;
@@ -163,19 +164,6 @@ impl Scene {
         check_planes::check_resolved(&scene)?;
         scene.seen = seen::seen(&scene);
         Ok(scene)
-    }
-
-    /// The scene where samples are taken fastest in this way: what `auto` becomes on a device.
-    pub fn sampled(mut self, fastest: Sampling) -> Scene {
-        if self.settings.ray.sampling == Sampling::Auto {
-            self.sampling = fastest;
-        }
-        self
-    }
-
-    /// Whether samples of the volume go through the device's own filter.
-    pub fn filters_in_hardware(&self) -> bool {
-        self.sampling != Sampling::Exact
     }
 
     pub fn probe(&self) -> Option<&Probe> {

@@ -19,18 +19,22 @@ pub enum ImageFormat {
     Rg16 = 12,
     R16 = 14,
     R8 = 15,
+    R32ui = 33,
+    Rg32ui = 35,
 }
 
 impl ImageFormat {
     /// Whether it needs the capability of extended formats.
     fn is_extended(self) -> bool {
-        self as u32 > 5
+        self as u32 > 5 && self != ImageFormat::R32ui
     }
 }
 
 pub(super) const EXTENDED_FORMATS: u32 = 49;
 pub(super) const NON_WRITABLE: u32 = 24;
 const LOD: u32 = 2;
+/// SignExtend and ZeroExtend.
+const EXTENDED: u32 = 0x3000;
 
 pub(super) fn instruction(opcode: u32, operands: &[u32]) -> Vec<u32> {
     let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode];
@@ -148,11 +152,14 @@ impl Rewriting {
                 }
                 None => instruction(opcode, a),
             },
-            // OpImageFetch: OpImageRead. There is one level only.
-            95 if held(2).is_some() => match a.get(4) {
-                None | Some(&LOD) => instruction(98, &a[..4]),
-                Some(_) => return error("a fetch with an offset cannot become a load"),
-            },
+            // OpImageFetch: OpImageRead. There is one level only. What says how integers are extended stays.
+            95 if held(2).is_some() => {
+                match a.get(4).map(|operands| (operands & !(LOD | EXTENDED), operands & EXTENDED)) {
+                    None | Some((0, 0)) => instruction(98, &a[..4]),
+                    Some((0, extended)) => instruction(98, &[&a[..4], &[extended]].concat()),
+                    Some(_) => return error("a fetch with an offset cannot become a load"),
+                }
+            }
             // OpImageQuerySizeLod: OpImageQuerySize
             103 if held(2).is_some() => instruction(104, &a[..3]),
             // OpImageSampleExplicitLod: OpUndef

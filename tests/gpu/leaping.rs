@@ -76,7 +76,7 @@ const MODES: [&str; 22] = [
 ];
 
 const RAYS: [&str; 7] = [
-    "sampling = 'exact', step = 0.4",
+    "sampling = 'quads', step = 0.4",
     "sampling = 'hardware', step = 0.55, early_end = 0.0",
     "sampling = 'hardware', step = 0.4, spread = 1.0",
     "sampling = 'hardware', step = 0.13",

@@ -29,6 +29,7 @@ mod sector;
 mod seen;
 mod shading;
 mod sliding;
+mod stored;
 mod tiles;
 mod timing;
 mod truth;

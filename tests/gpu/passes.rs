@@ -157,6 +157,14 @@ fn inputs_of(scene: &Scene, pass: &Pass, turn: &Turn, kind: &str, seed: u64) -> 
         let leaps = leaps_of(scene, bricks.slot, inputs.get("volume"));
         inputs.insert("bricks", leaps);
     }
+    if scene.packs() && reads.iter().any(|b| b.slot == Slot::Quads) {
+        let mut quads = Arrays::default();
+        let channels = Slot::Quads.format(scene).channels();
+        quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
+        let all = Turn { slices: scene.slices(), ..Turn::default() };
+        (echolume::passes::preprocess::quads::PASS.reference)(scene, &all, &inputs, &mut quads);
+        inputs.insert("quads", quads.get("quads").clone());
+    }
     inputs
 }
 
@@ -247,9 +255,10 @@ fn texels_loaded_are_the_texels_fetched() {
 #[test]
 fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_stays() {
     let device = Device::new();
-    let sampled = |fetch, asked: &str| {
-        let toml =
-            format!("picture = {{ size = [8, 8] }}\nslices = {{ pixels = 8 }}\nray = {{ sampling = '{asked}' }}");
+    let of = |fetch, asked: &str, size: u32, still: bool| {
+        let toml = format!(
+            "picture.size = [{size}, {size}]\nslices = {{ pixels = 24, still = {still} }}\nray.sampling = '{asked}'"
+        );
         let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml);
         let options = Options { fetch, ..Options::default() };
         let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
@@ -258,11 +267,14 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
         assert_eq!(before, renderer.scene().sampling, "a change of scene changes nothing of it");
         before
     };
-    assert_eq!(sampled(Some(Fetch::Textures), "auto"), Sampling::Hardware);
-    assert_eq!(sampled(Some(Fetch::Storage), "auto"), Sampling::Exact);
-    assert_eq!(sampled(Some(Fetch::Storage), "hardware"), Sampling::Hardware);
-    assert_eq!(sampled(Some(Fetch::Textures), "exact"), Sampling::Exact);
-    assert_eq!(sampled(None, "auto"), Fetch::of(&device.candidate).sampling());
+    let (textures, storage) = (Some(Fetch::Textures), Some(Fetch::Storage));
+    assert_eq!(of(textures, "auto", 64, true), Sampling::Hardware);
+    assert_eq!(of(storage, "auto", 64, false), Sampling::Quads);
+    assert_eq!(of(storage, "auto", 4, true), Sampling::Quads, "many pictures of one volume");
+    assert_eq!(of(storage, "auto", 4, false), Sampling::Exact, "fewer samples than pay for quads");
+    assert_eq!(of(storage, "hardware", 64, true), Sampling::Hardware);
+    assert_eq!(of(textures, "exact", 64, true), Sampling::Exact);
+    assert_eq!(of(None, "auto", 64, true), Fetch::of(&device.candidate).sampling());
 }
 
 #[test]

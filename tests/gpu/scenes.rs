@@ -54,7 +54,7 @@ pub fn scenes() -> Vec<(String, Scene)> {
         add(name, geometry, BYTES, toml);
     }
     for format in ["r8", "r16", "r16f", "r32f"] {
-        for sampling in ["hardware", "exact"] {
+        for sampling in ["hardware", "exact", "quads"] {
             let toml = format!(
                 "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.6, sampling = '{sampling}' }}"
             );

@@ -59,16 +59,16 @@ fn errors_fall_with_the_step_down_to_the_devices_floor() {
     assert_eq!(dial.points.iter().filter(|p| p.is_default).count(), 1);
 }
 
-/// Both ways to take a sample, each against the f64 of the same scene.
+/// Every way to take a sample, each against the f64 of the same scene.
 #[test]
-fn the_device_samples_as_f64_does_by_its_filter_and_by_eight_texels() {
+fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
     let _alone = alone();
     let report = report(&["slices.format=r16"], &["sampling"], Held::F64);
     let places: Vec<_> = report.dials[0].points.iter().map(|p| (p.label.as_str(), p.errors.rmse)).collect();
     println!("{places:?}");
-    assert_eq!(places.iter().map(|p| p.0).collect::<Vec<_>>(), ["exact", "hardware"]);
+    assert_eq!(places.iter().map(|p| p.0).collect::<Vec<_>>(), ["exact", "hardware", "quads"]);
     // An 8-bit weight is off by 1/512 of what two texels differ by.
-    assert!(places[0].1 < 1e-3 && places[1].1 < 2e-3, "{places:?}");
+    assert!(places[0].1 < 1e-3 && places[1].1 < 2e-3 && places[2].1 < 1e-3, "{places:?}");
 }
 
 /// A picture of the device's own as reference says how far it is from where it would go.

@@ -120,7 +120,7 @@ fn a_profile_adds_up_and_survives_being_written() {
 fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
     let _alone = alone();
     let context = device();
-    let turning = Asked { still: true, turn: 3.0, ..asked(3) };
+    let turning = Asked { still: true, turn: 170.0, ..asked(3) };
     for (mode, ray, tile) in [("sr", "raycast_surface", false), ("mpr", "raycast_planes", true)] {
         let scene = scene(&SETTINGS.replace("mode = 'sr'", &format!("mode = '{mode}'")));
         assert_eq!(scene.cuts_planes(), tile);
@@ -130,7 +130,7 @@ fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
         assert_eq!(of(ray).expect("cast again").runs_per_picture, 1, "{mode}");
         assert!(of(ray).expect("cast again").samples_ns.iter().all(|ns| *ns > 0.0), "{mode}: {profile:?}");
         assert!(of("scan_convert").is_none_or(|p| p.runs_per_picture == 0), "{mode}");
-        assert_eq!(profile.turn, 3.0);
+        assert_eq!(profile.turn, 170.0);
         // What was asked for, not where the view has turned to.
         assert_eq!(profile.scene, toml::to_string(&scene.settings).expect("settings"));
         if cfg!(target_os = "linux") {

@@ -5,6 +5,7 @@ use crate::passes::raycast::planes::{place, tile_at};
 use crate::passes::*;
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Scene, transfer};
+use glam::DVec3;
 
 /// How much of what lies under a cross-line it covers: anatomy stays visible.
 const LINE_STRENGTH: f64 = 0.7;
@@ -43,6 +44,7 @@ pub const PASS: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)];
+        constants.push(("GAMMA", (s.settings.post.gamma != 1.0) as i32));
         if s.draws_lines() {
             constants.push(("CROSSING", if s.shows_three() { 2 } else { 0 }));
         }

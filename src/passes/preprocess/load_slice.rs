@@ -1,7 +1,7 @@
 //! A slice of a Cartesian volume: scaled to 0..1 and put into its place.
 
 use super::scan_convert::{load_params, normalisation};
-use crate::passes::chain::{slice_link, writes_volume};
+use crate::passes::chain::{copied, slice_link, writes_volume};
 use crate::passes::*;
 
 const NAME: &str = "load_slice";
@@ -14,6 +14,7 @@ pub const PASS: Pass = Pass {
         if writes_volume(s, NAME, t) { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
     needed: |s| match s.probe() {
+        None if copied(s).is_some() => Err("a frame is a slice as the volume stores it: it is copied there"),
         None => Ok("the volume is Cartesian already: its slices are only scaled"),
         Some(_) => Err("frames are polar"),
     },

@@ -5,6 +5,7 @@ use crate::passes::*;
 use crate::probe::{Array, Motion, Probe};
 use crate::scene::cube::HalfSpace;
 use crate::scene::{Mode, Scene};
+use glam::DVec3;
 
 /// Colour and strength of the lines where faces meet: told from tissue, which is grey.
 const EDGE: ([f64; 3], f64) = ([0.55, 0.75, 0.95], 0.7);

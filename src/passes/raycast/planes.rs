@@ -4,6 +4,7 @@ use super::ray;
 use crate::passes::*;
 use crate::scene::planes::{Sheet, Tile};
 use crate::scene::{Scene, Slab};
+use glam::DVec3;
 
 pub const PASS: Pass = Pass {
     name: "raycast_planes",

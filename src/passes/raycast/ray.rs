@@ -1,10 +1,12 @@
 //! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
+use crate::passes::preprocess::quads;
 use crate::passes::skip::Leaps;
 use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
+use glam::DVec3;
 
 /// Picks the variant that has the tables this geometry needs, and no other.
 macro_rules! variant {
@@ -42,6 +44,7 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, uneven, moved) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
+    reads.push(whole("quads", Slot::Quads));
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
@@ -82,6 +85,10 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 /// Constants of the passes that take samples along rays.
 pub(super) fn marching_constants(scene: &Scene, leaps: Leaps) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
+    if scene.packs() {
+        constants.retain(|(name, _)| *name != "SAMPLING");
+        constants.push(("SAMPLING", quads::sampling(scene)));
+    }
     constants.push(leaps.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));
     constants

@@ -4,6 +4,7 @@ use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
+use glam::DVec3;
 
 pub const PASS: Pass = Pass {
     name: "raycast_volume",

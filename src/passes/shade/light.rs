@@ -4,6 +4,7 @@ use super::{camera_params, light_at, normal, to_light};
 use crate::passes::chain::distance_end;
 use crate::passes::*;
 use crate::scene::{Mode, Scene, Skin};
+use glam::DVec3;
 
 pub const PASS: Pass = Pass {
     name: "light",

@@ -5,6 +5,7 @@ use super::{camera_params, light_at, to_light};
 use crate::passes::chain::distance_end;
 use crate::passes::*;
 use crate::scene::Scene;
+use glam::DVec3;
 
 /// Places looked at on the way to the light.
 const STEPS: u32 = 96;

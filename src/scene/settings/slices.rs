@@ -25,6 +25,9 @@ pub struct Slices {
     /// Converts and filters all of the volume, not only what the region, start depths and clip planes leave to be seen. The
     /// picture is the same; a region that is dragged then needs no frames anew when it grows.
     pub everything: bool,
+    /// The volume is rendered many times before it changes: what is worth being made once for all of these pictures is made. The
+    /// picture is the same but for the last digit of its samples.
+    pub still: bool,
 }
 
 impl Default for Slices {
@@ -41,6 +44,7 @@ impl Default for Slices {
             blur: false,
             format: VolumeFormat::R16f,
             everything: false,
+            still: false,
         }
     }
 }
