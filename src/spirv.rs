@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+pub mod absent;
 pub mod hoisted;
 pub mod stored;
 pub mod tables;

@@ -189,7 +189,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
                 // As it is compiled, and with its textures as storage images.
-                let words = spirv::words(bytes);
+                let words = contract::for_scene(pass, &scene, &turn, &spirv::words(bytes)).expect("the scene's");
                 let stored = contract::for_cpu(pass, &scene, &turn, &words, |_| true);
                 let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
                 for words in [&words, &stored] {

@@ -8,12 +8,10 @@
 
 #ifdef PICTURE
 #define T vec4
-#define WITHIN(d, range) (vec4(lessThanEqual(abs(d), vec4(range))))
 #define STORED(v) (v)
 #define LOADED(v) (v)
 #else
 #define T float
-#define WITHIN(d, range) (abs(d) <= (range) ? 1.0 : 0.0)
 #define STORED(v) vec4(v, 0.0, 0.0, 0.0)
 #define LOADED(v) ((v).x)
 #endif

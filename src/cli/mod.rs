@@ -1,6 +1,7 @@
 //! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage.
 
 mod asked;
+mod convert;
 mod devices;
 mod filter;
 mod info;
@@ -66,6 +67,8 @@ enum Command {
     Report(report::Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(phantom::MakePhantom),
+    /// Write a volume of a sweep on a Cartesian lattice (.mha, .nrrd)
+    Convert(convert::Convert),
     /// Say what is in a recording (never who)
     Info(info::Info),
     /// List the Vulkan devices, what each lacks, and which one would be used
@@ -105,6 +108,7 @@ pub fn run() -> ExitCode {
         Command::Profile(profile) => profile.run(),
         Command::Report(report) => report.run(),
         Command::Phantom(phantom) => phantom.run(),
+        Command::Convert(convert) => convert.run(),
         Command::Info(info) => info.run(),
         Command::Devices(devices) => devices.run(),
     });

@@ -108,7 +108,8 @@ impl Pipelines {
             return Ok(pipeline.clone());
         }
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
-        let mut words = (self.shaders)(key.0).map_err(at_fault)?;
+        let words = (self.shaders)(key.0).map_err(at_fault)?;
+        let mut words = contract::for_scene(pass, scene, turn, &words).map_err(at_fault)?;
         if self.fetch == Fetch::Storage {
             let stores = |slot: Slot| match slot.shape(scene) {
                 Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),

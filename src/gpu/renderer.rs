@@ -3,6 +3,7 @@
 
 mod change;
 mod inspect;
+mod slab;
 
 use super::GpuError;
 use super::context::Context;
@@ -68,6 +69,8 @@ pub struct Renderer {
     uploads: Vec<Buffer>,
     volume_images: u32,
     next_lane: usize,
+    /// Slices that wait to be copied together.
+    slab: Option<slab::Slab>,
     /// The volume image that is shown.
     shown: u32,
     /// What all frames that were sent have been filtered over, at least.
@@ -111,6 +114,7 @@ impl Renderer {
             skipped: 0,
             scene,
             next_lane: 0,
+            slab: None,
             shown: 0,
             measured: Measured::new(context, options.spans),
             spans: options.spans,
@@ -215,18 +219,18 @@ impl Renderer {
             self.skipped += 1;
             return Ok(());
         }
+        if chain::copied(&self.scene).is_some() {
+            return self.gather(slice, bytes, image);
+        }
         let layer = self.next_lane;
         self.next_lane = (layer + 1) % self.lanes.len();
         let Lane { recorder, staging } = &mut self.lanes[layer];
         recorder.collect(&self.timeline, &mut self.measured)?;
         recorder.begin(&mut self.order, &self.timeline)?;
         self.measured.host("stage", || staging.bytes_mut().copy_from_slice(bytes));
-        let (slot, copy, part) = match chain::copied(&self.scene) {
-            Some(slot) => (slot, image, slice),
-            None => (Slot::Frames, 0, layer as u32),
-        };
-        if let Some(target) = self.slots.image(slot, copy) {
-            recorder.copy_in(&mut self.order, staging, target, Place { slot, copy, parts: part..part + 1 });
+        if let Some(frames) = self.slots.image(Slot::Frames, 0) {
+            let place = Place { slot: Slot::Frames, copy: 0, parts: layer as u32..layer as u32 + 1 };
+            recorder.copy_in(&mut self.order, staging, frames, place);
             recorder.stamp("upload");
         }
         for (i, step) in self.plan.steps_of(When::Frame) {
@@ -242,6 +246,7 @@ impl Renderer {
     /// All frames of volume image `image` have been sent: the next picture shows it.
     pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
         self.check(image)?;
+        self.flush()?;
         self.shown = image;
         self.stale.iter_mut().for_each(|stale| *stale = true);
         Ok(())
@@ -258,6 +263,7 @@ impl Renderer {
     }
 
     fn draw(&mut self) -> Result<(), GpuError> {
+        self.flush()?;
         self.plan.complete(&self.scene, &mut self.stale, &self.contents);
         self.picture.collect(&self.timeline, &mut self.measured)?;
         self.picture.begin(&mut self.order, &self.timeline)?;
@@ -302,6 +308,7 @@ impl Renderer {
 
     /// Waits until the device has done everything, and adds up what was measured.
     fn collect(&mut self) -> Result<(), GpuError> {
+        self.flush()?;
         self.timeline.wait_all()?;
         for lane in &mut self.lanes {
             lane.recorder.collect(&self.timeline, &mut self.measured)?;
@@ -319,10 +326,11 @@ fn frame_bytes(scene: &Scene) -> u64 {
 }
 
 fn lanes(context: &Arc<Context>, scene: &Scene, spans: bool) -> Result<Vec<Lane>, GpuError> {
+    let bytes = slab::frames_a_lane(scene) * frame_bytes(scene);
     let lane = |_| {
         Ok(Lane {
             recorder: Recorder::new(context, "frame", spans)?,
-            staging: Buffer::new(context, "staging", frame_bytes(scene), Purpose::Staging)?,
+            staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
         })
     };
     (0..FRAMES_IN_FLIGHT).map(lane).collect()

@@ -223,7 +223,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
         let bytes = |binds: fn(&Step, &Scene) -> Vec<Bind>| -> u64 {
             times * steps.iter().flat_map(|s| binds(s, scene)).map(|b| touched(&b, scene)).sum::<u64>()
         };
-        let copied = copied_bytes(name, scene) * u64::from(runs);
+        let copied = copied_bytes(name, scene, runs.into());
         PassProfile {
             name: name.into(),
             stage: steps.first().map_or("copies".into(), |s| s.pass.stage.name().into()),
@@ -269,12 +269,15 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
     }
 }
 
-/// What an upload or a readback moves each way.
-fn copied_bytes(name: &str, scene: &Scene) -> u64 {
-    use crate::passes::{Slot, layer};
+/// What so many uploads or readbacks move each way.
+fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
+    use crate::passes::{Slot, chain, layer};
+    let frame = touched(&layer("frames", Slot::Frames), scene);
     match name {
-        "upload" => touched(&layer("frames", Slot::Frames), scene),
-        "readback" => Slot::Screen.bytes(scene),
+        // Several slices at once.
+        "upload" if chain::copied(scene).is_some() && runs > 0 => scene.frames_seen().len() as u64 * frame,
+        "upload" => runs * frame,
+        "readback" => runs * Slot::Screen.bytes(scene),
         _ => 0,
     }
 }

@@ -3,10 +3,24 @@
 use super::slots::{Format, Shape};
 use super::{Bind, Params, Part, Pass, Slot, Turn, Value};
 use crate::scene::Scene;
+use crate::spirv::absent::without;
 use crate::spirv::hoisted::hoisted;
 use crate::spirv::stored::{ImageFormat, as_storage};
 use crate::spirv::tables::as_texels;
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
+
+/// Textures that a shader has and a pass need not: what rays leap by, and quads. Specialization constants say whether they are read.
+const OPTIONAL: [&str; 2] = ["bricks", "quads"];
+
+/// A pass's shader without the textures that this scene has not.
+///
+/// # Errors
+/// A module that breaks the format.
+pub fn for_scene(pass: &Pass, scene: &Scene, turn: &Turn, words: &[u32]) -> Result<Vec<u32>, String> {
+    let bound = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
+    let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
+    without(words, &absent).map_err(|e| e.to_string())
+}
 
 /// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
 /// tables as storage texel buffers, where `stores` says that the slot can be one.

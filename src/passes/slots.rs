@@ -34,7 +34,7 @@ pub enum Slot {
     SharpVolume,
     /// The 3D texture that rays are cast through.
     Volume,
-    /// Each texel of it with its neighbours one column and one row on, as their bits; a single one where no ray loads them.
+    /// Each texel of it with its neighbours one column and one row on, as their bits.
     Quads,
     /// Smallest and largest value of every tile of every slice.
     TileRanges,
@@ -207,7 +207,6 @@ impl Slot {
             Slot::Conditioned => Shape::Two(scene.line_lattice()),
             Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
             Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
-            Slot::Quads if !scene.packs() => Shape::Three([1; 3]),
             Slot::SharpVolume | Slot::Volume | Slot::Quads => Shape::Three(scene.volume_size()),
             Slot::TileRanges => Shape::Three(scene.tile_counts()),
             Slot::BrickTable => Shape::Buffer(16 * scene.bricks().total() as u32),

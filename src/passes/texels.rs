@@ -112,7 +112,8 @@ impl Texels {
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 => 1.0 / 255.0,
-            Format::R32u | Format::Rg32u => 1.0,
+            // Whole numbers are themselves; of others the fraction is lost.
+            Format::R32u | Format::Rg32u => 0.9,
             Format::R16 | Format::Rg16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,
             Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats => value.abs().max(1.2e-38) / 8_388_608.0,

@@ -2,6 +2,7 @@
 //! more memory is taken than the file's own bytes account for.
 
 mod contents;
+pub mod convert;
 pub mod error;
 mod kretz;
 mod metaimage;
@@ -10,6 +11,7 @@ mod pixels;
 pub mod played;
 pub mod recording;
 pub mod samples;
+mod unfinished;
 mod words;
 
 pub use crate::probe::{Geometry, Grid};

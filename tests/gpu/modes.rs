@@ -17,68 +17,64 @@ const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'vr'",
         "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
         "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut pre_integrated picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut pre_integrated picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { shading = 'first-hit' }",
         "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer distance_map veil picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer distance_map veil picture screen",
     ),
     (
         "mode = 'sr'",
         "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface light tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map surface picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map surface picture screen",
     ),
     (
         "mode = 'mixed'",
         "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps volume_leaps opaque_before sweep_lut transfer distance_map surface veil picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps volume_leaps opaque_before sweep_lut transfer distance_map surface veil picture screen",
     ),
     (
         "mode = 'mip'",
         "scan_convert tile_ranges brick_ranges raycast_projection tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges sweep_lut picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut picture screen",
     ),
     (
         "mode = 'minip'",
         "scan_convert tile_ranges brick_ranges raycast_projection tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges sweep_lut picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut picture screen",
     ),
     (
         "mode = 'mean'",
         "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_projection tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps sweep_lut picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps sweep_lut picture screen",
     ),
     (
         "mode = 'mip'\nray = { rays = 2 }",
         "scan_convert tile_ranges brick_ranges raycast_projection assemble tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges sweep_lut rendered picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut rendered picture screen",
     ),
-    (
-        "mode = 'plane'",
-        "scan_convert raycast_planes tone",
-        "frames scan_lut volume quads sweep_lut tiles picture screen",
-    ),
+    ("mode = 'plane'", "scan_convert raycast_planes tone", "frames scan_lut volume sweep_lut tiles picture screen"),
     (
         "mode = 'orthogonal'",
         "scan_convert raycast_planes tone",
-        "frames scan_lut volume quads sweep_lut tiles picture screen",
+        "frames scan_lut volume sweep_lut tiles picture screen",
     ),
     (
         "mode = 'tomography'",
         "scan_convert raycast_planes tone",
-        "frames scan_lut volume quads sweep_lut tiles picture screen",
+        "frames scan_lut volume sweep_lut tiles picture screen",
     ),
-    ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume quads sweep_lut block picture screen"),
+    ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
     (
         "mode = 'sr'\nlayout = '4up'",
         "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut tiles distance_map surface rendered planes picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut tiles distance_map surface rendered planes picture screen",
     ),
 ];
 

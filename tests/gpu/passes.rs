@@ -152,12 +152,12 @@ fn inputs_of(scene: &Scene, pass: &Pass, turn: &Turn, kind: &str, seed: u64) -> 
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
         inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
     }
-    if let Some(bricks) = reads.iter().find(|b| b.name == "bricks" && b.slot != Slot::Volume) {
+    if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
         // What rays leap by says what the volume says.
         let leaps = leaps_of(scene, bricks.slot, inputs.get("volume"));
         inputs.insert("bricks", leaps);
     }
-    if scene.packs() && reads.iter().any(|b| b.slot == Slot::Quads) {
+    if reads.iter().any(|b| b.slot == Slot::Quads) {
         let mut quads = Arrays::default();
         let channels = Slot::Quads.format(scene).channels();
         quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));

@@ -110,7 +110,7 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen"
     );
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
@@ -119,7 +119,7 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume quads tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map distance_a distance_b surface picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map distance_a distance_b surface picture screen"
     );
     let (passes, slots) = names("mode = 'vr'\nslices = { sigma = { window = 5, sigma = 0.0 } }");
     assert_eq!(

@@ -6,6 +6,7 @@ impl Renderer {
     /// A slot's content now; none for a slot that the plan does not have, or one made by the CPU as a table.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         self.check(self.shown)?;
+        self.flush()?;
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
         let (format, size) = (image.format, size_of(image.shape));

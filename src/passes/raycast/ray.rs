@@ -44,7 +44,6 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
     let (swept, uneven, moved) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
-    reads.push(whole("quads", Slot::Quads));
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
     reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
     reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
@@ -54,7 +53,8 @@ pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
 /// Of the passes that take samples along rays: what they leap by, too.
 pub(super) fn marching_reads(scene: &Scene, leaps: Leaps) -> Vec<Bind> {
     let mut reads = reads(scene);
-    reads.push(whole("bricks", leaps.slot()));
+    reads.extend(scene.packs().then_some(whole("quads", Slot::Quads)));
+    reads.extend(leaps.slot().map(|slot| whole("bricks", slot)));
     reads
 }
 

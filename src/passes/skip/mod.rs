@@ -29,12 +29,12 @@ pub enum Leaps {
 }
 
 impl Leaps {
-    /// The 3D texture bound as "bricks": where there is none, one that is bound already.
-    pub fn slot(self) -> Slot {
+    /// The 3D texture that shaders name "bricks".
+    pub fn slot(self) -> Option<Slot> {
         match self {
-            Leaps::None => Slot::Volume,
-            Leaps::Kinds(slot) => slot,
-            Leaps::Ranges => Slot::BrickRanges,
+            Leaps::None => None,
+            Leaps::Kinds(slot) => Some(slot),
+            Leaps::Ranges => Some(Slot::BrickRanges),
         }
     }
 

@@ -1,103 +1,12 @@
 //! The program as a user meets it: what it answers to right and wrong commands, and what it leaves behind.
 
+mod budget;
+mod common;
+
+use common::*;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
-const SWEEP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
-const KRETZ: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.vol");
-const BONE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bone-l14/bone.mha");
-
-/// A folder of one test, gone at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-cli-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).expect("make a folder for the test");
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("the temporary folder has a plain name").to_string()
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        let path = self.path(name);
-        fs::write(&path, bytes).expect("write a file of the test");
-        path
-    }
-
-    fn names(&self) -> BTreeSet<String> {
-        let entries = fs::read_dir(&self.0).expect("list the test's folder").map(|e| e.expect("read an entry"));
-        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
-    }
-
-    /// A refused rendering leaves the picture that was there, and nothing beside it.
-    fn refuses(&self, arguments: &[&str], named: &[&str]) {
-        let old = self.write("old.png", "old");
-        let (all, before) = ([&["render"], arguments, &["-o", &old]].concat(), self.names());
-        refuses(&all, &run(&all), 2, named);
-        assert_eq!(fs::read(&old).expect("the old picture is still there"), b"old", "{all:?}");
-        assert_eq!(self.names(), before, "{all:?}");
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Exit code, standard output and standard error.
-type Ran = (Option<i32>, String, String);
-
-fn finish(command: &mut Command) -> Ran {
-    let output = command.stdin(Stdio::null()).output().expect("start the program");
-    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    (output.status.code(), text(output.stdout), text(output.stderr))
-}
-
-fn run(arguments: &[&str]) -> Ran {
-    finish(Command::new(PROGRAM).args(arguments))
-}
-
-/// Runs what has to work, and gives what it prints.
-fn done(arguments: &[&str]) -> String {
-    let (code, out, err) = run(arguments);
-    assert_eq!(code, Some(0), "{arguments:?}: {err}");
-    out
-}
-
-fn render(input: &str, output: &str, more: &[&str]) -> String {
-    done(&[&["render", input, "-o", output, "--size", "64x48"], more].concat())
-}
-
-fn explain(input: &str, more: &[&str]) -> String {
-    done(&[&["render", input, "--explain"], more].concat())
-}
-
-fn refuses(what: &[&str], (code, _, err): &Ran, wanted: i32, named: &[&str]) {
-    let said = format!("{what:?} ended with {code:?} and said {err:?}, not {wanted} and {named:?}");
-    let line = err.strip_suffix('\n').unwrap_or(err);
-    assert!(*code == Some(wanted) && named.iter().all(|n| line.contains(n)), "{said}");
-    let plain = !line.chars().any(char::is_control) && line.len() < 1000;
-    assert!(plain && line.starts_with("echolume: "), "not one plain line: {said}");
-}
-
-fn png_size(path: &str) -> [u32; 2] {
-    let bytes = fs::read(path).expect("read the picture");
-    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "{path} is no PNG");
-    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
-}
-
-/// Words of the lines that begin so, each line's first word after it.
-fn first_words(text: &str, start: &str) -> Vec<String> {
-    let lines = text.lines().filter_map(|l| l.strip_prefix(start));
-    lines.filter_map(|l| l.split_whitespace().next()).map(str::to_string).collect()
-}
 
 #[test]
 fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help() {
@@ -366,64 +275,4 @@ fn the_program_needs_no_source_tree_no_path_and_no_place() {
     let (code, _, err) = finish(&mut command);
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert_eq!(png_size(&folder.path("p.png")), [64, 48]);
-}
-
-/// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.
-fn error_report(volume: &str) -> String {
-    let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
-        let time = ms * 1e6;
-        format!(
-            "{{\"label\": \"{label}\", \"set\": [{set}], \"value\": {value}, \"errors\": {{\"rmse\": {rmse}, \"max\": 0.1}}, \
-             \"time\": {{\"median\": {time}, \"low\": {time}, \"high\": {time}}}, \"is_default\": {is_default}}}"
-        )
-    };
-    format!(
-        "{{\"format\": \"echolume error report 1\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
-         \"scene\": \"bone\", \"sizes\": {{\"volume\": {volume}, \"picture\": [64, 48]}}, \"repeats\": 3, \"dials\": [{{\
-         \"name\": \"step\", \"unit\": \"mm\", \"reference\": {{\"kind\": \"f64\"}}, \"points\": [{}, {}]}}]}}",
-        point("0.5 mm", "", 0.5, 0.001, 20.0, true),
-        point("1.25 mm", "\"ray.step=1.25\"", 1.25, 0.004, 8.0, false)
-    )
-}
-
-#[test]
-fn a_budget_of_time_takes_what_a_report_measured_and_no_setting_of_the_users() {
-    let folder = Folder::new("budget");
-    let report = folder.write("error.json", error_report("[160, 216, 33]"));
-    let picture = |name: &str, more: &[&str]| {
-        let said = render(BONE, &folder.path(name), more);
-        (said, fs::read(folder.path(name)).expect("the picture"))
-    };
-    let (_, plain) = picture("plain.png", &["--set", "ray.step=0.5"]);
-    let (_, coarse) = picture("coarse.png", &["--set", "ray.step=1.25"]);
-    assert_ne!(plain, coarse);
-    let (said, chosen) = picture("chosen.png", &["--budget", "10ms", "--report", &report]);
-    assert!(
-        said.contains("budget 10ms: (ray.step=1.25) has RMSE 4.000e-3 and takes 8.000 ms, measured on a card"),
-        "{said}"
-    );
-    assert_eq!(chosen, coarse);
-    let (said, ample) = picture("ample.png", &["--budget", "0.1s", "--report", &report]);
-    assert!(said.contains("(the default)"), "{said}");
-    assert_eq!(ample, picture("default.png", &[]).1);
-    let (_, mine) = picture("mine.png", &["--budget", "10ms", "--report", &report, "--set", "ray.step=0.5"]);
-    assert_eq!(mine, plain, "what the user sets is above it");
-
-    let other = folder.write("other.json", error_report("[1, 2, 3]"));
-    let foreign = folder.write("foreign.json", "{\"format\": \"somebody else's\"}");
-    let text = folder.write("text.json", "not a report");
-    for (budget, file, named) in [
-        ("10ms", &folder.path("missing.json"), "missing.json: cannot be read"),
-        ("10ms", &foreign, "somebody else's"),
-        ("10ms", &text, "text.json: error report: cannot be read"),
-        ("10ms", &other, "1x2x3"),
-        ("soon", &report, "--budget soon"),
-    ] {
-        folder.refuses(&[BONE, "--budget", budget, "--report", file], &[named]);
-    }
-    let all = ["render", BONE, "--budget", "1ms", "--report", &report, "-o", &folder.path("never.png")];
-    refuses(&all, &run(&all), 1, &["--budget 1ms", "no setting takes", "8.000 ms"]);
-    for alone in [["--budget", "10ms"], ["--report", &report]] {
-        assert_eq!(run(&[&["render", BONE][..], &alone].concat()).0, Some(2), "{alone:?}");
-    }
 }

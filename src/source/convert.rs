@@ -1,0 +1,211 @@
+//! A sweep as a Cartesian volume file: each voxel takes what lies around its place in the polar frames, trilinear in sample, line and
+//! slice. In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
+
+use super::samples::{SampleType, StoredType};
+use super::unfinished::{Unfinished, unwritable};
+use super::{Frame, InputError};
+use crate::probe::{Geometry, Grid, Probe};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::io::Write;
+use std::path::Path;
+
+/// Most voxels along an edge, and in all: 32 GiB of floats.
+const MOST_ALONG: f64 = 16384.0;
+const MOST_VOXELS: f64 = 8_589_934_592.0;
+
+/// Volume files that are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeFile {
+    /// MetaImage with its samples behind its header (.mha).
+    MetaImage,
+    /// NRRD 4 with raw samples behind its header (.nrrd).
+    Nrrd,
+}
+
+impl VolumeFile {
+    /// By the name's ending.
+    ///
+    /// # Errors
+    /// Another ending.
+    pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        match &*ending {
+            "mha" => Ok(VolumeFile::MetaImage),
+            "nrrd" => Ok(VolumeFile::Nrrd),
+            _ => Err(InputError::new(path, "file", "must end in .mha or .nrrd")),
+        }
+    }
+
+    fn header(self, grid: &Grid, sample: SampleType) -> String {
+        let [x, y, z] = grid.size;
+        let [dx, dy, dz] = grid.spacing;
+        let [ox, oy, oz] = grid.origin;
+        match self {
+            VolumeFile::MetaImage => {
+                let kind = match sample {
+                    SampleType::U8 => "MET_UCHAR",
+                    SampleType::U16 => "MET_USHORT",
+                    SampleType::I16 => "MET_SHORT",
+                    SampleType::F32 => "MET_FLOAT",
+                };
+                format!(
+                    "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
+                     TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {ox} {oy} {oz}\nElementSpacing = {dx} {dy} {dz}\n\
+                     DimSize = {x} {y} {z}\nElementType = {kind}\nElementDataFile = LOCAL\n"
+                )
+            }
+            VolumeFile::Nrrd => {
+                let kind = match sample {
+                    SampleType::U8 => "uint8",
+                    SampleType::U16 => "uint16",
+                    SampleType::I16 => "int16",
+                    SampleType::F32 => "float",
+                };
+                format!(
+                    "NRRD0004\n# Lateral, depth and elevation of an ultrasound probe, mm.\ntype: {kind}\ndimension: 3\n\
+                     space dimension: 3\nsizes: {x} {y} {z}\nspace directions: ({dx},0,0) (0,{dy},0) (0,0,{dz})\n\
+                     kinds: domain domain domain\nspace units: \"mm\" \"mm\" \"mm\"\nspace origin: ({ox},{oy},{oz})\n\
+                     endian: little\nencoding: raw\n\n"
+                )
+            }
+        }
+    }
+}
+
+/// The lattice of even spacing, mm, over all that a geometry insonifies: lateral, depth (Y of the probe), elevation.
+///
+/// # Errors
+/// A spacing that is no length, or makes more voxels than a file may hold; in words without the file's name.
+pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
+    if !(spacing.is_finite() && spacing > 0.0) {
+        return Err(format!("{spacing} mm: must be a finite length above 0"));
+    }
+    let (low, high) = match geometry {
+        Geometry::Sweep(probe) => probe.bounds(),
+        Geometry::Cartesian(grid) => {
+            let (origin, pitch) = (DVec3::from(grid.origin), DVec3::from(grid.spacing));
+            let last = DVec3::from_array(grid.size.map(|n| n.saturating_sub(1) as f64));
+            (origin, origin + last * pitch)
+        }
+    };
+    // The outermost voxels lie within a spacing of the bounds; one that is off by rounding is not another.
+    let count = (((high - low) / spacing + 1e-9).floor() + 1.0).to_array();
+    if count.iter().any(|n| n.is_nan() || *n > MOST_ALONG) || count.iter().product::<f64>() > MOST_VOXELS {
+        let [x, y, z] = count;
+        return Err(format!(
+            "{spacing} mm: makes {x:.0} x {y:.0} x {z:.0} voxels; at most {MOST_ALONG} along an edge and {MOST_VOXELS:.0} in all are written"
+        ));
+    }
+    Ok(Grid { size: count.map(|n| n as usize), spacing: [spacing; 3], origin: low.to_array() })
+}
+
+/// The samples of one volume in memory, and where they lie.
+pub struct Volume {
+    geometry: Geometry,
+    stored: StoredType,
+    /// Samples and lines of a frame, and frames.
+    size: [usize; 3],
+    /// By slice in geometric order; a frame that is missing is zero.
+    frames: Vec<Vec<u8>>,
+}
+
+impl Volume {
+    pub fn new(geometry: Geometry, stored: StoredType) -> Volume {
+        let [samples, lines] = geometry.frame_size();
+        let size = [samples, lines, geometry.slices()];
+        Volume { geometry, stored, size, frames: vec![Vec::new(); size[2]] }
+    }
+
+    /// A frame in its place. One whose place or size is not this volume's is left out.
+    pub fn take(&mut self, frame: Frame) {
+        let bytes = self.size[0] * self.size[1] * self.stored.bytes();
+        if let Some(place) = self.frames.get_mut(frame.slice).filter(|_| frame.bytes.len() == bytes) {
+            *place = frame.bytes;
+        }
+    }
+
+    fn sample(&self, at: [usize; 3]) -> f64 {
+        let n = (at[1] * self.size[0] + at[0]) * self.stored.bytes();
+        let bytes = self.frames[at[2]].get(n..n + self.stored.bytes());
+        match (self.stored, bytes) {
+            (StoredType::U8, Some([a])) => f64::from(*a),
+            (StoredType::U16, Some([a, b])) => f64::from(u16::from_le_bytes([*a, *b])),
+            (StoredType::F32, Some([a, b, c, d])) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
+            _ => 0.0,
+        }
+    }
+
+    /// The stored value at a place in space, mm; none outside of what is insonified.
+    pub fn at(&self, place: DVec3) -> Option<f64> {
+        let index = match &self.geometry {
+            Geometry::Sweep(probe) => self.indices(probe, place),
+            Geometry::Cartesian(grid) => ((place - DVec3::from(grid.origin)) / DVec3::from(grid.spacing)).to_array(),
+        };
+        let mut low = [0; 3];
+        let mut share = [0.0; 3];
+        for axis in 0..3 {
+            let last = (self.size[axis] - 1) as f64;
+            // What is off by rounding at the border is still inside.
+            if !(index[axis] >= -1e-6 && index[axis] <= last + 1e-6) {
+                return None;
+            }
+            let at = index[axis].clamp(0.0, last);
+            low[axis] = (at as usize).min(self.size[axis].saturating_sub(2));
+            share[axis] = at - low[axis] as f64;
+        }
+        let mut sum = 0.0;
+        for corner in 0..8usize {
+            let weight: f64 = (0..3).map(|a| if corner >> a & 1 == 1 { share[a] } else { 1.0 - share[a] }).product();
+            if weight > 0.0 {
+                sum += weight * self.sample(std::array::from_fn(|a| low[a] + (corner >> a & 1)));
+            }
+        }
+        Some(sum)
+    }
+
+    fn indices(&self, probe: &Probe, place: DVec3) -> [f64; 3] {
+        let at = probe.to_indices(place);
+        [at.sample, at.line, at.slice]
+    }
+
+    /// Writes it on a lattice. `sample` is the type of the file that it came from, whose values are written; nothing is where the
+    /// sector is not: zero. `each` hears of every slice that is done.
+    ///
+    /// # Errors
+    /// An ending that is no format, a disk that is full; then no file is left.
+    pub fn write(&self, grid: &Grid, sample: SampleType, path: &Path, each: impl Fn()) -> Result<(), InputError> {
+        let format = VolumeFile::of(path)?;
+        let (mut unfinished, mut file) = Unfinished::create(path)?;
+        let written = |result: std::io::Result<()>| result.map_err(|e| unwritable(path, &e));
+        written(file.write_all(format.header(grid, sample).as_bytes()))?;
+        let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
+        for z in 0..grid.size[2] {
+            slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
+                for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
+                    let place = DVec3::from(grid.origin)
+                        + DVec3::from(grid.spacing) * DVec3::from_array([x, y, z].map(|n| n as f64));
+                    store(sample, self.at(place), voxel);
+                }
+            });
+            written(file.write_all(&slice))?;
+            each();
+        }
+        unfinished.finish(file)?;
+        unfinished.rename()
+    }
+}
+
+/// A stored value as the file's type has it, rounded to nearest.
+fn store(sample: SampleType, value: Option<f64>, voxel: &mut [u8]) {
+    let whole = value.unwrap_or(0.0).round();
+    match sample {
+        SampleType::U8 => voxel.copy_from_slice(&[whole as u8]),
+        SampleType::U16 => voxel.copy_from_slice(&(whole as u16).to_le_bytes()),
+        SampleType::I16 => {
+            let signed = value.map_or(0.0, |_| whole - sample.shift());
+            voxel.copy_from_slice(&(signed as i16).to_le_bytes());
+        }
+        SampleType::F32 => voxel.copy_from_slice(&(value.unwrap_or(0.0) as f32).to_le_bytes()),
+    }
+}

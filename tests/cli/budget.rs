@@ -1,0 +1,64 @@
+//! Settings chosen by what a report measured.
+
+use crate::common::*;
+use std::fs;
+
+/// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.
+fn error_report(volume: &str) -> String {
+    let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
+        let time = ms * 1e6;
+        format!(
+            "{{\"label\": \"{label}\", \"set\": [{set}], \"value\": {value}, \"errors\": {{\"rmse\": {rmse}, \"max\": 0.1}}, \
+             \"time\": {{\"median\": {time}, \"low\": {time}, \"high\": {time}}}, \"is_default\": {is_default}}}"
+        )
+    };
+    format!(
+        "{{\"format\": \"echolume error report 1\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
+         \"scene\": \"bone\", \"sizes\": {{\"volume\": {volume}, \"picture\": [64, 48]}}, \"repeats\": 3, \"dials\": [{{\
+         \"name\": \"step\", \"unit\": \"mm\", \"reference\": {{\"kind\": \"f64\"}}, \"points\": [{}, {}]}}]}}",
+        point("0.5 mm", "", 0.5, 0.001, 20.0, true),
+        point("1.25 mm", "\"ray.step=1.25\"", 1.25, 0.004, 8.0, false)
+    )
+}
+
+#[test]
+fn a_budget_of_time_takes_what_a_report_measured_and_no_setting_of_the_users() {
+    let folder = Folder::new("budget");
+    let report = folder.write("error.json", error_report("[160, 216, 33]"));
+    let picture = |name: &str, more: &[&str]| {
+        let said = render(BONE, &folder.path(name), more);
+        (said, fs::read(folder.path(name)).expect("the picture"))
+    };
+    let (_, plain) = picture("plain.png", &["--set", "ray.step=0.5"]);
+    let (_, coarse) = picture("coarse.png", &["--set", "ray.step=1.25"]);
+    assert_ne!(plain, coarse);
+    let (said, chosen) = picture("chosen.png", &["--budget", "10ms", "--report", &report]);
+    assert!(
+        said.contains("budget 10ms: (ray.step=1.25) has RMSE 4.000e-3 and takes 8.000 ms, measured on a card"),
+        "{said}"
+    );
+    assert_eq!(chosen, coarse);
+    let (said, ample) = picture("ample.png", &["--budget", "0.1s", "--report", &report]);
+    assert!(said.contains("(the default)"), "{said}");
+    assert_eq!(ample, picture("default.png", &[]).1);
+    let (_, mine) = picture("mine.png", &["--budget", "10ms", "--report", &report, "--set", "ray.step=0.5"]);
+    assert_eq!(mine, plain, "what the user sets is above it");
+
+    let other = folder.write("other.json", error_report("[1, 2, 3]"));
+    let foreign = folder.write("foreign.json", "{\"format\": \"somebody else's\"}");
+    let text = folder.write("text.json", "not a report");
+    for (budget, file, named) in [
+        ("10ms", &folder.path("missing.json"), "missing.json: cannot be read"),
+        ("10ms", &foreign, "somebody else's"),
+        ("10ms", &text, "text.json: error report: cannot be read"),
+        ("10ms", &other, "1x2x3"),
+        ("soon", &report, "--budget soon"),
+    ] {
+        folder.refuses(&[BONE, "--budget", budget, "--report", file], &[named]);
+    }
+    let all = ["render", BONE, "--budget", "1ms", "--report", &report, "-o", &folder.path("never.png")];
+    refuses(&all, &run(&all), 1, &["--budget 1ms", "no setting takes", "8.000 ms"]);
+    for alone in [["--budget", "10ms"], ["--report", &report]] {
+        assert_eq!(run(&[&["render", BONE][..], &alone].concat()).0, Some(2), "{alone:?}");
+    }
+}
