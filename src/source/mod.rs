@@ -3,6 +3,7 @@
 
 mod contents;
 pub mod error;
+pub mod igtl;
 mod kretz;
 mod metaimage;
 pub mod phantom;
