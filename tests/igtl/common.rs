@@ -2,6 +2,7 @@
 
 pub use echolume::source::igtl::*;
 pub use proptest::prelude::*;
+pub use std::time::{Duration, Instant};
 
 pub const FILES: [&str; 5] =
     ["Image_Motor_v1.bin", "Image_v2_v2.bin", "ProbeToMotor_v1.bin", "Str_v1.bin", "TDATA_ref_cpp_v1.bin"];

@@ -1,7 +1,8 @@
-//! OpenIGTLink: stored messages, messages of every kind there and back, and bytes that are
-//! none. Needs no GPU.
+//! OpenIGTLink: stored messages, messages of every kind there and back, bytes that are none, and a client against servers
+//! on the loopback interface. Needs no GPU.
 
 mod broken;
+mod client;
 mod common;
 mod round_trip;
 mod stored;

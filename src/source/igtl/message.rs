@@ -146,4 +146,17 @@ impl Message {
             Message::Other(m) => &m.kind,
         }
     }
+
+    /// Bytes of memory, about.
+    pub(super) fn weight(&self) -> usize {
+        let held = match self {
+            Message::Tracked(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
+            Message::Image(m) => m.bytes.len(),
+            Message::Status(m) => m.name.len() + m.text.len(),
+            Message::Text(m) => m.text.len(),
+            Message::Other(m) => m.kind.len(),
+            Message::Transform(_) => 0,
+        };
+        size_of::<Message>() + self.device().len() + held
+    }
 }

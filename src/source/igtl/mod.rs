@@ -1,10 +1,11 @@
 //! OpenIGTLink: what trackers, scanners and navigation software (PLUS, 3D Slicer) send over TCP.
 //!
-//! [`decode`] and [`encode`] are pure, and the first is total; a client and poses for 2D frames follow.
+//! [`decode`] and [`encode`] are pure, and the first is total; [`Client`] keeps a connection and a bounded queue.
 //!
 //! The format is OpenIGTLink's protocol 3 (its repository's Documents/Protocol). Where that document and the reference
 //! library's bytes differ, the bytes are followed: the document's extended header has 8 or 14 bytes, the library's 12.
 
+mod client;
 mod crc;
 mod decode;
 mod encode;
@@ -13,7 +14,9 @@ mod fields;
 mod header;
 mod image;
 mod message;
+mod queue;
 
+pub use client::{Client, Options, PORT, Statistics};
 pub use crc::crc64;
 pub use decode::{BODY_LIMIT, Decoded, decode};
 pub use encode::{Version, encode};
@@ -21,3 +24,4 @@ pub use error::{MessageError, Refused};
 pub use header::HEADER;
 pub use image::{Coordinates, Image, Region, Scalar};
 pub use message::{Message, Other, Status, Text, Tool, ToolKind, Tracked, Transform};
+pub use queue::Received;
