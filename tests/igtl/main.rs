@@ -4,5 +4,6 @@
 mod broken;
 mod client;
 mod common;
+mod pairing;
 mod round_trip;
 mod stored;
