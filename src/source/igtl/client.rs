@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// The port that IANA gave to OpenIGTLink.
+/// Where OpenIGTLink servers listen by custom, and a client connects unless told otherwise.
 pub const PORT: u16 = 18944;
 /// How often a waiting thread looks whether it shall stop.
 const POLL: Duration = Duration::from_millis(100);
@@ -90,7 +90,7 @@ pub struct Statistics {
 
 /// A connection to an OpenIGTLink server, made again whenever it breaks. Dropping it ends it within a second.
 ///
-/// Memory: at most the queue's bytes or its newest message, and two bodies of the largest size while one is decoded.
+/// Memory: at most the queue's bytes or its newest message, and while one is decoded three times its body.
 pub struct Client {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
