@@ -4,6 +4,7 @@
 mod contents;
 pub mod convert;
 pub mod error;
+pub mod igtl;
 mod kretz;
 mod metaimage;
 pub mod phantom;
