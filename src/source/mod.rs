@@ -1,5 +1,6 @@
-//! Where frames come from. Every reader is total: any bytes give frames or an [`InputError`], never a panic, and no
-//! more memory is taken than the file's own bytes account for.
+//! Where frames come from: files, the phantom, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
+//! any bytes give frames or an [`InputError`], never a panic, and no more memory is taken than the file's own bytes account
+//! for.
 
 mod contents;
 pub mod convert;

@@ -16,7 +16,7 @@ pub struct Camera {
     pub zoom: f64,
     /// Vertical field of view, deg; 0 is parallel projection.
     pub field_of_view: f64,
-    /// Looked at: lateral, depth, elevation in mm as in [`Region`]. Absent: the middle of the region.
+    /// Looked at: lateral, depth, elevation in mm as in [`Region`](super::Region). Absent: the middle of the region.
     pub target: Option<[f64; 3]>,
 }
 
