@@ -5,6 +5,7 @@ mod devices;
 mod filter;
 mod info;
 mod phantom;
+mod probe;
 mod profile;
 mod render;
 mod report;
@@ -68,6 +69,8 @@ enum Command {
     Phantom(phantom::MakePhantom),
     /// Say what is in a recording (never who)
     Info(info::Info),
+    /// Drive the motor of a probe: home, sweep, stop; or simulate one
+    Probe(probe::Probe),
     /// List the Vulkan devices, what each lacks, and which one would be used
     Devices(devices::Devices),
 }
@@ -106,6 +109,7 @@ pub fn run() -> ExitCode {
         Command::Report(report) => report.run(),
         Command::Phantom(phantom) => phantom.run(),
         Command::Info(info) => info.run(),
+        Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
     });
     let done = done.and_then(|()| match UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).take() {
