@@ -8,7 +8,7 @@ use echolume::probe::motor::{
     Drive, Fault, Held, MotorError, MotorTable, Parity, Position, Settings, StopBits, Sweep, port,
 };
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 const KILLED: &str = "The motor is stopped when the command ends, fails, panics, or gets SIGINT, SIGTERM or SIGHUP. A process \
 that is killed outright (SIGKILL, power) cannot stop it. Where the module has a watchdog (TMCL global parameter 68, \"serial \
@@ -86,10 +86,10 @@ struct SweepArguments {
     /// Passes [default: until SIGINT]
     #[arg(long, value_name = "N")]
     volumes: Option<usize>,
-    /// Write when the array was where: time in s, angle in degrees, direction
+    /// Write when the array was where: time in s since the sweep was begun, angle in degrees, direction
     #[arg(long, value_name = "FILE.csv")]
     positions: Option<PathBuf>,
-    /// Home was found before and the motor has not been off since: do not look for it
+    /// Home was found before and the module has not been off since: do not look for it
     #[arg(long)]
     homed: bool,
 }
@@ -230,6 +230,9 @@ impl SweepArguments {
         }
         say!("sweep: {} deg at {} volumes/s, {speed:.1} deg/s at most", self.angle, self.rate);
         let (mut positions, mut passes, start) = (Vec::new(), 0, Instant::now());
+        if self.positions.is_some() {
+            say!("time 0 of the positions: {}", humantime::format_rfc3339_micros(SystemTime::now()));
+        }
         let swept = drive.sweep(&sweep, start, &mut |position| {
             passes = position.pass;
             if self.positions.is_some() {

@@ -2,7 +2,7 @@
 
 use crate::{eventually, settings, simulated, stopped_at_last, table};
 use echolume::probe::motor::simulate::{Options, Simulator};
-use echolume::probe::motor::table::{Home, Side};
+use echolume::probe::motor::table::{Home, Side, Units};
 use echolume::probe::motor::tmcl::{Request, axis, command};
 use echolume::probe::motor::{Direction, Drive, Fault, MotorTable, Place, Position, Stopped, Sweep, Track};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -70,6 +70,20 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
     drop(drive);
     assert_eq!(simulator.received().len(), before);
     assert!(!simulator.turning() && (simulator.angle() - 12.0).abs() < 0.02);
+}
+
+#[test]
+fn a_reversed_motor_on_an_older_controller_sweeps_the_same_angle() {
+    let table = MotorTable { units: Units::Tmc429, ramp_divisor: 9, reversed: true, ..table() };
+    table.check().expect("within the controller's registers");
+    let options = Options { table: table.clone(), ..Options::default() };
+    let simulator = Simulator::start(options).expect("a pseudo-terminal");
+    let mut drive = Drive::open(&settings(&simulator, 2000), &table).expect("opened");
+    drive.home().expect("home");
+    let mut least = f64::INFINITY;
+    drive.sweep(&SWEEP, Instant::now(), &mut |p| least = least.min(p.angle)).expect("swept");
+    assert!((least + 12.0).abs() < 0.02, "the second pass ends at {least}");
+    assert!((simulator.angle() - 12.0).abs() < 0.02, "the third at {}", simulator.angle());
 }
 
 #[test]

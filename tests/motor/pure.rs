@@ -99,7 +99,7 @@ fn track(pitch: f64) -> Track {
         .take_while(|t| *t < 2.0)
         .map(|time| {
             let pass = (time * 2.0) as usize;
-            let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
+            let direction = if pass.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
             Position { time, angle: cosine(time), direction, pass }
         })
         .collect();

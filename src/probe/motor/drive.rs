@@ -7,7 +7,7 @@ use super::port::{Answer, Port, Settings};
 use super::sweep::{Direction, Position, Sweep};
 use super::table::{MotorTable, Side};
 use super::tmcl::{self, Request, axis};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Shortest time between two questions for the position.
 pub(super) const PERIOD: Duration = Duration::from_millis(5);
@@ -194,11 +194,10 @@ impl Drive {
         self.set(axis::LARGEST_SPEED, self.table.velocity(self.table.search_speed()))?;
         self.travel(-sweep.angle / 2.0, self.table.search_speed(), &mut |_, _| {})?;
         self.set(axis::LARGEST_SPEED, self.table.velocity(speed))?;
-        tracing::info!("sweep begins at {:?}", SystemTime::now());
         let mut last = f64::NEG_INFINITY;
         let volumes = sweep.volumes.unwrap_or(usize::MAX);
         for pass in 0..volumes {
-            let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
+            let direction = if pass.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
             let end = sweep.angle / 2.0 * direction.sign();
             self.travel(end, speed, &mut |at, angle| {
                 let time = at.saturating_duration_since(start).as_secs_f64();

@@ -2,7 +2,7 @@
 //!
 //! The shaft's own position counts from the edge of the home switch, in microsteps; the module's counter starts at 0 wherever
 //! the shaft is, until a search. The home switch is a flag over half the travel: closed left of home (right of it where
-//! `home_direction` is right). It is a model of the protocol and of how a motor moves, not of any one product's firmware.
+//! `home_direction` is right). A reference search goes straight there. It is a model of the protocol and of how a motor moves, not of any one product's firmware.
 
 use crate::probe::motor::table::{MotorTable, Side};
 use crate::probe::motor::tmcl::{self, Reply, Request, SUCCESS, axis, command};
