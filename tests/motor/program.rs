@@ -20,7 +20,11 @@ fn probe(simulator: &Simulator, action: &str, more: &[&str]) -> Command {
     command
 }
 
-fn finish(child: Child) -> Ran {
+/// Waits for the program, which must end by itself.
+fn finish(mut child: Child) -> Ran {
+    if !eventually(|| child.try_wait().expect("wait for the program").is_some()) {
+        child.kill().expect("end the program");
+    }
     let output = child.wait_with_output().expect("the program ends");
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     (output.status.code(), text(output.stdout), text(output.stderr))
