@@ -70,6 +70,10 @@ fn layers_hold() {
         let in_gpu = name.starts_with("src/gpu/");
         assert!(in_gpu || !text.contains("use ash"), "{name} imports ash");
         assert!(in_gpu || !text.contains("unsafe {"), "{name} has unsafe code");
+        let in_motor = name.starts_with("src/probe/motor/");
+        for word in ["serialport::", "signal_hook::", "rustix::"] {
+            assert!(in_motor || !text.contains(word), "{name} names {word}, which only the motor's folder knows");
+        }
         assert!(
             !text.contains(".unwrap()") || name.contains("test") || text.contains("#[cfg(test)]"),
             "{name} unwraps"

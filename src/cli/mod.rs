@@ -6,6 +6,7 @@ mod devices;
 mod filter;
 mod info;
 mod phantom;
+mod probe;
 mod profile;
 mod render;
 mod report;
@@ -71,6 +72,8 @@ enum Command {
     Convert(convert::Convert),
     /// Say what is in a recording (never who)
     Info(info::Info),
+    /// Drive the motor of a probe: home, sweep, stop; or simulate one
+    Probe(probe::Probe),
     /// List the Vulkan devices, what each lacks, and which one would be used
     Devices(devices::Devices),
 }
@@ -110,6 +113,7 @@ pub fn run() -> ExitCode {
         Command::Phantom(phantom) => phantom.run(),
         Command::Convert(convert) => convert.run(),
         Command::Info(info) => info.run(),
+        Command::Probe(probe) => probe.run(),
         Command::Devices(devices) => devices.run(),
     });
     let done = done.and_then(|()| match UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).take() {

@@ -4,6 +4,7 @@
 
 mod tables;
 
+use super::motor::MotorTable;
 use super::{Advance, Array, Axis, Motion, Probe, Volumes};
 use crate::source::InputError;
 use std::fs::File;
@@ -71,6 +72,11 @@ impl ProbeFile {
         self.tables.samples.range
     }
 
+    /// How the motor is driven, where the file says so.
+    pub fn motor(&self) -> Option<&MotorTable> {
+        self.tables.motor.as_ref()
+    }
+
     fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
         Err(InputError::new(&self.path, field, fault))
     }
@@ -120,6 +126,9 @@ impl ProbeFile {
         }
         if motion.kind == MotionKind::Still && motion.frames_per_volume > 1 {
             return self.fault("motion.frames_per_volume", "must be 1 when the probe is still");
+        }
+        if let Some((field, fault)) = self.tables.motor.as_ref().and_then(|m| m.check().err()) {
+            return self.fault(field, fault);
         }
         match self.range() {
             Some([low, high]) if !(low < high && (high - low).is_finite()) => {

@@ -1,9 +1,11 @@
-//! The probe: where its scan lines and frames lie ([`geometry`]), and how a TOML file says so ([`mod@file`]).
+//! The probe: where its scan lines and frames lie ([`geometry`]), how a TOML file says so ([`mod@file`]), and the motor
+//! that sweeps it ([`motor`]).
 
 pub mod axis;
 pub mod file;
 pub mod geometry;
 pub mod grid;
+pub mod motor;
 pub mod volumes;
 
 pub use axis::Axis;

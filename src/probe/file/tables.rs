@@ -1,5 +1,6 @@
 //! The tables of a probe file, one struct each. Unknown keys are errors, so that a typing error is not silently a default.
 
+use crate::probe::motor::MotorTable;
 use serde::Deserialize;
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -13,6 +14,7 @@ pub(super) struct Tables {
     pub sound: SoundTable,
     #[serde(default)]
     pub samples: SamplesTable,
+    pub motor: Option<MotorTable>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

@@ -1,0 +1,286 @@
+//! `echolume probe`: the motor.
+
+use super::{Failure, failed, input, say};
+use clap::{Args, Subcommand, ValueEnum};
+use echolume::picture::check_target;
+use echolume::probe::ProbeFile;
+use echolume::probe::motor::{
+    Drive, Fault, Held, MotorError, MotorTable, Parity, Position, Settings, StopBits, Sweep, port,
+};
+use std::path::PathBuf;
+use std::time::{Duration, Instant, SystemTime};
+
+const KILLED: &str = "The motor is stopped when the command ends, fails, panics, or gets SIGINT, SIGTERM or SIGHUP. A process \
+that is killed outright (SIGKILL, power) cannot stop it. Where the module has a watchdog (TMCL global parameter 68, \"serial \
+heartbeat\"; `probe status` says so), set watchdog_ms = 1000 in the [motor] table: the module then stops the motor itself when \
+no command has come for so long. home and sweep write it into the module, which keeps it. Where it has none, keep a switch for \
+the motor's power at hand.\n\nExit codes: 0 done, 1 failed, 2 bad input.";
+
+#[derive(Args)]
+#[command(after_help = KILLED)]
+pub struct Probe {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// List the serial ports
+    Ports,
+    /// Say which module is there, where the motor is, and its switches; nothing moves
+    #[command(after_help = KILLED)]
+    Status(Line),
+    /// Find home, from where angles count
+    #[command(after_help = KILLED)]
+    Home(Line),
+    /// Find home, then go back and forth over an angle
+    #[command(after_help = KILLED)]
+    Sweep(SweepArguments),
+    /// Stop the motor
+    #[command(after_help = KILLED)]
+    Stop(Line),
+    /// Simulate a module on a pseudo-terminal, whose path is printed; until SIGINT
+    #[cfg(target_os = "linux")]
+    Simulate(Simulate),
+}
+
+/// How to reach the module, and what hangs on it.
+#[derive(Args)]
+struct Line {
+    /// The serial port: /dev/ttyUSB0; `echolume probe ports` lists them
+    #[arg(long, value_name = "PORT")]
+    port: String,
+    /// The probe file, whose [motor] table says what hangs on the module; home and sweep need it
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// Bits a second
+    #[arg(long, value_name = "N", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    baud: u32,
+    #[arg(long, value_name = "PARITY", default_value = "none")]
+    parity: ParityName,
+    /// 1 or 2
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
+    stop_bits: u8,
+    /// Longest wait for a reply, ms
+    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u64).range(20..=10_000))]
+    timeout: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ParityName {
+    None,
+    Even,
+    Odd,
+}
+
+#[derive(Args)]
+struct SweepArguments {
+    #[command(flatten)]
+    line: Line,
+    /// From end to end, degrees
+    #[arg(long, value_name = "DEG")]
+    angle: f64,
+    /// Passes over the angle, and so volumes, a second
+    #[arg(long, value_name = "RATE")]
+    rate: f64,
+    /// Passes [default: until SIGINT]
+    #[arg(long, value_name = "N")]
+    volumes: Option<usize>,
+    /// Write when the array was where: time in s since the sweep was begun, angle in degrees, direction
+    #[arg(long, value_name = "FILE.csv")]
+    positions: Option<PathBuf>,
+    /// Home was found before and the module has not been off since: do not look for it
+    #[arg(long)]
+    homed: bool,
+}
+
+#[cfg(target_os = "linux")]
+#[derive(Args)]
+struct Simulate {
+    /// The probe file, whose [motor] table the simulated module is to fit [default: a motor of 200 steps, geared 12 to 1]
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// What goes wrong: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS so long after
+    /// the sweep's begin
+    #[arg(long, value_name = "NAME[@SECONDS]")]
+    fault: Option<echolume::probe::motor::simulate::Injected>,
+    /// A module without a watchdog
+    #[arg(long)]
+    no_watchdog: bool,
+}
+
+impl Probe {
+    pub fn run(&self) -> Result<(), Failure> {
+        match &self.action {
+            Action::Ports => ports(),
+            Action::Status(line) => status(line),
+            Action::Home(line) => home(line),
+            Action::Sweep(sweep) => sweep.run(),
+            Action::Stop(line) => stop(line),
+            #[cfg(target_os = "linux")]
+            Action::Simulate(simulate) => simulate.run(),
+        }
+    }
+}
+
+/// Bad input where the fault is in what was asked, failed where it is in the motor.
+fn fault(error: MotorError) -> Failure {
+    match error.fault {
+        Fault::OutOfRange(_) => input(error),
+        _ => failed(error),
+    }
+}
+
+fn table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure> {
+    let Some(file) = file else { return Ok(None) };
+    let probe = ProbeFile::read(file).map_err(input)?;
+    let table = probe.motor().cloned();
+    table.map(Some).ok_or_else(|| input(format!("{}: has no [motor] table", file.display())))
+}
+
+impl Line {
+    fn settings(&self) -> Settings {
+        Settings {
+            path: self.port.clone(),
+            baud: self.baud,
+            parity: match self.parity {
+                ParityName::None => Parity::None,
+                ParityName::Even => Parity::Even,
+                ParityName::Odd => Parity::Odd,
+            },
+            stop_bits: if self.stop_bits == 2 { StopBits::Two } else { StopBits::One },
+            timeout: Duration::from_millis(self.timeout),
+        }
+    }
+
+    /// The table of the probe file, or where nothing is moved any module's at the usual address.
+    fn any_table(&self) -> Result<MotorTable, Failure> {
+        Ok(table(self.probe.as_ref())?.unwrap_or(MotorTable { module: None, ..MotorTable::default() }))
+    }
+
+    fn table(&self) -> Result<MotorTable, Failure> {
+        table(self.probe.as_ref())?
+            .ok_or_else(|| input("--probe FILE is needed: its [motor] table says how far to turn"))
+    }
+}
+
+fn ports() -> Result<(), Failure> {
+    let ports = port::list().map_err(failed)?;
+    if ports.is_empty() {
+        say!("no serial ports: plug the module in, or try `echolume probe simulate`");
+    }
+    for (name, about) in ports {
+        say!("{name} ({about})");
+    }
+    Ok(())
+}
+
+fn status(line: &Line) -> Result<(), Failure> {
+    let table = line.any_table()?;
+    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
+    let status = drive.status().map_err(fault)?;
+    say!("module: {}", status.module);
+    if line.probe.is_some() {
+        say!("angle: {:.3} deg, if home was found since it is on", status.angle);
+        say!("speed: {:.3} deg/s", status.speed);
+    } else {
+        say!("motor: {}; its angle needs --probe", if status.speed == 0.0 { "at rest" } else { "turning" });
+    }
+    let word = |closed| if closed { "closed" } else { "open" };
+    say!(
+        "switches: home {}, left limit {}, right limit {}",
+        word(status.home_switch),
+        word(status.left_limit),
+        word(status.right_limit)
+    );
+    match status.watchdog {
+        None => say!("watchdog: none: if the program is killed, the motor is not stopped"),
+        Some(Duration::ZERO) => say!("watchdog: off: set watchdog_ms in the [motor] table"),
+        Some(time) => say!("watchdog: stops the motor after {time:?} without a command"),
+    }
+    Ok(())
+}
+
+fn home(line: &Line) -> Result<(), Failure> {
+    let table = line.table()?;
+    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
+    drive.home().map_err(fault)?;
+    say!("home: found; the array is at {:.3} deg", drive.status().map_err(fault)?.angle);
+    Ok(())
+}
+
+fn stop(line: &Line) -> Result<(), Failure> {
+    Drive::stop_at(&line.settings(), &line.any_table()?).map_err(fault)?;
+    say!("stopped");
+    Ok(())
+}
+
+impl SweepArguments {
+    fn run(&self) -> Result<(), Failure> {
+        let (table, settings) = (self.line.table()?, self.line.settings());
+        let sweep = Sweep { angle: self.angle, rate: self.rate, volumes: self.volumes };
+        // Before the port is touched.
+        let speed = sweep.speed(&table, settings.round_trip()).map_err(input)?;
+        if let Some(file) = &self.positions {
+            check_target(file).map_err(input)?;
+        }
+        let mut drive = Drive::open(&settings, &table).map_err(fault)?;
+        if !self.homed {
+            drive.home().map_err(fault)?;
+        }
+        say!("sweep: {} deg at {} volumes/s, {speed:.1} deg/s at most", self.angle, self.rate);
+        let (mut positions, mut passes, start) = (Vec::new(), 0, Instant::now());
+        if self.positions.is_some() {
+            say!("time 0 of the positions: {}", humantime::format_rfc3339_micros(SystemTime::now()));
+        }
+        let swept = drive.sweep(&sweep, start, &mut |position| {
+            passes = position.pass;
+            if self.positions.is_some() {
+                positions.push(position);
+            }
+        });
+        // What was seen until a fault is worth keeping too.
+        let kept = self.positions.as_ref().map_or(Ok(()), |file| {
+            std::fs::write(file, csv(&positions))
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", file.display())))
+        });
+        match swept {
+            Ok(volumes) => say!("swept: {volumes} volumes"),
+            // Without a number of volumes this is how it ends.
+            Err(MotorError { fault: Fault::Interrupted(signal), stopped, .. })
+                if self.volumes.is_none() && stopped == echolume::probe::motor::Stopped::Confirmed =>
+            {
+                say!("swept: {passes} volumes; the motor was stopped by {signal}");
+            }
+            Err(error) => return Err(fault(error)),
+        }
+        kept
+    }
+}
+
+fn csv(positions: &[Position]) -> String {
+    let mut text = String::from("time_s,angle_deg,direction\n");
+    for position in positions {
+        text += &format!("{:.6},{:.4},{}\n", position.time, position.angle, position.direction.name());
+    }
+    text
+}
+
+#[cfg(target_os = "linux")]
+impl Simulate {
+    fn run(&self) -> Result<(), Failure> {
+        use echolume::probe::motor::simulate::{Options, Simulator};
+        let held = Held::take();
+        let options = Options {
+            table: table(self.probe.as_ref())?.unwrap_or_default(),
+            fault: self.fault,
+            no_watchdog: self.no_watchdog,
+        };
+        let simulator = Simulator::start(options).map_err(|e| failed(format!("no pseudo-terminal can be had: {e}")))?;
+        say!("{}", simulator.path().display());
+        while held.signal().is_none() && !simulator.ended() {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,280 @@
+//! The motor of a probe: where it is, home, back and forth over the sweep, stop. Nothing moves before the limits are checked,
+//! and nothing goes on moving after a fault.
+
+use super::fault::{Fault, MotorError, Stopped};
+use super::guard::Guard;
+use super::port::{Answer, Port, Settings};
+use super::sweep::{Direction, Position, Sweep};
+use super::table::{MotorTable, Side};
+use super::tmcl::{self, Request, axis};
+use std::time::{Duration, Instant};
+
+/// Shortest time between two questions for the position.
+pub(super) const PERIOD: Duration = Duration::from_millis(5);
+/// Without any movement for so long the motor does not follow.
+const STILL: Duration = Duration::from_millis(400);
+/// Every how many positions the limit switch ahead is looked at as well.
+const LOOK_AHEAD: usize = 8;
+
+/// What the module says of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// Number and firmware, `TMCM-1140 firmware 1.16`.
+    pub module: String,
+    /// Degrees; true only after home.
+    pub angle: f64,
+    /// Degrees a second.
+    pub speed: f64,
+    pub home_switch: bool,
+    pub left_limit: bool,
+    pub right_limit: bool,
+    /// Time of the module's own watchdog; zero if it is off, nothing if it has none.
+    pub watchdog: Option<Duration>,
+}
+
+/// An open motor. Dropping it stops it, see [`super::guard`].
+pub struct Drive {
+    pub(super) guard: Guard,
+    pub(super) table: MotorTable,
+    module: String,
+}
+
+impl Drive {
+    /// Opens the port and makes sure that the module is the one of the table. Moves nothing.
+    ///
+    /// # Errors
+    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that already turns is then stopped if it can be.
+    pub fn open(settings: &Settings, table: &MotorTable) -> Result<Drive, MotorError> {
+        let mut drive = Drive::connect("open", settings, table)?;
+        let module = drive.identify();
+        drive.module = drive.done("open", module)?;
+        Ok(drive)
+    }
+
+    fn connect(doing: &'static str, settings: &Settings, table: &MotorTable) -> Result<Drive, MotorError> {
+        let path = settings.path.clone();
+        let port = Port::open(settings);
+        let port = port.map_err(|fault| MotorError { port: path, doing, fault, stopped: Stopped::NotMoved })?;
+        Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
+    }
+
+    /// Where the motor is and how the module stands. Moves nothing.
+    ///
+    /// # Errors
+    /// Any [`Fault`] of the port.
+    pub fn status(&mut self) -> Result<Status, MotorError> {
+        let status = self.read_status();
+        self.done("status", status)
+    }
+
+    /// Finds home and counts positions from there.
+    ///
+    /// # Errors
+    /// Any [`Fault`]; the motor is then stopped.
+    pub fn home(&mut self) -> Result<(), MotorError> {
+        let watchdog = self.set_watchdog();
+        self.done("home", watchdog)?;
+        let found = self.find_home();
+        self.done("home", found)
+    }
+
+    /// Goes to the sweep's start and back and forth over it; [`Drive::home`] comes first. Each position that was read goes to
+    /// `seen`, its time in seconds since `start`, rising.
+    ///
+    /// # Errors
+    /// Any [`Fault`], [`Fault::OutOfRange`] before anything has moved; the motor is then stopped.
+    pub fn sweep(
+        &mut self,
+        sweep: &Sweep,
+        start: Instant,
+        seen: &mut dyn FnMut(Position),
+    ) -> Result<usize, MotorError> {
+        let swept = self.sweep_all(sweep, start, seen);
+        self.done("sweep", swept)
+    }
+
+    /// Opens the port and stops the motor before anything else is asked, whichever module it is.
+    ///
+    /// # Errors
+    /// As [`Drive::stop`], and [`Fault::NotOpened`].
+    pub fn stop_at(settings: &Settings, table: &MotorTable) -> Result<(), MotorError> {
+        Drive::connect("stop", settings, table)?.stop()
+    }
+
+    /// Stops the motor and waits until it stands.
+    ///
+    /// # Errors
+    /// When the module does not confirm it, or turns on.
+    pub fn stop(&mut self) -> Result<(), MotorError> {
+        let stopped = self.guard.stop();
+        let path = self.guard.port().settings().path.clone();
+        if stopped != Stopped::Confirmed {
+            let fault = Fault::NoReply { request: "MST".into(), timeout: self.guard.port().settings().timeout };
+            return Err(MotorError { port: path, doing: "stop", fault, stopped });
+        }
+        let stands = self.wait_still();
+        self.done("stop", stands)
+    }
+
+    fn done<T>(&mut self, doing: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
+        result.map_err(|fault| self.guard.fail(doing, fault))
+    }
+
+    pub(super) fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
+        self.guard.ask(&request(self.table.address, self.table.motor))
+    }
+
+    pub(super) fn get(&mut self, parameter: u8) -> Result<i32, Fault> {
+        self.ask(|a, m| Request::get_axis(a, m, parameter)).map(|answer| answer.value)
+    }
+
+    pub(super) fn set(&mut self, parameter: u8, value: i32) -> Result<(), Fault> {
+        self.ask(|a, m| Request::set_axis(a, m, parameter, value)).map(drop)
+    }
+
+    fn identify(&mut self) -> Result<String, Fault> {
+        let answer = self.guard.ask(&Request::version(self.table.address))?.value as u32;
+        let (mut module, mut version) = ((answer >> 16) as u16, format!("{}.{}", answer >> 8 & 0xff, answer & 0xff));
+        if module == 0 {
+            // Older firmware gives its number as text only.
+            let bytes = self.guard.ask_raw(&Request::version_text(self.table.address))?;
+            (module, version) = tmcl::version_text(&bytes).unwrap_or((0, version));
+        }
+        match self.table.module {
+            Some(wanted) if wanted != module => Err(Fault::WrongModule {
+                found: format!("module {module}, firmware {version}"),
+                wanted: format!("module {wanted}"),
+            }),
+            _ => Ok(format!("TMCM-{module} firmware {version}")),
+        }
+    }
+
+    fn read_status(&mut self) -> Result<Status, Fault> {
+        let (position, velocity) = (self.get(axis::POSITION)?, self.get(axis::SPEED)?);
+        Ok(Status {
+            module: self.module.clone(),
+            angle: self.table.angle(position),
+            speed: self.table.speed(velocity),
+            home_switch: self.at_home_switch()?,
+            left_limit: self.get(axis::LEFT_LIMIT)? != 0,
+            right_limit: self.get(axis::RIGHT_LIMIT)? != 0,
+            watchdog: self.watchdog()?,
+        })
+    }
+
+    fn watchdog(&mut self) -> Result<Option<Duration>, Fault> {
+        match self.guard.ask(&Request::get_global(self.table.address, tmcl::WATCHDOG)) {
+            Ok(answer) => Ok(Some(Duration::from_millis(answer.value.max(0) as u64))),
+            // It knows no such parameter, or no global ones at all.
+            Err(Fault::Refused { status: 2..=4 | 6, .. }) => Ok(None),
+            Err(fault) => Err(fault),
+        }
+    }
+
+    /// Sets the module's watchdog as the table has it. The module keeps it over power-off, so it is written only when it differs.
+    fn set_watchdog(&mut self) -> Result<(), Fault> {
+        let Some(wanted) = self.table.watchdog_ms else { return Ok(()) };
+        match self.watchdog()? {
+            None => tracing::warn!("the module has no watchdog: if this process is killed, the motor is not stopped"),
+            Some(now) if now.as_millis() == u128::from(wanted) => {}
+            Some(_) => {
+                self.guard.ask(&Request::set_global(self.table.address, tmcl::WATCHDOG, i32::from(wanted)))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn sweep_all(&mut self, sweep: &Sweep, start: Instant, seen: &mut dyn FnMut(Position)) -> Result<usize, Fault> {
+        let speed = sweep.speed(&self.table, self.guard.port().settings().round_trip())?;
+        self.set_watchdog()?;
+        for side in [Side::Left, Side::Right] {
+            self.check_limit(side)?;
+        }
+        self.set(axis::LARGEST_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
+        self.set(axis::LARGEST_SPEED, self.table.velocity(self.table.search_speed()))?;
+        self.travel(-sweep.angle / 2.0, self.table.search_speed(), &mut |_, _| {})?;
+        self.set(axis::LARGEST_SPEED, self.table.velocity(speed))?;
+        let mut last = f64::NEG_INFINITY;
+        let volumes = sweep.volumes.unwrap_or(usize::MAX);
+        for pass in 0..volumes {
+            let direction = if pass.is_multiple_of(2) { Direction::Forward } else { Direction::Backward };
+            let end = sweep.angle / 2.0 * direction.sign();
+            self.travel(end, speed, &mut |at, angle| {
+                let time = at.saturating_duration_since(start).as_secs_f64();
+                if time > last {
+                    last = time;
+                    seen(Position { time, angle, direction, pass });
+                }
+            })?;
+        }
+        self.guard.at_rest();
+        Ok(volumes)
+    }
+
+    /// Goes to an angle and watches it get there.
+    fn travel(&mut self, angle: f64, speed: f64, seen: &mut dyn FnMut(Instant, f64)) -> Result<(), Fault> {
+        let target = self.table.position(angle);
+        let begin = self.get(axis::POSITION)?;
+        let from = self.table.angle(begin);
+        let ramps = 2.0 * speed / self.table.acceleration_deg_per_s2;
+        let limit = Duration::from_secs_f64(3.0 + 3.0 * ((angle - from).abs() / speed + ramps));
+        let ahead = if target >= begin { Side::Right } else { Side::Left };
+        self.ask(|a, m| Request::move_to(a, m, target))?;
+        let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
+        for count in 1.. {
+            let asked = Instant::now();
+            let answer = self.ask(|a, m| Request::get_axis(a, m, axis::POSITION))?;
+            if !answer.repeated {
+                seen(answer.at, self.table.angle(answer.value));
+            }
+            if answer.value == target {
+                return Ok(());
+            }
+            if last != Some(answer.value) {
+                (last, moved) = (Some(answer.value), Instant::now());
+            }
+            let still = moved.elapsed() > STILL;
+            if still || usize::is_multiple_of(count, LOOK_AHEAD) {
+                self.check_limit(ahead)?;
+            }
+            if still {
+                self.check_limit(ahead.other())?;
+                return Err(Fault::Stalled { angle: self.table.angle(answer.value) });
+            }
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "the way to the end of the sweep", limit });
+            }
+            std::thread::sleep(PERIOD.saturating_sub(asked.elapsed()));
+        }
+        Ok(())
+    }
+
+    pub(super) fn limit_closed(&mut self, side: Side) -> Result<bool, Fault> {
+        let switch = if side == Side::Left { axis::LEFT_LIMIT } else { axis::RIGHT_LIMIT };
+        Ok(self.get(switch)? != 0)
+    }
+
+    fn check_limit(&mut self, side: Side) -> Result<(), Fault> {
+        if self.limit_closed(side)? {
+            let position = self.get(axis::POSITION)?;
+            return Err(Fault::LimitSwitch { side, angle: self.table.angle(position) });
+        }
+        Ok(())
+    }
+
+    pub(super) fn at_home_switch(&mut self) -> Result<bool, Fault> {
+        Ok((self.get(axis::HOME_SWITCH)? != 0) != self.table.home_inverted)
+    }
+
+    /// Waits until the motor stands, 5 s at most.
+    pub(super) fn wait_still(&mut self) -> Result<(), Fault> {
+        let (start, limit) = (Instant::now(), Duration::from_secs(5));
+        while self.get(axis::SPEED)? != 0 {
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "slowing down", limit });
+            }
+            std::thread::sleep(PERIOD);
+        }
+        Ok(())
+    }
+}

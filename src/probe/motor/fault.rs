@@ -1,0 +1,76 @@
+//! What can go wrong with the motor, and whether it was stopped: one line that says what, where and what to do.
+
+use super::table::Side;
+use super::tmcl::status_words;
+use std::time::Duration;
+
+/// One fault, with what to do about it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    #[error("the port cannot be opened: {0}; take one that `echolume probe ports` lists and nothing else uses")]
+    NotOpened(String),
+    #[error(
+        "no reply to {request} within {timeout:?}; check the module's power, the cable, --baud, --timeout and the address"
+    )]
+    NoReply { request: String, timeout: Duration },
+    #[error("the reply to {request} is damaged: wrong checksum; check the cable, its ground, --baud and --parity")]
+    Checksum { request: String },
+    #[error("the module refuses {request}: status {status}, {}; check the [motor] table", status_words(*.status))]
+    Refused { request: String, status: u8 },
+    #[error("the {} limit switch is closed at {angle:.2} deg; turn the array off it by hand, then run home", .side.name())]
+    LimitSwitch { side: Side, angle: f64 },
+    #[error("the motor has stalled at {angle:.2} deg; free the array or lower the acceleration, then run home")]
+    Stalled { angle: f64 },
+    #[error("the port is gone: {0}; is it unplugged? Plug it in, then run home")]
+    Unplugged(String),
+    #[error("this is the wrong module: {found}, and not {wanted} as the probe file says; check the cable and --port")]
+    WrongModule { found: String, wanted: String },
+    #[error("the home switch was not found within the probe's travel; check the switch, home_inverted and home")]
+    HomeNotFound,
+    #[error("{what} has not ended after {limit:?}; check the speeds in the [motor] table and in the module")]
+    TooLong { what: &'static str, limit: Duration },
+    #[error("interrupted by {0}")]
+    Interrupted(&'static str),
+    /// What was asked is beyond the probe or the module: nothing has moved.
+    #[error("{0}")]
+    OutOfRange(String),
+}
+
+/// What became of the motor after a fault.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// It was never set in motion.
+    NotMoved,
+    /// The module has confirmed it.
+    Confirmed,
+    /// The port took the command to stop, but the module has not confirmed it: why.
+    Unconfirmed(String),
+    /// Not even the command could be sent: why.
+    Failed(String),
+}
+
+/// A fault, where it occurred, and what became of the motor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotorError {
+    pub port: String,
+    /// What was being done: "sweep", "home" ...
+    pub doing: &'static str,
+    pub fault: Fault,
+    pub stopped: Stopped,
+}
+
+impl std::error::Error for MotorError {}
+
+impl std::fmt::Display for MotorError {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}: {}: {}", self.port, self.doing, self.fault)?;
+        match &self.stopped {
+            Stopped::NotMoved => Ok(()),
+            Stopped::Confirmed => write!(f, ". The motor was stopped"),
+            Stopped::Unconfirmed(why) => {
+                write!(f, ". The motor was told to stop but has not confirmed it ({why}): if it turns, cut its power")
+            }
+            Stopped::Failed(why) => write!(f, ". The motor could not be stopped: {why}: cut its power"),
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! What stops the motor whatever happens: on drop, and so on an early return or a panic, and on SIGINT, SIGTERM and SIGHUP.
+//!
+//! A process that is killed outright (SIGKILL) or whose machine fails cannot do that: only the module's own watchdog can,
+//! see [`super::tmcl::WATCHDOG`].
+
+use super::fault::{Fault, MotorError, Stopped};
+use super::port::{Answer, Port};
+use super::table::MotorTable;
+use super::tmcl::{LENGTH, Request, SUCCESS, command};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
+
+#[cfg(unix)]
+const SIGNALS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
+#[cfg(not(unix))]
+const SIGNALS: &[i32] = &[SIGINT, SIGTERM];
+
+/// The process' signal handlers, registered once.
+struct Handlers {
+    /// The number of the last signal; 0: none.
+    received: Arc<AtomicUsize>,
+    /// Nobody holds the signals: they do what they do by default.
+    unheld: Arc<AtomicBool>,
+    holders: Mutex<usize>,
+}
+
+fn handlers() -> &'static Handlers {
+    static HANDLERS: OnceLock<Handlers> = OnceLock::new();
+    HANDLERS.get_or_init(|| {
+        let (received, unheld) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(true)));
+        for &signal in SIGNALS {
+            let registered = signal_hook::flag::register_conditional_default(signal, unheld.clone())
+                .and_then(|_| signal_hook::flag::register_usize(signal, received.clone(), signal as usize));
+            if let Err(error) = registered {
+                tracing::warn!("signal {signal} cannot be caught and would not stop the motor: {error}");
+            }
+        }
+        Handlers { received, unheld, holders: Mutex::new(0) }
+    })
+}
+
+/// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process but are told by [`Held::signal`].
+#[derive(Debug)]
+pub struct Held(());
+
+impl Held {
+    pub fn take() -> Held {
+        let handlers = handlers();
+        let mut holders = handlers.holders.lock().unwrap_or_else(|e| e.into_inner());
+        if *holders == 0 {
+            handlers.received.store(0, Ordering::SeqCst);
+        }
+        *holders += 1;
+        handlers.unheld.store(false, Ordering::SeqCst);
+        Held(())
+    }
+
+    /// The last signal that came, if any.
+    pub fn signal(&self) -> Option<&'static str> {
+        match handlers().received.load(Ordering::SeqCst) as i32 {
+            0 => None,
+            SIGINT => Some("SIGINT"),
+            SIGTERM => Some("SIGTERM"),
+            _ => Some("SIGHUP"),
+        }
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        let handlers = handlers();
+        let mut holders = handlers.holders.lock().unwrap_or_else(|e| e.into_inner());
+        *holders -= 1;
+        handlers.unheld.store(*holders == 0, Ordering::SeqCst);
+    }
+}
+
+/// The only way to the module: whatever may set the motor in motion goes through it, so it knows what has to be stopped.
+pub struct Guard {
+    port: Port,
+    address: u8,
+    motor: u8,
+    /// The motor may be in motion.
+    moving: bool,
+    /// The module may be looking for its reference.
+    searching: bool,
+    held: Held,
+}
+
+impl Guard {
+    pub fn new(port: Port, table: &MotorTable) -> Guard {
+        Guard { port, address: table.address, motor: table.motor, moving: false, searching: false, held: Held::take() }
+    }
+
+    /// Sends a request; see [`Port::ask`].
+    ///
+    /// # Errors
+    /// Those of [`Port::ask`], and [`Fault::Interrupted`] once a signal has come.
+    pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
+        self.interrupted()?;
+        // Before it is sent: what was not answered may have been carried out.
+        self.moving |= request.moves();
+        self.searching |= request.moves() && request.command == command::REFERENCE_SEARCH;
+        self.port.ask(request)
+    }
+
+    /// See [`Port::ask_raw`].
+    ///
+    /// # Errors
+    /// As [`Guard::ask`].
+    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+        self.interrupted()?;
+        self.port.ask_raw(request)
+    }
+
+    /// # Errors
+    /// [`Fault::Interrupted`] once a signal has come.
+    pub fn interrupted(&self) -> Result<(), Fault> {
+        self.held.signal().map_or(Ok(()), |signal| Err(Fault::Interrupted(signal)))
+    }
+
+    pub fn port(&self) -> &Port {
+        &self.port
+    }
+
+    /// The motor may be in motion.
+    pub fn moving(&self) -> bool {
+        self.moving
+    }
+
+    /// The motor has come to rest by itself where it was sent.
+    pub fn at_rest(&mut self) {
+        (self.moving, self.searching) = (false, false);
+    }
+
+    /// Stops the motor, and a search, signal or not: each command is sent up to three times until the module confirms it.
+    pub fn stop(&mut self) -> Stopped {
+        // What is still on its way is no answer to MST: no waiting for it.
+        self.port.hurry();
+        let stop = Request::stop(self.address, self.motor);
+        let mut told = self.port.ask(&stop);
+        if self.searching && !matches!(told, Err(Fault::Unplugged(_))) {
+            // Some modules go on with a reference search after MST alone.
+            told = self.port.ask(&Request::search_stop(self.address, self.motor)).and_then(|_| self.port.ask(&stop));
+        }
+        match told {
+            Ok(_) => {
+                (self.moving, self.searching) = (false, false);
+                Stopped::Confirmed
+            }
+            Err(fault @ Fault::Unplugged(_)) => Stopped::Failed(why(&fault)),
+            Err(fault) => Stopped::Unconfirmed(why(&fault)),
+        }
+    }
+
+    /// Stops the motor after a fault and says so.
+    pub fn fail(&mut self, doing: &'static str, fault: Fault) -> MotorError {
+        // A motor that was not moved from here is stopped all the same: another program may have left it turning.
+        let harmless = matches!(fault, Fault::OutOfRange(_)) && !self.moving;
+        let stopped = if harmless { Stopped::NotMoved } else { self.stop() };
+        // It was tried three times: once more on drop would only take longer.
+        self.moving = false;
+        MotorError { port: self.port.settings().path.clone(), doing, fault, stopped }
+    }
+}
+
+/// A fault of stopping, without the advice.
+fn why(fault: &Fault) -> String {
+    match fault {
+        Fault::NoReply { .. } => "it does not answer".into(),
+        Fault::Checksum { .. } => "its answers are damaged".into(),
+        Fault::Refused { request, status } if *status != SUCCESS => {
+            format!("it answers {request} with status {status}")
+        }
+        Fault::Unplugged(error) => format!("the port is gone ({error})"),
+        other => other.to_string(),
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        if self.moving {
+            let stopped = self.stop();
+            if stopped != Stopped::Confirmed {
+                tracing::error!("{}: the motor is not known to have stopped: {stopped:?}", self.port.settings().path);
+            }
+        }
+    }
+}

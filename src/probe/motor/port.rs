@@ -1,0 +1,242 @@
+//! One TMCL module behind a serial port: requests and replies, with a time-out on everything.
+//!
+//! A TMCL reply names its command but not the parameter, so an answer that comes too late could be taken for the answer to
+//! the next question. Therefore whatever lies in the port is thrown away before a request, and after a time-out also what
+//! still arrives. Only requests that do no harm twice are sent again ([`Request::repeatable`]).
+
+use super::fault::Fault;
+use super::tmcl::{LENGTH, Reply, Request, SUCCESS};
+use serialport::{ClearBuffer, SerialPort};
+use std::io::{self, ErrorKind};
+use std::time::{Duration, Instant};
+
+pub use serialport::{Parity, StopBits};
+
+/// How often a repeatable request is sent at most.
+const TRIES: usize = 3;
+
+/// How to reach the module. TMCL modules come with 9600 baud, no parity, one stop bit.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// `/dev/ttyUSB0`, `COM3`.
+    pub path: String,
+    /// Bits a second.
+    pub baud: u32,
+    pub parity: Parity,
+    pub stop_bits: StopBits,
+    /// Longest wait for one reply.
+    pub timeout: Duration,
+}
+
+impl Settings {
+    pub fn new(path: impl Into<String>) -> Settings {
+        Settings {
+            path: path.into(),
+            baud: 9600,
+            parity: Parity::None,
+            stop_bits: StopBits::One,
+            timeout: Duration::from_millis(500),
+        }
+    }
+
+    /// Time that a request and its reply are on the wire at least.
+    pub fn round_trip(&self) -> Duration {
+        let parity = u32::from(self.parity != Parity::None);
+        let stop = if self.stop_bits == StopBits::Two { 2 } else { 1 };
+        Duration::from_secs_f64(f64::from((9 + parity + stop) * 2 * LENGTH as u32) / f64::from(self.baud.max(1)))
+    }
+}
+
+/// A successful reply.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    pub value: i32,
+    /// Half way between the request and its reply.
+    pub at: Instant,
+    /// Needed more than one try: `at` may belong to another reply than `value`.
+    pub repeated: bool,
+}
+
+/// An open serial port.
+pub struct Port {
+    serial: Box<dyn SerialPort>,
+    settings: Settings,
+    /// An earlier reply may still be on its way.
+    late: bool,
+}
+
+impl Port {
+    /// Opens the port for this process alone.
+    ///
+    /// # Errors
+    /// [`Fault::NotOpened`].
+    pub fn open(settings: &Settings) -> Result<Port, Fault> {
+        let builder = serialport::new(&settings.path, settings.baud)
+            .parity(settings.parity)
+            .stop_bits(settings.stop_bits)
+            .timeout(settings.timeout);
+        let serial = builder.open().map_err(|e| Fault::NotOpened(e.to_string()))?;
+        Ok(Port { serial, settings: settings.clone(), late: false })
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Sends a request and waits for its reply.
+    ///
+    /// # Errors
+    /// [`Fault::NoReply`], [`Fault::Checksum`] after three tries of a repeatable request and one of any other;
+    /// [`Fault::Refused`]; [`Fault::Unplugged`].
+    pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
+        let tries = if request.repeatable() { TRIES } else { 1 };
+        let mut fault = None;
+        for attempt in 0..tries {
+            match self.ask_once(request) {
+                Ok((reply, at)) if reply.status == SUCCESS => {
+                    // It may be the answer to an earlier try, and that to the last still be on its way.
+                    self.late |= attempt > 0;
+                    return Ok(Answer { value: reply.value, at, repeated: attempt > 0 });
+                }
+                // Status 1: it has understood nothing and done nothing.
+                Ok((reply, _)) => fault = Some(Fault::Refused { request: request.to_string(), status: reply.status }),
+                Err(gone @ Fault::Unplugged(_)) => return Err(gone),
+                Err(other) => fault = Some(other),
+            }
+            if matches!(fault, Some(Fault::Refused { status, .. }) if status != 1) {
+                break;
+            }
+            tracing::debug!("{}: try {} of {request}: {fault:?}", self.settings.path, attempt + 1);
+        }
+        Err(fault.unwrap_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout }))
+    }
+
+    /// Sends a request whose nine bytes of reply have no checksum, and gives them as they are.
+    ///
+    /// # Errors
+    /// [`Fault::NoReply`], [`Fault::Unplugged`].
+    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+        let mut received = self.send(request)?;
+        let until = Instant::now() + self.settings.timeout;
+        while received.len() < LENGTH && self.receive(&mut received, until)? {}
+        self.late = received.len() < LENGTH;
+        let bytes = received.get(..LENGTH).and_then(|b| b.try_into().ok());
+        bytes.ok_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout })
+    }
+
+    /// Lets the next request go out at once, even if an earlier reply may still be on its way.
+    pub fn hurry(&mut self) {
+        self.late = false;
+    }
+
+    fn ask_once(&mut self, request: &Request) -> Result<(Reply, Instant), Fault> {
+        let sent = Instant::now();
+        let mut received = self.send(request)?;
+        let until = Instant::now() + self.settings.timeout;
+        loop {
+            if let Some(reply) = Reply::find(&received, request) {
+                let answered = Instant::now();
+                return Ok((reply, sent + (answered - sent) / 2));
+            }
+            // Noise may come before the reply, but not for ever.
+            if received.len() > 64 * LENGTH || !self.receive(&mut received, until)? {
+                break;
+            }
+        }
+        self.late = true;
+        if received.len() < LENGTH {
+            return Err(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout });
+        }
+        Err(Fault::Checksum { request: request.to_string() })
+    }
+
+    /// Sends a request into a quiet line.
+    fn send(&mut self, request: &Request) -> Result<Vec<u8>, Fault> {
+        if self.late {
+            self.drain()?;
+        }
+        self.serial.clear(ClearBuffer::Input).map_err(gone)?;
+        let until = Instant::now() + self.settings.timeout;
+        let bytes = request.bytes();
+        let mut left = &bytes[..];
+        while !left.is_empty() {
+            match self.timed(until, |port| port.write(left))? {
+                Some(written) if written > 0 => left = &left[written..],
+                _ => return Err(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout }),
+            }
+        }
+        Ok(Vec::with_capacity(2 * LENGTH))
+    }
+
+    /// Waits for more bytes until a time; whether there were any. Once a whole reply's worth has come, a pause ends it.
+    fn receive(&mut self, received: &mut Vec<u8>, until: Instant) -> Result<bool, Fault> {
+        let pause = (self.settings.round_trip() + Duration::from_millis(40)).min(self.settings.timeout);
+        let until = if received.len() < LENGTH { until } else { until.min(Instant::now() + pause) };
+        let mut bytes = [0; 64];
+        match self.timed(until, |port| port.read(&mut bytes))? {
+            Some(0) => Err(Fault::Unplugged("end of file".into())),
+            Some(n) => {
+                received.extend_from_slice(&bytes[..n]);
+                Ok(true)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// Throws away what still arrives, until nothing has for one time-out, for three at most.
+    fn drain(&mut self) -> Result<(), Fault> {
+        let start = Instant::now();
+        let mut bytes = [0; 64];
+        while start.elapsed() < 3 * self.settings.timeout {
+            let until = Instant::now() + self.settings.timeout;
+            match self.timed(until, |port| port.read(&mut bytes))? {
+                Some(0) => return Err(Fault::Unplugged("end of file".into())),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        self.late = false;
+        Ok(())
+    }
+
+    /// Reads or writes by a time; nothing if that has passed.
+    fn timed(
+        &mut self,
+        until: Instant,
+        mut act: impl FnMut(&mut dyn SerialPort) -> io::Result<usize>,
+    ) -> Result<Option<usize>, Fault> {
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            self.serial.set_timeout(left).map_err(gone)?;
+            match act(&mut *self.serial) {
+                Ok(count) => return Ok(Some(count)),
+                Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => return Ok(None),
+                // A signal: whoever asked for it is told elsewhere.
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(Fault::Unplugged(e.to_string())),
+            }
+        }
+    }
+}
+
+fn gone(error: serialport::Error) -> Fault {
+    Fault::Unplugged(error.to_string())
+}
+
+/// The serial ports of this machine, each with what is known about it.
+///
+/// # Errors
+/// In words, where the system cannot list them.
+pub fn list() -> Result<Vec<(String, String)>, String> {
+    let ports = serialport::available_ports().map_err(|e| format!("the serial ports cannot be listed: {e}"))?;
+    let about = |kind| match kind {
+        serialport::SerialPortType::UsbPort(usb) => {
+            let words: Vec<String> = [usb.manufacturer, usb.product].into_iter().flatten().collect();
+            format!("USB {:04x}:{:04x} {}", usb.vid, usb.pid, words.join(" ")).trim_end().to_string()
+        }
+        serialport::SerialPortType::PciPort => "built in".to_string(),
+        serialport::SerialPortType::BluetoothPort => "Bluetooth".to_string(),
+        serialport::SerialPortType::Unknown => "of unknown kind".to_string(),
+    };
+    Ok(ports.into_iter().map(|p| (p.port_name, about(p.port_type))).collect())
+}

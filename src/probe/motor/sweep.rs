@@ -1,0 +1,160 @@
+//! A sweep: how fast it has to be, and where the array was at any time, from the positions that were read: each frame's
+//! angle and direction. Pure.
+
+use super::drive::PERIOD;
+use super::fault::Fault;
+use super::table::MotorTable;
+use std::time::Duration;
+
+/// A sweep to be done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// From end to end, degrees; the middle is 0.
+    pub angle: f64,
+    /// Passes over the angle, and so volumes, a second.
+    pub rate: f64,
+    /// Passes; without a number until interrupted.
+    pub volumes: Option<usize>,
+}
+
+impl Sweep {
+    /// Speed, degrees a second, of the middle of a pass between the table's ramps. `round_trip`: of a request and its reply.
+    ///
+    /// # Errors
+    /// [`Fault::OutOfRange`] naming the limit.
+    pub fn speed(&self, table: &MotorTable, round_trip: Duration) -> Result<f64, Fault> {
+        let Sweep { angle, rate, volumes } = *self;
+        let refuse = |fault: String| Err(Fault::OutOfRange(fault));
+        if !(angle > 0.0 && angle <= table.largest_angle_deg) {
+            return refuse(format!(
+                "--angle {angle}: must be above 0, up to the probe's {} deg",
+                table.largest_angle_deg
+            ));
+        }
+        if !(rate > 0.0 && rate <= table.largest_rate) {
+            return refuse(format!(
+                "--rate {rate}: must be above 0, up to the probe's {} volumes/s",
+                table.largest_rate
+            ));
+        }
+        if volumes == Some(0) {
+            return refuse("--volumes 0: must be at least 1".into());
+        }
+        // At the turn: the end is noticed, and the way back is asked for.
+        let turn = 2.5 * round_trip.max(PERIOD).as_secs_f64();
+        let (time, acceleration) = (1.0 / rate - turn, table.acceleration_deg_per_s2);
+        // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2.
+        let least = (4.0 * angle / acceleration).sqrt();
+        if time < least {
+            return refuse(format!(
+                "--rate {rate}: over {angle} deg at {acceleration} deg/s2 at most {:.2} volumes/s can be done",
+                1.0 / (least + turn)
+            ));
+        }
+        let at = acceleration * time;
+        let speed = (at - (at * at - 4.0 * acceleration * angle).max(0.0).sqrt()) / 2.0;
+        if speed > table.largest_speed_deg_per_s {
+            let most = table.largest_speed_deg_per_s;
+            return refuse(format!(
+                "--rate {rate}: over {angle} deg takes {speed:.1} deg/s, and the probe's largest is {most}"
+            ));
+        }
+        Ok(speed)
+    }
+}
+
+/// The way of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Towards larger angles.
+    Forward,
+    Backward,
+}
+
+impl Direction {
+    /// 1 forwards, -1 backwards.
+    pub fn sign(self) -> f64 {
+        if self == Direction::Forward { 1.0 } else { -1.0 }
+    }
+
+    pub fn name(self) -> &'static str {
+        if self == Direction::Forward { "forward" } else { "backward" }
+    }
+}
+
+/// One position that was read during a sweep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Position {
+    /// Seconds, of any clock that all positions and frames share.
+    pub time: f64,
+    /// Degrees.
+    pub angle: f64,
+    /// Of the pass that it belongs to.
+    pub direction: Direction,
+    /// Number of the pass, from 0.
+    pub pass: usize,
+}
+
+/// Where a frame lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// Within a pass.
+    Pass { angle: f64, direction: Direction, pass: usize },
+    /// Near a turning point: the angle is between those of two passes, the direction is not known.
+    Turning { angle: f64 },
+    /// Before the first or after the last position, or within a gap.
+    Outside,
+}
+
+/// Positions over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    positions: Vec<Position>,
+    longest_gap: f64,
+}
+
+impl Track {
+    /// Positions in order of time. Two that lie further apart than `longest_gap` seconds have nothing known between them.
+    ///
+    /// # Errors
+    /// In words, when a time or an angle is not finite, the times do not rise, or the gap is not above 0.
+    pub fn new(positions: Vec<Position>, longest_gap: f64) -> Result<Track, String> {
+        if let Some(at) = positions.iter().position(|p| !p.time.is_finite() || !p.angle.is_finite()) {
+            return Err(format!("position {at} is not finite"));
+        }
+        if let Some(at) = positions.windows(2).position(|w| w[1].time <= w[0].time) {
+            return Err(format!("the time of position {} does not rise", at + 1));
+        }
+        if longest_gap.is_nan() || longest_gap <= 0.0 {
+            return Err(format!("a longest gap of {longest_gap} s is not above 0"));
+        }
+        Ok(Track { positions, longest_gap })
+    }
+
+    pub fn positions(&self) -> &[Position] {
+        &self.positions
+    }
+
+    /// Where the array was at a time, linearly between the two positions around it. The error is at most a dt^2 / 8 for an
+    /// acceleration a and positions dt apart: 0.1 deg for 8000 deg/s2 and 10 ms.
+    pub fn at(&self, time: f64) -> Place {
+        let after = self.positions.partition_point(|p| p.time < time);
+        let Some(b) = self.positions.get(after) else { return Place::Outside };
+        if b.time == time {
+            return Place::Pass { angle: b.angle, direction: b.direction, pass: b.pass };
+        }
+        let Some(a) = after.checked_sub(1).and_then(|i| self.positions.get(i)) else { return Place::Outside };
+        let gap = b.time - a.time;
+        if gap.is_nan() || gap > self.longest_gap || time.is_nan() {
+            return Place::Outside;
+        }
+        let angle = a.angle + (b.angle - a.angle) * ((time - a.time) / gap);
+        // Against the direction of its pass the array only swings.
+        let along = (b.angle - a.angle) * a.direction.sign() > 0.0;
+        if a.pass == b.pass && along {
+            Place::Pass { angle, direction: a.direction, pass: a.pass }
+        } else {
+            Place::Turning { angle }
+        }
+    }
+}

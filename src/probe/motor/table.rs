@@ -1,0 +1,251 @@
+//! The `[motor]` table of a probe file, and what its numbers make of degrees. Angles are those of the sweep, in degrees: 0 in
+//! the middle, rising forwards.
+
+use serde::Deserialize;
+
+/// Clock of the motion controllers whose velocities are not in microsteps a second, Hz.
+const TMC429_CLOCK: f64 = 16e6;
+
+/// How the motor finds the place that its positions count from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Home {
+    /// By the module's own search (RFS), in the mode that is set in the module.
+    #[default]
+    ReferenceSearch,
+    /// By turning until the home switch closes, and slowly back until it opens: there is home.
+    Switch,
+}
+
+/// Where the home switch is looked for first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Towards smaller positions of the module.
+    #[default]
+    Left,
+    Right,
+}
+
+impl Side {
+    pub fn other(self) -> Side {
+        if self == Side::Left { Side::Right } else { Side::Left }
+    }
+
+    pub fn name(self) -> &'static str {
+        if self == Side::Left { "left" } else { "right" }
+    }
+}
+
+/// What the module's velocities and accelerations count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Units {
+    /// Microsteps a second, and a second squared.
+    #[default]
+    Pps,
+    /// 0 to 2047, scaled by the pulse and the ramp divisor (axis parameters 154 and 153).
+    Tmc429,
+}
+
+/// The `[motor]` table of a probe file. `tests/motor/probe.toml` is a commented example.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotorTable {
+    /// Full steps of the motor a turn, 4 to 10000.
+    pub steps_per_turn: u32,
+    /// Microsteps of a full step, as set in the module: 1, 2, 4 ... 256.
+    pub microsteps: u32,
+    /// Turns of the motor for one of the array, 0.001 to 10000.
+    pub gear: f64,
+    /// Rising positions turn the array backwards.
+    #[serde(default)]
+    pub reversed: bool,
+    /// The module's address, 1 to 255.
+    #[serde(default = "one")]
+    pub address: u8,
+    /// The axis of the module, 0 to 5.
+    #[serde(default)]
+    pub motor: u8,
+    /// Number that the firmware gives (1140 of a TMCM-1140); without it any TMCL module will do.
+    pub module: Option<u16>,
+    #[serde(default)]
+    pub home: Home,
+    #[serde(default)]
+    pub home_direction: Side,
+    /// The home switch reads 0 when it is closed.
+    #[serde(default)]
+    pub home_inverted: bool,
+    /// Where home lies in the sweep, degrees.
+    #[serde(default)]
+    pub home_angle_deg: f64,
+    /// Speed of the search for home, degrees a second; without it the module's own (reference search) or 10 (switch).
+    pub search_speed_deg_per_s: Option<f64>,
+    /// Largest sweep from end to end that the probe allows, degrees, up to 360.
+    pub largest_angle_deg: f64,
+    /// Most sweeps (volumes) a second that the probe allows, up to 100.
+    pub largest_rate: f64,
+    /// Largest speed that the motor follows, degrees a second.
+    pub largest_speed_deg_per_s: f64,
+    /// Of the ramps; what the motor follows under its load. Degrees a second squared.
+    pub acceleration_deg_per_s2: f64,
+    #[serde(default)]
+    pub units: Units,
+    /// For `units = 'tmc429'`, as set in the module, 0 to 13.
+    #[serde(default)]
+    pub pulse_divisor: u8,
+    #[serde(default)]
+    pub ramp_divisor: u8,
+    /// The module's own watchdog, 100 to 65535 ms: stops the motor when no command came for so long. 0: is switched off.
+    /// Left out: stays as it is in the module.
+    pub watchdog_ms: Option<u16>,
+}
+
+fn one() -> u8 {
+    1
+}
+
+impl Default for MotorTable {
+    /// Of the simulated module: a motor of 200 steps, 16 microsteps, geared 12 to 1.
+    fn default() -> MotorTable {
+        MotorTable {
+            steps_per_turn: 200,
+            microsteps: 16,
+            gear: 12.0,
+            reversed: false,
+            address: 1,
+            motor: 0,
+            module: Some(1140),
+            home: Home::ReferenceSearch,
+            home_direction: Side::Left,
+            home_inverted: false,
+            home_angle_deg: 0.0,
+            search_speed_deg_per_s: Some(30.0),
+            largest_angle_deg: 85.0,
+            largest_rate: 5.0,
+            largest_speed_deg_per_s: 600.0,
+            acceleration_deg_per_s2: 8000.0,
+            units: Units::Pps,
+            pulse_divisor: 0,
+            ramp_divisor: 0,
+            watchdog_ms: Some(2000),
+        }
+    }
+}
+
+impl MotorTable {
+    /// The first field that is out of its range, and what is wrong with it.
+    pub fn check(&self) -> Result<(), (&'static str, String)> {
+        let limits = [
+            ("motor.steps_per_turn", f64::from(self.steps_per_turn), 4.0, 1e4),
+            ("motor.microsteps", f64::from(self.microsteps), 1.0, 256.0),
+            ("motor.gear", self.gear, 1e-3, 1e4),
+            ("motor.address", f64::from(self.address), 1.0, 255.0),
+            ("motor.motor", f64::from(self.motor), 0.0, 5.0),
+            ("motor.home_angle_deg", self.home_angle_deg, -180.0, 180.0),
+            ("motor.search_speed_deg_per_s", self.search_speed_deg_per_s.unwrap_or(1.0), 0.01, 1e4),
+            ("motor.largest_angle_deg", self.largest_angle_deg, 0.1, 360.0),
+            ("motor.largest_rate", self.largest_rate, 0.01, 100.0),
+            ("motor.largest_speed_deg_per_s", self.largest_speed_deg_per_s, 0.01, 1e5),
+            ("motor.acceleration_deg_per_s2", self.acceleration_deg_per_s2, 0.01, 1e7),
+            ("motor.pulse_divisor", f64::from(self.pulse_divisor), 0.0, 13.0),
+            ("motor.ramp_divisor", f64::from(self.ramp_divisor), 0.0, 13.0),
+            ("motor.watchdog_ms", f64::from(self.watchdog_ms.filter(|ms| *ms > 0).unwrap_or(100)), 100.0, 65535.0),
+        ];
+        for (field, value, least, most) in limits {
+            if !(least..=most).contains(&value) {
+                return Err((field, format!("is {value}, must be {least} to {most}")));
+            }
+        }
+        if !self.microsteps.is_power_of_two() {
+            return Err(("motor.microsteps", format!("is {}, must be 1, 2, 4 ... 256", self.microsteps)));
+        }
+        if self.search_speed_deg_per_s.is_some_and(|s| s > self.largest_speed_deg_per_s) {
+            return Err(("motor.search_speed_deg_per_s", "is above largest_speed_deg_per_s".into()));
+        }
+        let registers = [
+            ("motor.largest_speed_deg_per_s", self.speed_register(self.largest_speed_deg_per_s)),
+            ("motor.acceleration_deg_per_s2", self.acceleration_register(self.acceleration_deg_per_s2)),
+            ("motor.search_speed_deg_per_s", self.speed_register(self.search_speed())),
+        ];
+        for (field, register) in registers {
+            // The largest pps values are those of the modules' own ramp generators, 2^24 - 1.
+            let most = if self.units == Units::Tmc429 { 2047.0 } else { 16_777_215.0 };
+            if !(1.0..=most).contains(&register) {
+                return Err((field, format!("makes {register:.1} in the module, which takes 1 to {most}")));
+            }
+        }
+        // One microstep is the finest that a position can say; the ends of the widest sweep must still be an i32.
+        if self.largest_angle_deg * self.steps_per_degree() < 2.0 || self.steps_per_degree() > 4e6 {
+            return Err(("motor.gear", format!("makes {} microsteps a degree", self.steps_per_degree())));
+        }
+        Ok(())
+    }
+
+    /// Microsteps of the motor a degree of the array.
+    pub fn steps_per_degree(&self) -> f64 {
+        f64::from(self.steps_per_turn) * f64::from(self.microsteps) * self.gear / 360.0
+    }
+
+    /// The module's position, in microsteps from home, nearest to an angle in degrees. Saturates.
+    pub fn position(&self, angle: f64) -> i32 {
+        ((angle - self.home_angle_deg) * self.steps_per_degree() * self.sign()).round() as i32
+    }
+
+    /// The angle, in degrees, of a position in microsteps.
+    pub fn angle(&self, position: i32) -> f64 {
+        f64::from(position) * self.sign() / self.steps_per_degree() + self.home_angle_deg
+    }
+
+    fn sign(&self) -> f64 {
+        if self.reversed { -1.0 } else { 1.0 }
+    }
+
+    /// Degrees a second of the search for home.
+    pub fn search_speed(&self) -> f64 {
+        self.search_speed_deg_per_s.unwrap_or(self.largest_speed_deg_per_s.min(10.0))
+    }
+
+    fn speed_register(&self, speed: f64) -> f64 {
+        speed * self.steps_per_degree() * self.speed_scale()
+    }
+
+    fn acceleration_register(&self, acceleration: f64) -> f64 {
+        acceleration * self.steps_per_degree() * self.acceleration_scale()
+    }
+
+    /// The module's units of one microstep a second.
+    pub fn speed_scale(&self) -> f64 {
+        match self.units {
+            Units::Pps => 1.0,
+            // TMC429 data sheet: v = clock * velocity / (2^pulse_divisor * 2048 * 32).
+            Units::Tmc429 => 2f64.powi(i32::from(self.pulse_divisor) + 16) / TMC429_CLOCK,
+        }
+    }
+
+    /// The module's units of one microstep a second squared.
+    pub fn acceleration_scale(&self) -> f64 {
+        match self.units {
+            Units::Pps => 1.0,
+            // TMC429 data sheet: a = clock^2 * acceleration / 2^(pulse_divisor + ramp_divisor + 29).
+            Units::Tmc429 => {
+                2f64.powi(i32::from(self.pulse_divisor) + i32::from(self.ramp_divisor) + 29) / TMC429_CLOCK.powi(2)
+            }
+        }
+    }
+
+    /// A speed in degrees a second as the module's velocity, at least 1.
+    pub fn velocity(&self, speed: f64) -> i32 {
+        (self.speed_register(speed).round() as i32).max(1)
+    }
+
+    /// A velocity of the module in degrees a second.
+    pub fn speed(&self, velocity: i32) -> f64 {
+        f64::from(velocity) / self.speed_scale() / self.steps_per_degree() * self.sign()
+    }
+
+    /// An acceleration in degrees a second squared in the module's units, at least 1.
+    pub fn acceleration(&self, acceleration: f64) -> i32 {
+        (self.acceleration_register(acceleration).round() as i32).max(1)
+    }
+}

@@ -1,0 +1,265 @@
+//! TMCL, Trinamic's binary serial protocol: nine bytes there, nine bytes back. Nothing here touches a port.
+//!
+//! A request is {address, command, type, motor or bank, value as big-endian i32, checksum}, a reply {host, module, status,
+//! command, value as big-endian i32, checksum}; the checksum is the sum of the first eight bytes modulo 256. Source: the
+//! TMCL firmware manuals of the TMCM modules, chapters "Binary command format" and "Reply format".
+
+/// Bytes of a request and of a reply.
+pub const LENGTH: usize = 9;
+
+/// Numbers of the commands.
+pub mod command {
+    pub const ROTATE_RIGHT: u8 = 1;
+    pub const ROTATE_LEFT: u8 = 2;
+    pub const STOP: u8 = 3;
+    pub const MOVE_TO: u8 = 4;
+    pub const SET_AXIS: u8 = 5;
+    pub const GET_AXIS: u8 = 6;
+    pub const SET_GLOBAL: u8 = 9;
+    pub const GET_GLOBAL: u8 = 10;
+    pub const REFERENCE_SEARCH: u8 = 13;
+    pub const GET_INPUT: u8 = 15;
+    pub const VERSION: u8 = 136;
+}
+
+/// Numbers of the axis parameters: positions in microsteps, speeds and accelerations in the module's own units.
+pub mod axis {
+    pub const TARGET: u8 = 0;
+    pub const POSITION: u8 = 1;
+    pub const TARGET_SPEED: u8 = 2;
+    pub const SPEED: u8 = 3;
+    pub const LARGEST_SPEED: u8 = 4;
+    pub const LARGEST_ACCELERATION: u8 = 5;
+    pub const REACHED: u8 = 8;
+    pub const HOME_SWITCH: u8 = 9;
+    pub const RIGHT_LIMIT: u8 = 10;
+    pub const LEFT_LIMIT: u8 = 11;
+    pub const SEARCH_MODE: u8 = 193;
+    pub const SEARCH_SPEED: u8 = 194;
+    pub const SWITCH_SPEED: u8 = 195;
+}
+
+/// The global parameter (bank 0) of the module's own watchdog, the "serial heartbeat": milliseconds without a command after
+/// which the module stops its motors; 0 is off.
+pub const WATCHDOG: u8 = 68;
+
+/// What a reply says when all went well.
+pub const SUCCESS: u8 = 100;
+
+/// A status code in words.
+pub fn status_words(status: u8) -> &'static str {
+    match status {
+        SUCCESS => "carried out",
+        101 => "stored in the module's program instead of carried out",
+        1 => "it received a wrong checksum",
+        2 => "it does not know this command",
+        3 => "it does not know this parameter",
+        4 => "the value is out of its range",
+        5 => "its configuration memory is locked",
+        6 => "the command is not available at present",
+        128 => "the target was reached, which nobody asked",
+        _ => "a status that no TMCL manual lists",
+    }
+}
+
+/// The sum of bytes modulo 256.
+pub fn checksum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |sum, b| sum.wrapping_add(*b))
+}
+
+/// One request, whatever its command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// The module's, 1 to 255.
+    pub address: u8,
+    pub command: u8,
+    /// What the command is about: a parameter's number, or how to move.
+    pub kind: u8,
+    /// The axis, or of global parameters and inputs the bank.
+    pub motor: u8,
+    pub value: i32,
+}
+
+impl Request {
+    fn new(address: u8, motor: u8, command: u8, kind: u8, value: i32) -> Request {
+        Request { address, command, kind, motor, value }
+    }
+
+    /// ROR: turns right, towards larger positions, until told otherwise. `velocity` in the module's units.
+    pub fn rotate_right(address: u8, motor: u8, velocity: i32) -> Request {
+        Request::new(address, motor, command::ROTATE_RIGHT, 0, velocity)
+    }
+
+    /// ROL: turns left, towards smaller positions, until told otherwise.
+    pub fn rotate_left(address: u8, motor: u8, velocity: i32) -> Request {
+        Request::new(address, motor, command::ROTATE_LEFT, 0, velocity)
+    }
+
+    /// MST: slows down to a stop.
+    pub fn stop(address: u8, motor: u8) -> Request {
+        Request::new(address, motor, command::STOP, 0, 0)
+    }
+
+    /// MVP ABS: goes to a position in microsteps.
+    pub fn move_to(address: u8, motor: u8, position: i32) -> Request {
+        Request::new(address, motor, command::MOVE_TO, 0, position)
+    }
+
+    /// MVP REL: goes so many microsteps further.
+    pub fn move_by(address: u8, motor: u8, distance: i32) -> Request {
+        Request::new(address, motor, command::MOVE_TO, 1, distance)
+    }
+
+    /// SAP, see [`axis`].
+    pub fn set_axis(address: u8, motor: u8, parameter: u8, value: i32) -> Request {
+        Request::new(address, motor, command::SET_AXIS, parameter, value)
+    }
+
+    /// GAP, see [`axis`].
+    pub fn get_axis(address: u8, motor: u8, parameter: u8) -> Request {
+        Request::new(address, motor, command::GET_AXIS, parameter, 0)
+    }
+
+    /// SGP in bank 0, which the module keeps over power-off.
+    pub fn set_global(address: u8, parameter: u8, value: i32) -> Request {
+        Request::new(address, 0, command::SET_GLOBAL, parameter, value)
+    }
+
+    /// GGP in bank 0.
+    pub fn get_global(address: u8, parameter: u8) -> Request {
+        Request::new(address, 0, command::GET_GLOBAL, parameter, 0)
+    }
+
+    /// RFS START: the module looks for its reference by itself.
+    pub fn search_start(address: u8, motor: u8) -> Request {
+        Request::new(address, motor, command::REFERENCE_SEARCH, 0, 0)
+    }
+
+    /// RFS STOP.
+    pub fn search_stop(address: u8, motor: u8) -> Request {
+        Request::new(address, motor, command::REFERENCE_SEARCH, 1, 0)
+    }
+
+    /// RFS STATUS: 0 once no search goes on.
+    pub fn search_status(address: u8, motor: u8) -> Request {
+        Request::new(address, motor, command::REFERENCE_SEARCH, 2, 0)
+    }
+
+    /// GIO: an input of a bank (0 digital, 1 analogue).
+    pub fn get_input(address: u8, bank: u8, input: u8) -> Request {
+        Request::new(address, bank, command::GET_INPUT, input, 0)
+    }
+
+    /// The firmware's version as a number: module in the upper half (0 on modules that leave it out), version below.
+    pub fn version(address: u8) -> Request {
+        Request::new(address, 0, command::VERSION, 1, 0)
+    }
+
+    /// The firmware's version as text, in a reply of its own form: see [`version_text`].
+    pub fn version_text(address: u8) -> Request {
+        Request::new(address, 0, command::VERSION, 0, 0)
+    }
+
+    /// What goes over the wire.
+    pub fn bytes(&self) -> [u8; LENGTH] {
+        let [a, b, c, d] = self.value.to_be_bytes();
+        let mut bytes = [self.address, self.command, self.kind, self.motor, a, b, c, d, 0];
+        bytes[8] = checksum(&bytes[..8]);
+        bytes
+    }
+
+    /// The request in nine bytes, or nothing if their checksum is wrong.
+    pub fn parse(bytes: &[u8; LENGTH]) -> Option<Request> {
+        let [address, command, kind, motor, a, b, c, d, sum] = *bytes;
+        let value = i32::from_be_bytes([a, b, c, d]);
+        (checksum(&bytes[..8]) == sum).then_some(Request { address, command, kind, motor, value })
+    }
+
+    /// Carrying it out may set the motor in motion.
+    pub fn moves(&self) -> bool {
+        match self.command {
+            command::ROTATE_RIGHT | command::ROTATE_LEFT | command::MOVE_TO => true,
+            command::REFERENCE_SEARCH => self.kind == 0,
+            // In the module's position mode the motor follows these two.
+            command::SET_AXIS => [axis::TARGET, axis::POSITION].contains(&self.kind),
+            _ => false,
+        }
+    }
+
+    /// Carrying it out twice does no more than once: reads, and stopping.
+    pub fn repeatable(&self) -> bool {
+        use command::*;
+        match self.command {
+            GET_AXIS | GET_GLOBAL | GET_INPUT | VERSION | STOP => true,
+            REFERENCE_SEARCH => self.kind != 0,
+            _ => false,
+        }
+    }
+}
+
+/// As the manuals write it: `MVP 0, 0, -800`.
+impl std::fmt::Display for Request {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        use command::*;
+        let Request { command, kind, motor, value, .. } = *self;
+        match command {
+            ROTATE_RIGHT => write!(f, "ROR {motor}, {value}"),
+            ROTATE_LEFT => write!(f, "ROL {motor}, {value}"),
+            STOP => write!(f, "MST {motor}"),
+            MOVE_TO => write!(f, "MVP {kind}, {motor}, {value}"),
+            SET_AXIS => write!(f, "SAP {kind}, {motor}, {value}"),
+            GET_AXIS => write!(f, "GAP {kind}, {motor}"),
+            SET_GLOBAL => write!(f, "SGP {kind}, {motor}, {value}"),
+            GET_GLOBAL => write!(f, "GGP {kind}, {motor}"),
+            REFERENCE_SEARCH => write!(f, "RFS {kind}, {motor}"),
+            GET_INPUT => write!(f, "GIO {kind}, {motor}"),
+            VERSION => write!(f, "the request for its version"),
+            other => write!(f, "command {other}, type {kind}"),
+        }
+    }
+}
+
+/// One reply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    pub host: u8,
+    pub module: u8,
+    /// See [`status_words`].
+    pub status: u8,
+    /// Of the request that is answered.
+    pub command: u8,
+    pub value: i32,
+}
+
+impl Reply {
+    /// What goes over the wire.
+    pub fn bytes(&self) -> [u8; LENGTH] {
+        let [a, b, c, d] = self.value.to_be_bytes();
+        let mut bytes = [self.host, self.module, self.status, self.command, a, b, c, d, 0];
+        bytes[8] = checksum(&bytes[..8]);
+        bytes
+    }
+
+    /// The reply in nine bytes, or nothing if their checksum is wrong.
+    pub fn parse(bytes: &[u8; LENGTH]) -> Option<Reply> {
+        let [host, module, status, command, a, b, c, d, sum] = *bytes;
+        let value = i32::from_be_bytes([a, b, c, d]);
+        (checksum(&bytes[..8]) == sum).then_some(Reply { host, module, status, command, value })
+    }
+
+    /// The first reply to this request anywhere in what was received: noise may come before and after it.
+    pub fn find(received: &[u8], request: &Request) -> Option<Reply> {
+        let replies = received.windows(LENGTH).filter_map(|w| Reply::parse(w.try_into().ok()?));
+        let mut ours = replies.filter(|r| r.module == request.address && r.command == request.command);
+        ours.find(|r| r.status != 128)
+    }
+}
+
+/// The module's number and version in a reply to [`Request::version_text`]: the host's address and eight characters such as
+/// `1161V115`, without a checksum. Nothing if this is not what they say.
+pub fn version_text(bytes: &[u8; LENGTH]) -> Option<(u16, String)> {
+    let text = std::str::from_utf8(&bytes[1..]).ok()?.trim_end_matches('\0');
+    let (module, version) = text.split_once(['V', 'v'])?;
+    let plain = !version.is_empty() && version.chars().all(|c| c.is_ascii_digit() || c == '.');
+    plain.then_some((module.parse().ok()?, version.to_string()))
+}
