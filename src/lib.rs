@@ -2,7 +2,7 @@
 //!
 //! The tour, in the order in which a frame travels:
 //!
-//! - [`source`] reads recordings into frames; [`probe`] says where their samples lie in space, in f64.
+//! - [`source`] reads recordings into frames; [`probe`] says where their samples lie in space, in f64, and drives its motor.
 //! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
 //! - [`passes`] declares every compute pass in one place: its slots, parameters, constants, tolerance and f64 reference.
 //!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
