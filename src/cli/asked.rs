@@ -7,14 +7,14 @@ use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene};
 use echolume::source::phantom::{self, Phantom};
 use echolume::source::played::Played;
-use echolume::source::{Frame, Recording, Source};
+use echolume::source::{self, Frame, Source};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The arguments that every command which renders has.
 #[derive(clap::Args)]
 pub struct Asked {
-    /// MetaImage (.mha, .mhd) or Kretz (.vol) file; without one a synthetic fetal head is drawn (preset phantom)
+    /// MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames) file; without one a synthetic fetal head is drawn (preset phantom)
     input: Option<PathBuf>,
     /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
     #[arg(long)]
@@ -97,8 +97,13 @@ impl Asked {
         source.skip_to_volume(self.volume).map_err(input)?;
         let frames = source.frames_per_volume();
         let bar = indicatif::ProgressBar::new(frames as u64).with_message("frames");
+        let mut volume = None;
         for _ in 0..frames {
             let Some(frame) = source.next_frame().map_err(input)? else { break };
+            // A volume that was not acquired to its end is followed by another.
+            if *volume.get_or_insert(frame.volume) != frame.volume {
+                break;
+            }
             each(frame)?;
             bar.inc(1);
         }
@@ -122,7 +127,7 @@ impl Asked {
 
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
         match &self.input {
-            Some(file) => Ok(Box::new(Recording::open(file, self.probe.as_deref()).map_err(input)?)),
+            Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
             None => Ok(Box::new(Played::new(Phantom::new(phantom::Options::default()).map_err(input)?))),
         }
     }

@@ -1,10 +1,12 @@
 //! Positions of the scan lines of a frame, or of the slices of a sweep, along their axis.
 
+use serde::{Deserialize, Serialize};
+
 /// Strictly increasing positions: angles in rad or places in mm, one an index.
 ///
 /// An even axis has the closed inverse `(v - first) / pitch`; a table is inverted by bracketing and interpolating,
 /// which is what uneven Kretz tables need.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Axis {
     Even { first: f64, pitch: f64, count: usize },
     Table(Vec<f64>),

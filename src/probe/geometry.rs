@@ -5,10 +5,11 @@
 
 use super::axis::Axis;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// How the transducer elements lie.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Array {
     /// Elements on an arc of `radius` mm (Ra, apex to face); 0 is a phased array. Lines are angles in rad.
     Curved { radius: f64 },
@@ -17,7 +18,7 @@ pub enum Array {
 }
 
 /// How the frames of a sweep lie to one another.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
     /// The array turns about an axis `wobble_radius` mm (Rw) behind the face. Slices are angles in rad.
     Fan { wobble_radius: f64 },
@@ -28,7 +29,7 @@ pub enum Motion {
 }
 
 /// How far the motor travels while a frame is acquired line by line, in units of the slice axis, signed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Advance {
     None,
     /// The same for every slice: one direction, even pitch.
@@ -38,7 +39,7 @@ pub enum Advance {
 }
 
 /// Everything that places a sample in space.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     pub array: Array,
     /// One position a scan line: rad or mm.

@@ -1,12 +1,13 @@
 //! Frames that are pictures already, and the choice between those and the polar frames of a sweep.
 
 use super::geometry::{GeometryError, Probe};
+use serde::{Deserialize, Serialize};
 
 /// No place or spacing is further than this, mm: f32 on the GPU keeps squares of it finite.
 const FAR: f64 = 1e6;
 
 /// Voxels on a straight lattice, as in a volume that was scan-converted by others.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Voxels along x (fastest), y, and z (one a frame).
     pub size: [usize; 3],
@@ -37,7 +38,7 @@ impl Grid {
 }
 
 /// Where the samples of a volume lie.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Geometry {
     /// Polar frames of a probe.
     Sweep(Probe),

@@ -11,6 +11,7 @@ mod metaimage;
 pub mod phantom;
 mod pixels;
 pub mod played;
+pub mod recorder;
 pub mod recording;
 pub mod samples;
 mod unfinished;
@@ -60,6 +61,22 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
         metaimage::read(path)
     } else {
         Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
+    }
+}
+
+/// A file of frames or any other recording, by its content.
+///
+/// # Errors
+/// As of [`recorder::Replay::open`] and [`Recording::open`].
+pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
+    let mut start = Vec::new();
+    // What cannot be read here is named by the reader. Opening a pipe may wait for ever.
+    if fs::metadata(path).is_ok_and(|m| m.is_file()) {
+        let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+    }
+    match recorder::Replay::is_one(&start) {
+        true => Ok(Box::new(recorder::Replay::open(path)?)),
+        false => Ok(Box::new(Recording::open(path, probe)?)),
     }
 }
 

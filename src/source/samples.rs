@@ -1,5 +1,6 @@
 //! The number types of samples, and their way from a file's bytes to the ones that are stored and uploaded.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What a sample is in the file.
@@ -12,7 +13,7 @@ pub enum SampleType {
 }
 
 /// What a sample is in a [`Frame`](super::Frame).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StoredType {
     U8,
     U16,
