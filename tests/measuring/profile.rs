@@ -75,9 +75,10 @@ fn a_profile_adds_up_and_survives_being_written() {
     let context = device();
     let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
     profile.check().expect("consistent");
-    let names: Vec<_> = profile.passes.iter().map(|p| p.name.as_str()).collect();
+    // Quads are made where the device is a CPU.
+    let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "quads");
     assert_eq!(
-        names,
+        names.collect::<Vec<_>>(),
         [
             "upload",
             "scan_convert",
