@@ -21,6 +21,8 @@ impl Scene {
     fn quads_pay(&self) -> bool {
         let texels: u64 = self.volume_size().iter().map(|n| u64::from(*n)).product();
         let rays: u64 = self.ray_size().iter().map(|n| u64::from(*n)).product();
+        // A view that moves keeps the quads that it takes when it stands.
+        let rays = if self.settings.ray.half { 4 * rays } else { rays };
         // Half the box's diagonal: some rays miss it, some end early.
         let samples = rays as f64 * 0.5 * (self.high - self.low).length() / self.step;
         let made = texels as f64 * self.share_seen();

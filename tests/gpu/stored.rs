@@ -6,7 +6,7 @@ use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, chain, is_hit};
 use echolume::plan::Rerun;
 use echolume::probe::Geometry;
-use echolume::scene::{Input, Scene};
+use echolume::scene::{Input, Sampling, Scene};
 use echolume::source::StoredType;
 use glam::DVec3;
 
@@ -120,6 +120,17 @@ fn quads_are_the_samples_of_eight_texels() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_view_that_moves_keeps_its_quads() {
+    for size in [8, 24, 48, 96, 192] {
+        let set = format!("mode = 'mip'\npicture.size = [{size}, {size}]\nslices = {{ pixels = 60, format = 'r8' }}");
+        let still = scene(Geometry::Sweep(wobbler()), BYTES, &set);
+        let moving = Scene::new(still.geometry.clone(), still.input, still.settings.moving()).expect("scene");
+        assert!(moving.settings.ray.half);
+        assert_eq!(still.sampled(Sampling::Quads).sampling, moving.sampled(Sampling::Quads).sampling, "{size}");
     }
 }
 
