@@ -59,6 +59,12 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
         kretz::read(path)
     } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
         metaimage::read(path)
+    } else if recorder::Replay::is_one(&start) {
+        Err(InputError::new(
+            path,
+            "file",
+            "holds frames as they arrived; render, profile and report read those, this command does not",
+        ))
     } else {
         Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
     }
