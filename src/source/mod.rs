@@ -7,6 +7,7 @@ pub mod convert;
 pub mod error;
 pub mod igtl;
 mod kretz;
+pub mod live;
 mod metaimage;
 pub mod phantom;
 mod pixels;
@@ -87,7 +88,7 @@ pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputE
 }
 
 /// Where frames come from, in order of acquisition.
-pub trait Source {
+pub trait Source: Send {
     /// Where the samples of a volume lie; the direction of its sweep decides about the motor's advance.
     fn geometry(&self, volume: usize) -> Geometry;
     fn stored_type(&self) -> StoredType;
@@ -99,6 +100,10 @@ pub trait Source {
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
     /// None after the last.
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
+    /// When the frame that was given last arrived, s on the recorder's clock, where that was recorded.
+    fn arrival(&self) -> Option<f64> {
+        None
+    }
 }
 
 impl Source for Recording {

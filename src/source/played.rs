@@ -1,6 +1,8 @@
-//! The phantom as a source: frames in order of acquisition, one volume computed at a time.
+//! The phantom as a source: frames in order of acquisition, computed a volume at a time or all at once.
 
+use super::live::header_of;
 use super::phantom::Phantom;
+use super::recorder::Header;
 use super::{Frame, Geometry, InputError, Source, StoredType};
 use std::collections::VecDeque;
 
@@ -14,6 +16,57 @@ pub struct Played {
 impl Played {
     pub fn new(phantom: Phantom) -> Played {
         Played { phantom, next: 0, waiting: VecDeque::new() }
+    }
+}
+
+/// Volumes of the phantom that were computed once and are given again and again: a source that is never late.
+pub struct Kept {
+    header: Header,
+    /// By volume, in order of acquisition.
+    volumes: Vec<Vec<Frame>>,
+    next: (usize, usize),
+}
+
+impl Kept {
+    /// Computes all volumes of the phantom: as many bytes as they have samples.
+    pub fn new(phantom: Phantom) -> Kept {
+        let volumes = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
+        Kept { header: header_of(&Played::new(phantom)), volumes, next: (0, 0) }
+    }
+}
+
+impl Source for Kept {
+    fn geometry(&self, volume: usize) -> Geometry {
+        let backward = self.volumes.get(volume).and_then(|v| v.first()).is_some_and(|frame| frame.backward);
+        if backward { self.header.backward.clone() } else { self.header.forward.clone() }
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.header.stored
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.header.range
+    }
+
+    fn volumes(&self) -> usize {
+        self.volumes.len()
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.header.forward.slices()
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        self.next = (volume, 0);
+        Ok(())
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        let (volume, number) = self.next;
+        let Some(frames) = self.volumes.get(volume) else { return Ok(None) };
+        self.next = if number + 1 < frames.len() { (volume, number + 1) } else { (volume + 1, 0) };
+        Ok(frames.get(number).cloned())
     }
 }
 

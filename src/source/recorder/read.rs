@@ -257,6 +257,10 @@ impl Source for Replay {
         }
         Ok(None)
     }
+
+    fn arrival(&self) -> Option<f64> {
+        Some(self.arrived)
+    }
 }
 
 impl Replay {
