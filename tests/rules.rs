@@ -172,6 +172,7 @@ fn scenes() -> Vec<Scene> {
         for sections in [
             "mode = 'plane'",
             "mode = 'orthogonal'",
+            "mode = 'plane'\npost = { floats = true }",
             "mode = 'tomography'\nplanes = { lines = false, thickness = 3, slab = 'max' }",
             "mode = 'cube'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
         ] {

@@ -1,17 +1,32 @@
 // MPR: each pixel shows the place of its tile's plane, or what a slab about it amounts to. No ray is cast.
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+// TONED: at once in 8 bits, where stage 4 has nothing else to do.
+// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED; toned_plain TONED LINES; toned_even TONED LINES SWEPT; toned_moved TONED LINES SWEPT MOVED; toned_uneven TONED LINES SWEPT UNEVEN; toned_uneven_moved TONED LINES SWEPT UNEVEN MOVED
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int SAMPLES = 1; // through the slab
 layout(constant_id = 4) const int SLAB = 0;    // 0 mean, 1 largest, 2 smallest
+#ifdef TONED
+#include "tone_constants.glsl"
+#endif
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
     int columns;
     int rows;
+#ifdef TONED
+#include "tone_params.glsl"
+    float line_strength; // 0..1
+#endif
 };
 #include "ray.glsl"
 #include "tiles.glsl"
+#ifdef TONED
+#include "tone.glsl"
+uniform writeonly image2D screen;
+#define TARGET screen
+#else
 uniform writeonly image2D picture;
+#define TARGET picture
+#endif
 
 // Within what is rendered, on the near side of every clip plane.
 bool is_kept(vec3 p) {
@@ -25,7 +40,7 @@ bool is_kept(vec3 p) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = imageSize(picture), cells = ivec2(columns, rows);
+    ivec2 size = imageSize(TARGET), cells = ivec2(columns, rows);
     if (any(greaterThanEqual(pixel, size))) return;
     ivec2 cell = cell_of(pixel, size, cells);
     int n = cell.y * columns + cell.x;
@@ -45,5 +60,10 @@ void main() {
         }
     }
     if (SLAB == 0) value /= float(max(count, 1));
-    imageStore(picture, pixel, count > 0 ? vec4(vec3(value), 1.0) : vec4(0.0));
+#ifdef TONED
+    vec3 c = count > 0 ? toned(vec3(value)) : vec3(0.0);
+    imageStore(TARGET, pixel, vec4(with_lines(c, pixel, size), 1.0));
+#else
+    imageStore(TARGET, pixel, count > 0 ? vec4(vec3(value), 1.0) : vec4(0.0));
+#endif
 }

@@ -133,6 +133,7 @@ impl Asked<'_> {
     }
 
     fn rendered(&self, scene: &Scene, repeats: u32) -> Result<Seen, GpuError> {
+        let scene = &in_floats(scene);
         let mut renderer = Renderer::new(self.context, scene.clone(), &Options::default())?;
         let mut times = Vec::new();
         // The first, which compiles, is not counted.
@@ -157,6 +158,7 @@ impl Asked<'_> {
     }
 
     fn in_f64(&self, scene: &Scene) -> Seen {
+        let scene = &in_floats(scene);
         let format = Slot::Frames.format(scene);
         let [width, height] = scene.frame_size().map(|n| n as usize);
         let mut frames: Vec<&Frame> = self.frames.iter().collect();
@@ -167,6 +169,13 @@ impl Asked<'_> {
         let picture = slots.remove(&Slot::Picture).unwrap_or_else(|| Texels::untouched([0; 3], 4));
         Seen { scene: scene.clone(), picture, distance, times: Vec::new() }
     }
+}
+
+/// The scene with its picture before it becomes 8 bits, whose steps are as large as many an error.
+fn in_floats(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.settings.post.floats = true;
+    scene
 }
 
 /// Samples that the f64 reference of a scene takes, filters of slices included.

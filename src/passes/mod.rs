@@ -84,6 +84,7 @@ pub const PASSES: &[Pass] = &[
     raycast::volume::PASS,
     raycast::projection::PASS,
     raycast::planes::PASS,
+    raycast::planes::TONED,
     raycast::cube::PASS,
     filter::median::DISTANCE,
     filter::bilateral::DISTANCE,

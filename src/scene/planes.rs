@@ -97,6 +97,13 @@ impl Scene {
         several && self.settings.planes.lines
     }
 
+    /// Whether planes become 8 bits as they are cut: nothing else of stage 4 looks at them.
+    pub fn tones_planes(&self) -> bool {
+        let post = &self.settings.post;
+        let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
+        self.is_flat() && !filtered && !post.floats
+    }
+
     /// Samples through the slab: at most one slice pixel apart, both faces included.
     pub fn slab_samples(&self) -> f64 {
         let thickness = self.settings.planes.thickness;

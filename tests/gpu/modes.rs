@@ -59,16 +59,16 @@ const MODES: &[(&str, &str, &str)] = &[
         "scan_convert tile_ranges brick_ranges raycast_projection assemble tone",
         "frames scan_lut volume tile_ranges brick_table brick_ranges sweep_lut rendered picture screen",
     ),
-    ("mode = 'plane'", "scan_convert raycast_planes tone", "frames scan_lut volume sweep_lut tiles picture screen"),
+    ("mode = 'plane'", "scan_convert raycast_planes_toned", "frames scan_lut volume sweep_lut tiles screen"),
     (
-        "mode = 'orthogonal'",
+        "mode = 'orthogonal'\npost = { floats = true }",
         "scan_convert raycast_planes tone",
         "frames scan_lut volume sweep_lut tiles picture screen",
     ),
     (
-        "mode = 'tomography'",
-        "scan_convert raycast_planes tone",
-        "frames scan_lut volume sweep_lut tiles picture screen",
+        "mode = 'tomography'\npost = { sigma = {} }",
+        "scan_convert raycast_planes sigma_picture tone",
+        "frames scan_lut volume sweep_lut tiles picture smooth_picture screen",
     ),
     ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
     (
@@ -127,7 +127,7 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
                 if base.composites() { from(&["classify_volume"]) } else { vec![] },
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
-            ("contrast", |s| s.settings.post.contrast = 1.5, vec!["tone"]),
+            ("contrast", |s| s.settings.post.contrast = 1.5, vec![all[all.len() - 1]]),
             ("what the mode does not use", |s| s.settings.light.occlusion = None, vec![]),
         ];
         for (what, change, expected) in changes {

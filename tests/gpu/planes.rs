@@ -59,6 +59,11 @@ pub fn scenes() -> Vec<(String, Scene)> {
         let whole = format!("{toml}\n{base}");
         scenes.push((toml, scene(Geometry::Sweep(wobbler()), BYTES, &whole)));
     }
+    let in_floats: Vec<_> = scenes.iter().filter(|(_, scene)| scene.tones_planes()).cloned().collect();
+    scenes.extend(in_floats.into_iter().map(|(name, mut scene)| {
+        scene.settings.post.floats = true;
+        (format!("{name}, in floats"), scene)
+    }));
     scenes
 }
 
@@ -86,7 +91,11 @@ fn shown(scene: &Scene, [right, down, normal]: [DVec3; 3], at: DVec3, x: usize, 
     middle + (right * (x as f64 + 0.5 - width / 2.0) + down * (y as f64 + 0.5 - height / 2.0)) * pixel
 }
 
+/// The picture in floats, before it becomes 8 bits.
 pub fn picture(renderer: &mut Renderer) -> Texels {
+    let mut scene = renderer.scene().clone();
+    scene.settings.post.floats = true;
+    renderer.change(scene).expect("change");
     renderer.picture().expect("picture");
     renderer.read(Slot::Picture).expect("read").expect("there")
 }

@@ -8,14 +8,17 @@ use crate::scene::{ColourMap, Scene, transfer};
 use glam::DVec3;
 
 /// How much of what lies under a cross-line it covers: anatomy stays visible.
-const LINE_STRENGTH: f64 = 0.7;
+pub const LINE_STRENGTH: f64 = 0.7;
 
 pub const PASS: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
     when: When::Picture,
     shader: |s, _| if s.draws_lines() { "postprocess/tone.lines" } else { "postprocess/tone.plain" },
-    needed: |_| Ok("every picture ends in 8 bits"),
+    needed: |s| match s.tones_planes() {
+        true => Err("planes are cut straight to 8 bits"),
+        false => Ok("every picture ends in 8 bits"),
+    },
     reads: |s, _| {
         let mut reads = vec![whole("picture", picture_end(s))];
         reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
@@ -25,31 +28,14 @@ pub const PASS: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
-        let post = &s.settings.post;
-        let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
-        let params = Params::default()
-            .f32("brightness", post.brightness)
-            .f32("contrast", post.contrast)
-            .f32("exponent", 1.0 / post.gamma)
-            .vec3("map_0", a)
-            .vec3("map_1", b)
-            .vec3("map_2", c)
-            .vec3("map_3", d)
-            .vec3("map_4", e);
+        let params = params(s, Params::default());
         if !s.draws_lines() {
             return params;
         }
         let [columns, rows] = s.tile_grid();
         params.i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
     },
-    constants: |s, _| {
-        let mut constants = vec![("COLOUR_MAP", (s.settings.post.colour_map != ColourMap::None) as i32)];
-        constants.push(("GAMMA", (s.settings.post.gamma != 1.0) as i32));
-        if s.draws_lines() {
-            constants.push(("CROSSING", if s.shows_three() { 2 } else { 0 }));
-        }
-        constants
-    },
+    constants: |s, _| constants(s, s.draws_lines()),
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,
@@ -60,18 +46,48 @@ pub const PASS: Pass = Pass {
         let picture = reads.get("picture");
         let screen = writes.get_mut("screen");
         let sheet = scene.draws_lines().then(|| scene.sheet());
-        for y in 0..picture.size[1] {
-            for x in 0..picture.size[0] {
-                let rgba = picture.get([x, y, 0]);
-                let mut colour = if rgba[3] > 0.0 { toned(scene, [rgba[0], rgba[1], rgba[2]]) } else { [0.0; 3] };
-                if let Some((sheet, tile)) = sheet.as_ref().and_then(|s| tile_at(s, x, y).map(|tile| (s, tile))) {
-                    colour = with_lines(sheet, tile, colour, x, y);
-                }
-                screen.set([x, y, 0], &[colour[0], colour[1], colour[2], 1.0]);
-            }
+        for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
+            let rgba = picture.get([x, y, 0]);
+            let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
+            screen.set([x, y, 0], &shown(scene, sheet.as_ref(), colour, x, y));
         }
     },
 };
+
+/// Its numbers, behind those that are there.
+pub fn params(scene: &Scene, params: Params) -> Params {
+    let post = &scene.settings.post;
+    let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
+    params
+        .f32("brightness", post.brightness)
+        .f32("contrast", post.contrast)
+        .f32("exponent", 1.0 / post.gamma)
+        .vec3("map_0", a)
+        .vec3("map_1", b)
+        .vec3("map_2", c)
+        .vec3("map_3", d)
+        .vec3("map_4", e)
+}
+
+/// Its structure; with `lines`, over planes.
+pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
+    let post = &scene.settings.post;
+    let mut constants = vec![("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32)];
+    constants.push(("GAMMA", (post.gamma != 1.0) as i32));
+    if lines {
+        constants.push(("CROSSING", if scene.shows_three() && scene.draws_lines() { 2 } else { 0 }));
+    }
+    constants
+}
+
+/// What the screen shows of a colour, or where there is none, of nothing: under the lines of the sheet, if it has any.
+pub fn shown(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
+    let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
+    if let Some((sheet, tile)) = sheet.and_then(|s| tile_at(s, x, y).map(|tile| (s, tile))) {
+        colour = with_lines(sheet, tile, colour, x, y);
+    }
+    [colour[0], colour[1], colour[2], 1.0]
+}
 
 fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     let post = &scene.settings.post;

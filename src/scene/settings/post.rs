@@ -17,6 +17,8 @@ pub struct Post {
     /// The exponent is 1 / gamma; above 1 lifts the dark parts. 0.1..10.
     pub gamma: f64,
     pub colour_map: ColourMap,
+    /// Keep the picture in floats beside that in 8 bits also where nothing needs it: planes are then cut first and toned after.
+    pub floats: bool,
 }
 
 impl Default for Post {
@@ -29,6 +31,7 @@ impl Default for Post {
             contrast: 1.0,
             gamma: 1.0,
             colour_map: ColourMap::None,
+            floats: false,
         }
     }
 }
