@@ -7,7 +7,7 @@
 //! - [`passes`] declares every compute pass in one place: its slots, parameters, constants, tolerance and f64 reference.
 //!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
-//!   order between them; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
+//!   order between them and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
 //!   without a GPU.
 //! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
 //!   one to fill the other.
@@ -22,6 +22,7 @@ pub mod passes;
 pub mod picture;
 pub mod plan;
 pub mod probe;
+pub mod queues;
 pub mod report;
 pub mod scene;
 #[cfg(feature = "hot-reload")]
