@@ -35,6 +35,10 @@ impl Workers {
         self.0 & Workers::from(worker).0 != 0
     }
 
+    pub fn without(self, worker: Worker) -> Workers {
+        Workers(self.0 & !Workers::from(worker).0)
+    }
+
     fn with(self, other: Workers) -> Workers {
         Workers(self.0 | other.0)
     }

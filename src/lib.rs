@@ -9,6 +9,7 @@
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
 //!   order between them and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
 //!   without a GPU.
+//! - [`live`] is the loop between a source that does not wait and the device.
 //! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
 //!   one to fill the other.
 
@@ -17,6 +18,7 @@
 pub mod barriers;
 #[allow(unsafe_code)]
 pub mod gpu;
+pub mod live;
 pub mod measuring;
 pub mod passes;
 pub mod picture;

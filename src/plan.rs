@@ -126,7 +126,8 @@ impl Plan {
             let slots = slots.chain(chain::copied(scene));
             slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
         };
-        if stored(&before, old) != stored(self, new) || old.geometry != new.geometry || old.input != new.input {
+        let moved = !old.geometry.is_but_for_advance(&new.geometry);
+        if stored(&before, old) != stored(self, new) || moved || old.input != new.input {
             return Rerun::Everything;
         }
         // Less to be seen changes nothing that is there; more needs frames.
@@ -205,6 +206,11 @@ impl Step {
         (self.pass.name, self.iteration)
     }
 
+    /// Slots that it reads.
+    pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
+        (self.pass.reads)(scene, &self.turn()).iter().map(|b| b.slot).collect()
+    }
+
     /// Slots that it writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
         (self.pass.writes)(scene, &self.turn()).iter().map(|b| b.slot).collect()
@@ -243,12 +249,20 @@ fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
         Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
         // Follows from the other, which is shorter.
         Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
-        Slot::BrickTable => return old.geometry != new.geometry || old.brick_basis() != new.brick_basis(),
+        Slot::BrickTable => {
+            return !old.geometry.is_but_for_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
+        }
+        Slot::SliceTable => return old.geometry != new.geometry,
         _ => {}
     }
-    // The rest follow from the geometry, and their content is too long to compare.
+    // The rest follow from the geometry, and their content is too long to compare. The way that the motor goes during a frame stretches
+    // the sweep's span and nothing else.
     let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
-    old.geometry != new.geometry || lattice(old) != lattice(new)
+    let stays = match slot {
+        Slot::SweepLut => old.geometry.is_but_for_direction(&new.geometry),
+        _ => old.geometry.is_but_for_advance(&new.geometry),
+    };
+    !stays || lattice(old) != lattice(new)
 }
 
 #[cfg(test)]

@@ -54,6 +54,7 @@ fn layers_hold() {
         ("src/report", &["crate::gpu", "crate::measuring", "ash::vk"]),
         ("src/gpu", &["crate::report", "crate::measuring"]),
         ("src/measuring", &["ash::vk"]),
+        ("src/live", &["crate::report", "crate::measuring", "ash::vk"]),
         ("src/cli", &["ash::vk", "use ash"]),
     ];
     let all = sources("src");

@@ -62,7 +62,7 @@ fn all(run: Run) -> Result<(), String> {
     if run != Run::List {
         println!("device: {} ({}), {}", candidate.name, candidate.kind_name(), candidate.driver.trim());
     }
-    if run == Run::Bench && candidate.valid_bits == 0 {
+    if run == Run::Bench && candidate.valid_bits() == 0 {
         return Err("the device has no time stamps, so nothing can be measured; ECHOLUME_DEVICE picks another".into());
     }
     let phantom = common::phantom(sizes.frames, sizes.lines, sizes.samples)?;

@@ -7,8 +7,9 @@ use super::faults::{Faults, Seam};
 use super::select::{self, Candidate, Choice};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ffi::{CStr, CString, c_void};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -34,13 +35,25 @@ pub struct Context {
     /// Reads the device's clock, where it can be read.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
-    queue: Mutex<vk::Queue>,
-    /// Families that slots which cross queues are shared between; one here until a device offers more.
+    /// As of the candidate: renders, takes frames in, copies them.
+    queues: Vec<Mutex<vk::Queue>>,
+    /// Families that slots which cross queues are shared between.
     pub queue_families: Vec<u32>,
     /// Taken in `drop`, before the device goes.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
     pub faults: Faults,
+    pub counts: Counts,
+}
+
+/// What is costly and must not happen for every frame, counted since the start.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Of device memory.
+    pub allocations: AtomicU64,
+    pub pipelines: AtomicU64,
+    /// Waits for the whole device.
+    pub waits_idle: AtomicU64,
 }
 
 /// Loads Vulkan and lists the devices, for `echolume devices`.
@@ -151,9 +164,12 @@ impl Context {
             push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
             clock: (candidate.calibrated).then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
-            // SAFETY: the device was created with one queue of this family.
-            queue: Mutex::new(unsafe { device.get_device_queue(candidate.queue_family, 0) }),
-            queue_families: vec![candidate.queue_family],
+            queues: {
+                // SAFETY: the device was created with these queues.
+                let get = |q: &select::QueueOf| unsafe { device.get_device_queue(q.family, q.index) };
+                candidate.queues.iter().map(|q| Mutex::new(get(q))).collect()
+            },
+            queue_families: candidate.queues.iter().map(|q| q.family).collect::<BTreeSet<_>>().into_iter().collect(),
             limits: candidate.limits,
             instance: instance.clone(),
             _entry: entry,
@@ -164,10 +180,12 @@ impl Context {
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
             faults: Faults::default(),
+            counts: Counts::default(),
         });
         context.name(context.device.handle(), "device");
-        let queue = *context.queue.lock().unwrap_or_else(|e| e.into_inner());
-        context.name(queue, "queue");
+        for (queue, name) in context.queues.iter().zip(["queue", "ingest queue", "transfer queue"]) {
+            context.name(*queue.lock().unwrap_or_else(|e| e.into_inner()), name);
+        }
         tracing::info!("device '{}', driver {}", context.candidate.name, context.candidate.driver.trim());
         Ok(context)
     }
@@ -218,11 +236,27 @@ impl Context {
         }
     }
 
-    pub(super) fn submit(&self, submit: &vk::SubmitInfo2, doing: impl FnOnce() -> String) -> Result<(), GpuError> {
+    /// The queue that does this one's work: where there are fewer than asked for, several are one.
+    pub fn queue(&self, number: usize) -> select::QueueOf {
+        self.candidate.queues[number.min(self.queues.len() - 1)]
+    }
+
+    /// How many queues there are for different work: 1..=3.
+    pub fn queue_count(&self) -> usize {
+        self.queues.len()
+    }
+
+    pub(super) fn submit(
+        &self,
+        queue: usize,
+        submit: &vk::SubmitInfo2,
+        doing: impl FnOnce() -> String,
+    ) -> Result<(), GpuError> {
         self.faults
             .pass(Seam::Submit)
             .and_then(|()| {
-                let queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
+                let queue = &self.queues[queue.min(self.queues.len() - 1)];
+                let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
                 // SAFETY: the lock keeps the queue to one thread; the command buffer in `submit` is recorded and what it names is
                 // alive until the timeline says it is done.
                 unsafe { self.device.queue_submit2(*queue, &[*submit], vk::Fence::null()) }
@@ -231,8 +265,9 @@ impl Context {
     }
 
     pub(super) fn wait_idle(&self) {
-        let _queue = self.queue.lock().unwrap_or_else(|e| e.into_inner());
-        // SAFETY: the lock keeps every queue of the device to this thread.
+        self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
+        let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+        // SAFETY: the locks keep every queue of the device to this thread.
         let _ = unsafe { self.device.device_wait_idle() };
     }
 
@@ -252,9 +287,15 @@ impl Context {
 }
 
 fn create_device(instance: &ash::Instance, candidate: &Candidate) -> Result<ash::Device, GpuError> {
-    let priorities = [1.0];
-    let queues =
-        [vk::DeviceQueueCreateInfo::default().queue_family_index(candidate.queue_family).queue_priorities(&priorities)];
+    let priorities = [1.0; crate::queues::MOST];
+    let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
+    let queues: Vec<_> = families
+        .into_iter()
+        .map(|family| {
+            let count = candidate.queues.iter().filter(|q| q.family == family).count();
+            vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities[..count])
+        })
+        .collect();
     let mut extensions = vec![ash::khr::push_descriptor::NAME.as_ptr()];
     extensions.extend(candidate.calibrated.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     let core = vk::PhysicalDeviceFeatures::default()

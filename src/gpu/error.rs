@@ -33,6 +33,10 @@ pub enum GpuError {
     FrameSize { got: usize, expected: usize },
     #[error("frame for slice {slice}, the volume has {slices}")]
     FrameSlice { slice: u32, slices: u32 },
+    #[error(
+        "frame for slice {slice}: {bytes} bytes from line {first} on are no whole lines that follow the {there} that are there"
+    )]
+    FrameLines { slice: u32, first: u32, bytes: usize, there: u32 },
     #[error("volume image {image}: there are {images}")]
     VolumeImage { image: u32, images: u32 },
     #[error("the last change of scene failed ({0}); the next one builds everything anew")]

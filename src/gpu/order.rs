@@ -1,13 +1,14 @@
 //! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
 
 use super::context::Context;
-use crate::barriers::{Access, Barrier, Tracker, Worker, Workers};
+use crate::barriers::{Access, Barrier, Worker, Workers};
+use crate::queues::Queues;
 use ash::vk;
 
 /// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
 #[derive(Default)]
 pub struct Order {
-    pub tracker: Tracker,
+    pub queues: Queues,
     pub barriers: u32,
     /// Names and extents of the passes dispatched, in order, while someone counts them.
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
@@ -17,11 +18,15 @@ pub struct Order {
 
 impl Order {
     /// Records the barrier that an operation with these accesses needs, if it needs one.
-    pub(super) fn before(&mut self, context: &Context, commands: vk::CommandBuffer, accesses: &[Access]) {
-        let Some(Barrier { from, to }) = self.tracker.before(accesses) else { return };
+    pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
+        let Some(Barrier { mut from, mut to }) = self.queues.before(queue, accesses) else { return };
         self.barriers += 1;
         if self.drop_barrier == Some(self.barriers) {
             return;
+        }
+        // A queue that only copies knows no shaders.
+        if !context.queue(queue).computes {
+            (from, to) = (from.without(Worker::Compute), to.without(Worker::Compute));
         }
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(stages(from))

@@ -11,6 +11,7 @@ use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// A compute pipeline and what it is bound by.
 pub struct Pipeline {
@@ -196,6 +197,7 @@ impl Pipeline {
         let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
         // SAFETY: as above; the shader module is alive until after the call.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
+        context.counts.pipelines.fetch_add(1, Ordering::Relaxed);
         // SAFETY: a module may go once its pipelines are made.
         unsafe { device.destroy_shader_module(shader, None) };
         pipeline.handle = made.map_err(|(_, result)| result).doing(doing)?[0];

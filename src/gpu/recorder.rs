@@ -8,7 +8,7 @@ use super::order::Order;
 use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Buffer, Image, Purpose, WHOLE};
 use super::slots::{Resource, Slots};
-use super::timeline::Timeline;
+use super::timeline::Timelines;
 use super::timing::Stamps;
 use crate::barriers::{self, Access, Worker};
 use crate::passes::{Part, Pass, Slot, Turn, contract};
@@ -59,16 +59,23 @@ pub struct Recorder {
     /// The submission whose times were added last.
     collected_to: u64,
     label: &'static str,
+    /// The queue that it is submitted to.
+    queue: usize,
     /// Begun and not submitted.
     recording: bool,
 }
 
 impl Recorder {
     /// With `statistics` the invocations of every dispatch are counted, where the device can.
-    pub fn new(context: &Arc<Context>, label: &'static str, statistics: bool) -> Result<Recorder, GpuError> {
-        let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.candidate.queue_family);
+    pub fn new(
+        context: &Arc<Context>,
+        queue: usize,
+        label: &'static str,
+        statistics: bool,
+    ) -> Result<Recorder, GpuError> {
+        let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(queue).family);
         let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
-        let stamps = Stamps::new(context, STAMPS, statistics)?;
+        let stamps = Stamps::new(context, queue, STAMPS, statistics)?;
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_command_pool(&create, None) }.doing(|| "create commands".into())?;
         context.name(pool, label);
@@ -85,6 +92,7 @@ impl Recorder {
             done_at: 0,
             collected_to: 0,
             label,
+            queue,
             recording: false,
         };
         recorder.commands = commands.doing(|| "create commands".into())?[0];
@@ -93,11 +101,11 @@ impl Recorder {
     }
 
     /// Waits until the last submission is done, then starts anew.
-    pub fn begin(&mut self, order: &mut Order, timeline: &Timeline) -> Result<(), GpuError> {
+    pub fn begin(&mut self, order: &mut Order, timelines: &Timelines) -> Result<(), GpuError> {
         if std::mem::replace(&mut self.recording, true) {
-            order.tracker.doubt();
+            order.queues.doubt(self.queue);
         }
-        timeline.wait(self.done_at)?;
+        self.wait(timelines)?;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the device is done with this pool's only command buffer.
         unsafe {
@@ -115,34 +123,59 @@ impl Recorder {
     }
 
     /// Adds the times of the last submission, once, when it is done.
-    pub fn collect(&mut self, timeline: &Timeline, measured: &mut Measured) -> Result<(), GpuError> {
+    pub fn collect(&mut self, timelines: &Timelines, measured: &mut Measured) -> Result<(), GpuError> {
         if self.collected_to == self.done_at {
             return Ok(());
         }
-        timeline.wait(self.done_at)?;
+        self.wait(timelines)?;
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
-            let (bits, period) = (self.context.candidate.valid_bits, self.context.limits.timestamp_period);
+            let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
             measured.add(&stamps.read()?, bits, period);
         }
         Ok(())
     }
 
-    pub fn submit(&mut self, timeline: &mut Timeline) -> Result<(), GpuError> {
+    /// Blocks until the last submission is done.
+    pub fn wait(&self, timelines: &Timelines) -> Result<(), GpuError> {
+        timelines.of(self.queue).wait(self.done_at)
+    }
+
+    /// Whether the last submission is done.
+    pub fn is_done(&self, timelines: &Timelines) -> Result<bool, GpuError> {
+        timelines.of(self.queue).is_done(self.done_at)
+    }
+
+    pub fn submit(&mut self, order: &mut Order, timelines: &mut Timelines) -> Result<(), GpuError> {
         // SAFETY: the command buffer is being recorded.
         unsafe { self.context.device.end_command_buffer(self.commands) }
             .doing(|| format!("record '{}'", self.label))?;
+        let waits = order.queues.waits(self.queue);
+        let waited: Vec<_> = waits
+            .iter()
+            .map(|wait| {
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(timelines.of(wait.queue).semaphore)
+                    .value(wait.value)
+                    .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            })
+            .collect();
+        let timeline = timelines.of_mut(self.queue);
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let signal = [vk::SemaphoreSubmitInfo::default()
             .semaphore(timeline.semaphore)
             .value(timeline.submitted + 1)
             .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signal);
-        self.context.submit(&submit, || format!("submit '{}'", self.label))?;
+        let submit = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waited)
+            .command_buffer_infos(&commands)
+            .signal_semaphore_infos(&signal);
+        self.context.submit(self.queue, &submit, || format!("submit '{}'", self.label))?;
         timeline.submitted += 1;
         timeline.doing = self.label.to_string();
         self.done_at = timeline.submitted;
         self.recording = false;
+        order.queues.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }
 
@@ -347,7 +380,7 @@ impl Recorder {
     }
 
     fn barrier(&self, order: &mut Order, accesses: &[Access]) {
-        order.before(&self.context, self.commands, accesses);
+        order.before(&self.context, self.queue, self.commands, accesses);
     }
 }
 

@@ -2,6 +2,8 @@
 //! frame array, command buffer), so that several are on their way at once; a picture re-runs what changed and nothing else.
 
 mod change;
+mod draw;
+mod frames;
 mod inspect;
 mod slab;
 
@@ -13,12 +15,13 @@ use super::pipelines::{Fetch, Pipeline, Pipelines, Shaders, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
-use super::timeline::Timeline;
+use super::timeline::Timelines;
 use crate::passes::chain;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Span, Texels, Turn, When};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
+use crate::queues::{Queues, Work as Task};
 use crate::scene::{Scene, Seen};
 use std::sync::Arc;
 
@@ -31,15 +34,20 @@ pub struct Options {
     pub spans: bool,
     /// How single texels are read; what is fast on the device unless given.
     pub fetch: Option<Fetch>,
+    /// Queues that share the work, 1..=3; as many as the device has for different work unless given. Where it has fewer than given,
+    /// several are one.
+    pub queues: Option<usize>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { volume_images: 1, shaders: embedded(), spans: false, fetch: None }
+        Options { volume_images: 1, shaders: embedded(), spans: false, fetch: None, queues: None }
     }
 }
 
 struct Lane {
+    /// Copies the samples in, where a queue of its own does that.
+    copier: Option<Recorder>,
     recorder: Recorder,
     staging: Buffer,
 }
@@ -52,7 +60,7 @@ pub struct Renderer {
     slots: Slots,
     steps: Vec<Arc<Pipeline>>,
     pipelines: Pipelines,
-    timeline: Timeline,
+    timelines: Timelines,
     order: Order,
     context: Arc<Context>,
     plan: Plan,
@@ -69,8 +77,14 @@ pub struct Renderer {
     uploads: Vec<Buffer>,
     volume_images: u32,
     next_lane: usize,
+    /// The frame whose lines are arriving.
+    arriving: Option<frames::Arriving>,
+    /// Frames that were given up because another began before all of their lines had come.
+    torn: u64,
     /// Slices that wait to be copied together.
     slab: Option<slab::Slab>,
+    /// A picture is on its way.
+    drawing: bool,
     /// The volume image that is shown.
     shown: u32,
     /// What all frames that were sent have been filtered over, at least.
@@ -93,15 +107,16 @@ impl Renderer {
         super::formats::check(context, &plan, &scene)?;
         let mut pipelines = Pipelines::new(context, options.shaders.clone(), fetch)?;
         let steps = pipelines_of(&mut pipelines, &plan, &scene)?;
+        let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, crate::queues::MOST);
         let mut renderer = Renderer {
             lanes: Vec::new(),
-            picture: Recorder::new(context, "picture", options.spans)?,
+            picture: Recorder::new(context, 0, "picture", options.spans)?,
             readback: readback(context, &scene)?,
             slots: Slots::new(context, options.volume_images.max(1)),
             steps,
             pipelines,
-            timeline: Timeline::new(context)?,
-            order: Order::default(),
+            timelines: Timelines::new(context, queues)?,
+            order: Order { queues: Queues::new(queues), ..Order::default() },
             context: context.clone(),
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
@@ -114,13 +129,16 @@ impl Renderer {
             skipped: 0,
             scene,
             next_lane: 0,
+            arriving: None,
+            torn: 0,
             slab: None,
+            drawing: false,
             shown: 0,
             measured: Measured::new(context, options.spans),
             spans: options.spans,
             fetch,
         };
-        renderer.lanes = lanes(context, &renderer.scene, options.spans)?;
+        renderer.lanes = renderer.new_lanes()?;
         renderer.forget_volumes();
         renderer.fit()?;
         Ok(renderer)
@@ -156,13 +174,13 @@ impl Renderer {
         if new.is_empty() {
             return Ok(());
         }
-        self.picture.begin(&mut self.order, &self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timelines)?;
         self.picture.clear_new(&mut self.order, &self.slots, &new);
-        self.picture.submit(&mut self.timeline)?;
+        self.picture.submit(&mut self.order, &mut self.timelines)?;
         for (slot, _) in new {
             self.fill(slot)?;
         }
-        self.timeline.wait_all()
+        self.timelines.wait_all()
     }
 
     /// Uploads a slot that is made from the scene. Nothing that reads it may be in flight.
@@ -181,11 +199,11 @@ impl Renderer {
         let mut staging = Buffer::new(&self.context, "upload", slot.bytes(&self.scene), Purpose::Staging)?;
         let length = bytes.len().min(staging.bytes().len());
         staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-        self.picture.begin(&mut self.order, &self.timeline)?;
+        self.picture.begin(&mut self.order, &self.timelines)?;
         self.picture.copy_in(&mut self.order, &staging, image, Place { slot, copy, parts: 0..image.shape.parts() });
         self.uploads.push(staging);
-        self.picture.submit(&mut self.timeline)?;
-        self.timeline.wait_all()?;
+        self.picture.submit(&mut self.order, &mut self.timelines)?;
+        self.timelines.wait_all()?;
         self.uploads.clear();
         Ok(())
     }
@@ -201,119 +219,31 @@ impl Renderer {
         }
     }
 
-    /// Sends one frame through stage 1 into its slice of volume image `image`. Returns once the frame's bytes are copied; the
-    /// device works on. Waits only when the ring is full. A frame that nothing of this scene can see is left out and counted.
-    ///
-    /// # Errors
-    /// A frame of the wrong size, a slice that is not there, a device that fails.
-    pub fn frame(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
-        self.check(image)?;
-        if bytes.len() != self.frame_bytes() {
-            return Err(GpuError::FrameSize { got: bytes.len(), expected: self.frame_bytes() });
-        }
-        if slice >= self.scene.slices() {
-            return Err(GpuError::FrameSlice { slice, slices: self.scene.slices() });
-        }
-        self.filtered = self.scene.seen;
-        if !self.scene.frames_seen().contains(&slice) {
-            self.skipped += 1;
-            return Ok(());
-        }
-        if chain::copied(&self.scene).is_some() {
-            return self.gather(slice, bytes, image);
-        }
-        let layer = self.next_lane;
-        self.next_lane = (layer + 1) % self.lanes.len();
-        let Lane { recorder, staging } = &mut self.lanes[layer];
-        recorder.collect(&self.timeline, &mut self.measured)?;
-        recorder.begin(&mut self.order, &self.timeline)?;
-        self.measured.host("stage", || staging.bytes_mut().copy_from_slice(bytes));
-        if let Some(frames) = self.slots.image(Slot::Frames, 0) {
-            let place = Place { slot: Slot::Frames, copy: 0, parts: layer as u32..layer as u32 + 1 };
-            recorder.copy_in(&mut self.order, staging, frames, place);
-            recorder.stamp("upload");
-        }
-        for (i, step) in self.plan.steps_of(When::Frame) {
-            let turn = Turn { layer: layer as u32, slice, slices: 1, iteration: step.iteration, image };
-            let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            recorder.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
-        }
-        self.measured.host("submit", || recorder.submit(&mut self.timeline))?;
-        self.unseen[image as usize][slice as usize] = true;
-        Ok(())
-    }
-
-    /// All frames of volume image `image` have been sent: the next picture shows it.
-    pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
-        self.check(image)?;
-        self.flush()?;
-        self.shown = image;
-        self.stale.iter_mut().for_each(|stale| *stale = true);
-        Ok(())
-    }
-
-    /// Runs what changed since the last picture and brings the result back; where nothing changed, nothing runs.
-    pub fn picture(&mut self) -> Result<Picture, GpuError> {
-        self.check(self.shown)?;
-        let [width, height] = self.scene.picture_size();
-        if self.stale.iter().any(|stale| *stale) {
-            self.draw()?;
-        }
-        Ok(Picture { width, height, rgba: self.readback.bytes().to_vec() })
-    }
-
-    fn draw(&mut self) -> Result<(), GpuError> {
-        self.flush()?;
-        self.plan.complete(&self.scene, &mut self.stale, &self.contents);
-        self.picture.collect(&self.timeline, &mut self.measured)?;
-        self.picture.begin(&mut self.order, &self.timeline)?;
-        let unseen = &self.unseen[self.shown as usize];
-        let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
-        for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
-            let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            let runs: Vec<_> = match step.pass.when {
-                When::Volume => {
-                    let (low, high) = (scene.seen.low[2], scene.seen.high[2]);
-                    let runs = affected(unseen, step.reach(scene)).into_iter();
-                    runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
-                }
-                _ => std::iter::once(0..0).collect(),
-            };
-            if step.pass.when == When::Volume && !runs.is_empty() {
-                self.filtered = scene.seen;
-            }
-            for slices in runs {
-                let (slice, slices) = (slices.start, slices.end - slices.start);
-                let turn = Turn { image: self.shown, slice, slices, ..step.turn() };
-                let work = Work { slots, pipeline, scene, pass: step.pass, turn: &turn };
-                self.picture.dispatch(&mut self.order, &work)?;
-            }
-            // Taken as written from here on: if the submission fails, all of it is stale still.
-            self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
-        }
-        if let Some(screen) = self.slots.image(Slot::Screen, 0) {
-            self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, &self.readback);
-            self.picture.stamp("readback");
-        }
-        let (picture, timeline) = (&mut self.picture, &mut self.timeline);
-        self.measured.host("submit", || picture.submit(timeline))?;
-        self.measured.host("wait", || self.timeline.wait_all())?;
-        // A frame that has arrived since without its volume being shown is seen the next time.
-        if self.plan.steps_of(When::Volume).all(|(i, _)| self.stale[i]) {
-            self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);
-        }
-        self.stale.iter_mut().for_each(|stale| *stale = false);
-        Ok(())
-    }
-
     /// Waits until the device has done everything, and adds up what was measured.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.flush()?;
-        self.timeline.wait_all()?;
+        self.timelines.wait_all()?;
         for lane in &mut self.lanes {
-            lane.recorder.collect(&self.timeline, &mut self.measured)?;
+            lane.collect(&self.timelines, &mut self.measured)?;
         }
-        self.picture.collect(&self.timeline, &mut self.measured)
+        self.picture.collect(&self.timelines, &mut self.measured)
+    }
+
+    fn new_lanes(&self) -> Result<Vec<Lane>, GpuError> {
+        let (context, count) = (&self.context, self.order.queues.count());
+        let bytes = slab::frames_a_lane(&self.scene) * frame_bytes(&self.scene);
+        let (copy, ingest) = (Task::Copy.queue(count), Task::Ingest.queue(count));
+        // Slices of a 3D image are not sub-resources: not every queue may copy one alone.
+        let copies = copy != ingest && (chain::copied(&self.scene).is_none() || context.queue(copy).copies_slices);
+        let lane = |_| {
+            let copier = || Recorder::new(context, copy, "copy", false);
+            Ok(Lane {
+                copier: copies.then(copier).transpose()?,
+                recorder: Recorder::new(context, ingest, "frame", self.spans)?,
+                staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
+            })
+        };
+        (0..FRAMES_IN_FLIGHT).map(lane).collect()
     }
 }
 
@@ -323,17 +253,6 @@ fn pipelines_of(pipelines: &mut Pipelines, plan: &Plan, scene: &Scene) -> Result
 
 fn frame_bytes(scene: &Scene) -> u64 {
     Slot::Frames.bytes(scene) / u64::from(FRAMES_IN_FLIGHT)
-}
-
-fn lanes(context: &Arc<Context>, scene: &Scene, spans: bool) -> Result<Vec<Lane>, GpuError> {
-    let bytes = slab::frames_a_lane(scene) * frame_bytes(scene);
-    let lane = |_| {
-        Ok(Lane {
-            recorder: Recorder::new(context, "frame", spans)?,
-            staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
-        })
-    };
-    (0..FRAMES_IN_FLIGHT).map(lane).collect()
 }
 
 fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Buffer, GpuError> {
@@ -351,6 +270,6 @@ pub fn size_of(shape: Shape) -> [usize; 3] {
 
 impl Drop for Renderer {
     fn drop(&mut self) {
-        self.timeline.drain();
+        self.timelines.drain();
     }
 }

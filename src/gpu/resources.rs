@@ -11,6 +11,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 pub struct Image {
     context: Arc<Context>,
@@ -56,6 +57,7 @@ fn allocate(
     doing: &dyn Fn() -> String,
 ) -> Result<Allocation, GpuError> {
     context.faults.pass(Seam::Allocate).doing(doing)?;
+    context.counts.allocations.fetch_add(1, Ordering::Relaxed);
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     let Some(allocator) = allocator.as_mut() else {
         return Err(GpuError::Memory { doing: doing(), fault: "the context is shutting down".into() });

@@ -35,9 +35,8 @@ pub struct Candidate {
     pub lacks: Vec<&'static str>,
     /// What is optional and not there.
     pub without: Vec<&'static str>,
-    pub queue_family: u32,
-    /// Of time stamps; 0 for none.
-    pub valid_bits: u32,
+    /// The queues that are used: the first renders, the second takes frames in, the third copies them, as far as there are such.
+    pub queues: Vec<QueueOf>,
     /// Time stamps can be put on the host's clock.
     pub calibrated: bool,
     /// Shader invocations can be counted.
@@ -47,9 +46,27 @@ pub struct Candidate {
     pub max_bytes: u64,
 }
 
+/// A queue of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QueueOf {
+    pub family: u32,
+    /// Within its family.
+    pub index: u32,
+    /// Of its time stamps; 0 for none.
+    pub valid_bits: u32,
+    pub computes: bool,
+    /// Whether it copies single slices of a 3D image, and not only all of it.
+    pub copies_slices: bool,
+}
+
 impl Candidate {
     pub fn is_software(&self) -> bool {
         self.kind == vk::PhysicalDeviceType::CPU
+    }
+
+    /// Of the time stamps of the queue that renders; 0 for none.
+    pub fn valid_bits(&self) -> u32 {
+        self.queues.first().map_or(0, |q| q.valid_bits)
     }
 
     pub fn kind_name(&self) -> &'static str {
@@ -122,10 +139,15 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         need(v13.synchronization2 == vk::TRUE, "synchronization2");
         need(v13.maintenance4 == vk::TRUE, "maintenance4");
     }
-    let family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
-    need(family.is_some(), "a compute queue");
-    let valid_bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
+    let queues = queues(&families);
+    need(!queues.is_empty(), "a compute queue");
+    let valid_bits = queues.first().map_or(0, |q| q.valid_bits);
     let mut without = Vec::new();
+    match queues.len() {
+        0 | 1 => without.push("an asynchronous compute queue: frames are taken in between pictures, not beside them"),
+        2 => without.push("a transfer queue: frames are copied where they are converted"),
+        _ => {}
+    }
     if valid_bits == 0 {
         without.push("time stamps: no times are printed");
     }
@@ -149,14 +171,45 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         version: properties.api_version,
         lacks,
         without,
-        queue_family: family.unwrap_or(0) as u32,
-        valid_bits,
+        queues,
         calibrated,
         statistics,
         limits: properties.limits,
         // A driver older than 1.3 leaves this 0; it is refused anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
+}
+
+/// The queues to use: one that computes, best with graphics too, since that one may show pictures; another that computes, best one
+/// that does nothing else; and one that only copies.
+fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
+    let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
+    let of = |family: usize, index: u32| QueueOf {
+        family: family as u32,
+        index,
+        valid_bits: families[family].timestamp_valid_bits,
+        computes: families[family].queue_flags.contains(compute),
+        copies_slices: families[family].min_image_transfer_granularity.depth == 1
+            && families[family].min_image_transfer_granularity.width == 1
+            && families[family].min_image_transfer_granularity.height == 1,
+    };
+    let find =
+        |fits: &dyn Fn(&vk::QueueFamilyProperties) -> bool| families.iter().position(|f| f.queue_count > 0 && fits(f));
+    let first = find(&|f| f.queue_flags.contains(graphics | compute)).or(find(&|f| f.queue_flags.contains(compute)));
+    let Some(first) = first else { return Vec::new() };
+    let mut queues = vec![of(first, 0)];
+    let only_computes =
+        |f: &vk::QueueFamilyProperties| f.queue_flags.contains(compute) && !f.queue_flags.contains(graphics);
+    match find(&only_computes).filter(|f| *f != first) {
+        Some(beside) => queues.push(of(beside, 0)),
+        None if families[first].queue_count > 1 => queues.push(of(first, 1)),
+        None => return queues,
+    }
+    let only_copies = |f: &vk::QueueFamilyProperties| {
+        f.queue_flags.contains(vk::QueueFlags::TRANSFER) && !f.queue_flags.intersects(graphics | compute)
+    };
+    queues.extend(find(&only_copies).map(|family| of(family, 0)));
+    queues
 }
 
 /// The number of the chosen device.
@@ -202,8 +255,7 @@ mod tests {
             version: vk::API_VERSION_1_3,
             lacks,
             without: vec![],
-            queue_family: 0,
-            valid_bits: 64,
+            queues: vec![],
             calibrated: true,
             statistics: true,
             limits: vk::PhysicalDeviceLimits::default(),
@@ -221,6 +273,34 @@ mod tests {
         assert_eq!(choose(&devices, &Choice::Best).ok(), Some(2));
         assert_eq!(choose(&devices[..2], &Choice::Best).ok(), Some(0));
         assert_eq!(choose(&devices, &Choice::Name("PIPE".into())).ok(), Some(0));
+    }
+
+    fn family(flags: vk::QueueFlags, queue_count: u32, depth: u32) -> vk::QueueFamilyProperties {
+        let min_image_transfer_granularity = vk::Extent3D { width: depth, height: depth, depth };
+        vk::QueueFamilyProperties {
+            queue_flags: flags,
+            queue_count,
+            timestamp_valid_bits: 64,
+            min_image_transfer_granularity,
+        }
+    }
+
+    /// One queue in all (lavapipe); all in one family but several queues (Intel); families of their own (NVIDIA, AMD), of which one
+    /// that copies may only copy whole images.
+    #[test]
+    fn as_many_queues_are_used_as_there_are_for_different_work() {
+        use vk::QueueFlags as Q;
+        let all = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
+        let families = |list: &[vk::QueueFamilyProperties]| -> Vec<(u32, u32)> {
+            queues(list).iter().map(|q| (q.family, q.index)).collect()
+        };
+        assert_eq!(families(&[family(all, 1, 1)]), [(0, 0)]);
+        assert_eq!(families(&[family(all, 2, 1)]), [(0, 0), (0, 1)]);
+        let own = [family(all, 16, 1), family(Q::TRANSFER, 2, 0), family(Q::COMPUTE | Q::TRANSFER, 8, 1)];
+        assert_eq!(families(&own), [(0, 0), (2, 0), (1, 0)]);
+        assert_eq!(queues(&own).iter().map(|q| q.copies_slices).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(families(&[family(Q::TRANSFER, 1, 1), family(Q::COMPUTE, 1, 1)]), [(1, 0)]);
+        assert_eq!(families(&[family(Q::TRANSFER, 1, 1)]), []);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::recorder::{Place, Recorder, Work};
 use super::renderer::size_of;
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
-use super::timeline::Timeline;
+use super::timeline::Timelines;
 use super::{GpuError, formats};
 use crate::passes::slots::{Filled, Shape};
 use crate::passes::{Arrays, Bind, Part, Pass, Slot, Texels, Turn, When};
@@ -47,8 +47,8 @@ impl Single {
         let (reads, writes) = ((pass.reads)(scene, turn), (pass.writes)(scene, turn));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, turn.image + 1);
-        let mut timeline = Timeline::new(&self.context)?;
-        let mut recorder = Recorder::new(&self.context, pass.name, false)?;
+        let mut timelines = Timelines::new(&self.context, 1)?;
+        let mut recorder = Recorder::new(&self.context, 0, pass.name, false)?;
         let mut order = Order::default();
         let pipeline = self.pipelines.get(pass, scene, turn)?;
         let new = slots.fit(&plan, scene)?;
@@ -70,7 +70,7 @@ impl Single {
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
-        recorder.begin(&mut order, &timeline)?;
+        recorder.begin(&mut order, &timelines)?;
         recorder.clear_new(&mut order, &slots, &new);
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
@@ -94,10 +94,10 @@ impl Single {
             recorder.copy_out(&mut order, image, bind.slot, copy, &buffer);
             results.push((bind.name, size_of(image.shape), image.format, buffer));
         }
-        recorder.submit(&mut timeline)?;
-        let done = timeline.wait_all();
+        recorder.submit(&mut order, &mut timelines)?;
+        let done = timelines.wait_all();
         // Everything above is freed at the end, also when waiting failed.
-        timeline.drain();
+        timelines.drain();
         done?;
         let mut outputs = Arrays::default();
         for (name, size, format, buffer) in results {
@@ -115,7 +115,7 @@ pub struct Timed {
     dispatches: Vec<(Turn, Arc<Pipeline>)>,
     _pipelines: Pipelines,
     slots: Slots,
-    timeline: Timeline,
+    timelines: Timelines,
     order: Order,
     context: Arc<Context>,
     scene: Scene,
@@ -161,11 +161,11 @@ impl Timed {
         plan.slots.sort();
         plan.slots.dedup();
         let mut timed = Timed {
-            recorder: Recorder::new(context, pass.name, false)?,
+            recorder: Recorder::new(context, 0, pass.name, false)?,
             dispatches,
             _pipelines: pipelines,
             slots: Slots::new(context, 1),
-            timeline: Timeline::new(context)?,
+            timelines: Timelines::new(context, 1)?,
             order: Order::default(),
             context: context.clone(),
             scene: scene.clone(),
@@ -178,7 +178,7 @@ impl Timed {
 
     fn fill(&mut self, plan: &Plan, contents: &[(Slot, Texels)]) -> Result<(), GpuError> {
         let new = self.slots.fit(plan, &self.scene)?;
-        self.recorder.begin(&mut self.order, &self.timeline)?;
+        self.recorder.begin(&mut self.order, &self.timelines)?;
         self.recorder.clear_new(&mut self.order, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
@@ -197,24 +197,24 @@ impl Timed {
             self.recorder.copy_in(&mut self.order, &staging, image, place);
             keep.push(staging);
         }
-        self.recorder.submit(&mut self.timeline)?;
-        let done = self.timeline.wait_all();
+        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        let done = self.timelines.wait_all();
         // The staging buffers are freed at the end, also when waiting failed.
-        self.timeline.drain();
+        self.timelines.drain();
         done
     }
 
     /// Runs every iteration of the pass once, in one submission, and waits: the device's time for them all, ns; none where it
     /// has no time stamps. A pass that repeats works on what it left there the last time.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
-        self.recorder.begin(&mut self.order, &self.timeline)?;
+        self.recorder.begin(&mut self.order, &self.timelines)?;
         for (turn, pipeline) in &self.dispatches {
             let work = Work { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, turn };
             self.recorder.dispatch(&mut self.order, &work)?;
         }
-        self.recorder.submit(&mut self.timeline)?;
+        self.recorder.submit(&mut self.order, &mut self.timelines)?;
         let mut measured = Measured::new(&self.context, false);
-        self.recorder.collect(&self.timeline, &mut measured)?;
+        self.recorder.collect(&self.timelines, &mut measured)?;
         Ok(measured.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
     }
 
@@ -222,19 +222,19 @@ impl Timed {
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
-        self.recorder.begin(&mut self.order, &self.timeline)?;
+        self.recorder.begin(&mut self.order, &self.timelines)?;
         self.recorder.copy_out(&mut self.order, image, slot, 0, &buffer);
-        self.recorder.submit(&mut self.timeline)?;
-        let done = self.timeline.wait_all();
+        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        let done = self.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
-        self.timeline.drain();
+        self.timelines.drain();
         done.map(|()| Some(Texels::decode(size_of(image.shape), image.format, buffer.bytes())))
     }
 }
 
 impl Drop for Timed {
     fn drop(&mut self) {
-        self.timeline.drain();
+        self.timelines.drain();
     }
 }
 

@@ -1,4 +1,4 @@
-//! One timeline semaphore: what was submitted, and whether it is done.
+//! Timeline semaphores, one a queue: what was submitted, and whether it is done.
 
 use super::GpuError;
 use super::context::Context;
@@ -48,6 +48,13 @@ impl Timeline {
         self.wait(self.submitted)
     }
 
+    /// Whether a submission is done, without waiting for it.
+    pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
+        // SAFETY: the semaphore is alive.
+        let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) };
+        reached.map(|reached| reached >= value).doing(|| format!("run {}", self.doing))
+    }
+
     /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. A lost
     /// device has nothing in flight any more.
     pub fn drain(&self) {
@@ -56,6 +63,32 @@ impl Timeline {
             Err(error) if error.is_device_lost() => {}
             Err(_) => self.context.wait_idle(),
         }
+    }
+}
+
+/// Those of all queues that a renderer uses.
+pub struct Timelines(Vec<Timeline>);
+
+impl Timelines {
+    pub fn new(context: &Arc<Context>, queues: usize) -> Result<Timelines, GpuError> {
+        (0..queues).map(|_| Timeline::new(context)).collect::<Result<_, _>>().map(Timelines)
+    }
+
+    pub(super) fn of(&self, queue: usize) -> &Timeline {
+        &self.0[queue]
+    }
+
+    pub(super) fn of_mut(&mut self, queue: usize) -> &mut Timeline {
+        &mut self.0[queue]
+    }
+
+    pub fn wait_all(&self) -> Result<(), GpuError> {
+        self.0.iter().try_for_each(Timeline::wait_all)
+    }
+
+    /// See [`Timeline::drain`].
+    pub fn drain(&self) {
+        self.0.iter().for_each(Timeline::drain);
     }
 }
 

@@ -44,8 +44,14 @@ impl Stamps {
     /// None where the device's queue has no time stamps.
     ///
     /// With `statistics` invocations are counted too, where the device can.
-    pub fn new(context: &Arc<Context>, capacity: u32, statistics: bool) -> Result<Option<Stamps>, GpuError> {
-        if context.candidate.valid_bits == 0 {
+    pub fn new(
+        context: &Arc<Context>,
+        queue: usize,
+        capacity: u32,
+        statistics: bool,
+    ) -> Result<Option<Stamps>, GpuError> {
+        let queue = context.queue(queue);
+        if queue.valid_bits == 0 {
             return Ok(None);
         }
         let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(capacity);
@@ -54,7 +60,7 @@ impl Stamps {
         context.name(pool, "time stamps");
         let mut stamps =
             Stamps { context: context.clone(), pool, capacity, between: Vec::new(), statistics: None, counted: 0 };
-        if statistics && context.candidate.statistics {
+        if statistics && context.candidate.statistics && queue.computes {
             let create = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::PIPELINE_STATISTICS)
                 .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS)

@@ -25,7 +25,7 @@ pub fn device(context: &Context) -> Device {
         api: candidate.api_version(),
         is_software: candidate.is_software(),
         timestamp_period_ns: f64::from(context.limits.timestamp_period),
-        valid_bits: candidate.valid_bits,
+        valid_bits: candidate.valid_bits(),
         calibrated: candidate.calibrated,
         clocks: clocks(candidate.is_software()),
     }

@@ -286,9 +286,23 @@ impl Slot {
         matches!(self, Slot::SharpVolume | Slot::Volume | Slot::Quads | Slot::TileRanges | Slot::BrickRanges)
     }
 
-    /// Written and read by different queues where the device has several: created CONCURRENT then.
+    /// Used by different queues where the device has several, and created CONCURRENT then: all that stage 1 works on, since what is
+    /// new is cleared and filled where pictures are made.
     pub fn crosses_queues(self) -> bool {
-        matches!(self, Slot::Frames | Slot::SharpVolume | Slot::Volume)
+        matches!(
+            self,
+            Slot::Frames
+                | Slot::Conditioned
+                | Slot::ScanLut
+                | Slot::SliceA
+                | Slot::SliceB
+                | Slot::Growth
+                | Slot::SliceShares
+                | Slot::SliceForward
+                | Slot::SliceRows
+                | Slot::SharpVolume
+                | Slot::Volume
+        )
     }
 
     pub fn bytes(self, scene: &Scene) -> u64 {

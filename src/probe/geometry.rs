@@ -131,7 +131,8 @@ impl Probe {
         self.slices.at(slice) + self.advance_at(slice) * line / self.lines.len() as f64
     }
 
-    fn advance_at(&self, slice: f64) -> f64 {
+    /// The motor's way while the frame at a fractional slice is acquired.
+    pub(super) fn advance_at(&self, slice: f64) -> f64 {
         match &self.advance {
             Advance::None => 0.0,
             Advance::Same(a) => *a,
@@ -215,13 +216,12 @@ impl Probe {
         }
     }
 
-    /// Lowest and highest slice position of any line.
+    /// Lowest and highest slice position of any line, swept either way: what is looked at does not jump to and fro with the motor.
     pub fn slice_bounds(&self) -> (f64, f64) {
-        let last_line = (self.lines.len() - 1) as f64;
-        let last_slice = (self.slices.len() - 1) as f64;
-        let ends = [(0.0, 0.0), (last_line, 0.0), (0.0, last_slice), (last_line, last_slice)];
-        let ends = ends.map(|(line, slice)| self.slice_position(line, slice));
-        (ends.iter().copied().fold(f64::MAX, f64::min), ends.iter().copied().fold(f64::MIN, f64::max))
+        let last = (self.slices.len() - 1) as f64;
+        let share = 1.0 - 1.0 / self.lines.len() as f64;
+        let (low, high) = (self.advance_at(0.0).abs() * share, self.advance_at(last).abs() * share);
+        (self.slices.at(0.0) - low, self.slices.at(last) + high)
     }
 
     /// Corners of a box in space that holds the insonified region.

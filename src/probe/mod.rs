@@ -7,6 +7,7 @@ pub mod geometry;
 pub mod grid;
 pub mod motor;
 pub mod volumes;
+mod ways;
 
 pub use axis::Axis;
 pub use file::ProbeFile;

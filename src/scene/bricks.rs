@@ -228,9 +228,9 @@ fn sliced(probe: &Probe, positions: Option<[f64; 2]>) -> ([f64; 2], Side) {
         Advance::Same(a) => *a,
         Advance::Each(table) => table.get(k).copied().unwrap_or(0.0),
     };
-    // Each slice while its frame was acquired: from its first line's position to its last one's.
-    let least = |k: usize| probe.slices.at(k as f64) + advance(k).min(0.0);
-    let most = |k: usize| probe.slices.at(k as f64) + advance(k).max(0.0);
+    // Each slice while its frame was acquired, swept either way: bricks stay when the motor turns.
+    let least = |k: usize| probe.slices.at(k as f64) - advance(k).abs();
+    let most = |k: usize| probe.slices.at(k as f64) + advance(k).abs();
     if to < least(0) || from > most(count - 1) {
         return (all, Side::Outside);
     }

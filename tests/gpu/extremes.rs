@@ -256,7 +256,7 @@ fn timed(
     let device = std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().expect("a device"));
     let mut context = Context::new(&ContextOptions { device, validation: true }).expect("a Vulkan device");
     let own = Arc::get_mut(&mut context).expect("nobody else has it yet");
-    own.candidate.valid_bits = valid_bits.unwrap_or(own.candidate.valid_bits);
+    own.candidate.queues.iter_mut().for_each(|q| q.valid_bits = valid_bits.unwrap_or(q.valid_bits));
     own.limits.timestamp_period *= period.unwrap_or(1.0);
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\npicture = { size = [96, 96] }");
     let frames = body_frames(&scene, |p| 0.5 + 0.4 * (0.3 * p.y).sin());

@@ -16,6 +16,7 @@ mod half;
 mod known_answers;
 mod leaping;
 mod led_astray;
+mod live;
 mod modes;
 mod motion;
 mod passes;

@@ -112,7 +112,7 @@ fn a_quick_run_fills_every_row() {
     let mut volumes = 0;
     let report = run(&context, &asked, &mut || volumes += 1).expect("run");
     assert_eq!((volumes, asked.volumes()), (18 * 3, 18 * 3));
-    let repeats = if context.candidate.valid_bits > 0 { 2 } else { 0 };
+    let repeats = if context.candidate.valid_bits() > 0 { 2 } else { 0 };
     for row in report.tables.iter().flat_map(|t| &t.rows) {
         for times in [&row.times.picture, &row.times.preprocess] {
             assert_eq!(times.len(), repeats, "{}", row.label);

@@ -3,6 +3,12 @@
 use super::*;
 
 impl Renderer {
+    /// Whether a scene is another than the one that is shown, what the device decides of it aside.
+    pub fn is_other(&self, scene: &Scene) -> bool {
+        (&scene.geometry, &scene.settings, scene.input, scene.seen)
+            != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.seen)
+    }
+
     /// Takes a new scene. What it changes is run with the next picture; when it says `Everything` or `Frames`, frames have to
     /// be sent again first.
     ///
@@ -17,7 +23,13 @@ impl Renderer {
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         super::super::formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
-        self.collect()?;
+        // Frames that are on their way use nothing that a change of pictures alone touches: only the picture is waited for.
+        let touched =
+            |slots: &[Slot]| plan.steps_of(When::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)));
+        match &rerun {
+            Rerun::Steps { slots, .. } if !touched(slots) => self.drawn()?,
+            _ => self.collect()?,
+        }
         let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
@@ -43,7 +55,7 @@ impl Renderer {
                 self.forget_volumes();
                 if *rerun == Rerun::Everything {
                     self.slots.clear();
-                    self.lanes = lanes(&self.context, &self.scene, self.spans)?;
+                    self.lanes = self.new_lanes()?;
                     self.next_lane = 0;
                 }
                 self.plan.slots.clone()

@@ -11,11 +11,11 @@ impl Renderer {
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
         let (format, size) = (image.format, size_of(image.shape));
         let copy = if slot.takes_turns() { self.shown } else { 0 };
-        self.picture.collect(&self.timeline, &mut self.measured)?;
-        self.picture.begin(&mut self.order, &self.timeline)?;
+        self.picture.collect(&self.timelines, &mut self.measured)?;
+        self.picture.begin(&mut self.order, &self.timelines)?;
         self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);
-        self.picture.submit(&mut self.timeline)?;
-        let done = self.timeline.wait_all();
+        self.picture.submit(&mut self.order, &mut self.timelines)?;
+        let done = self.timelines.wait_all();
         if done.is_err() {
             // The copy may still be running.
             self.uploads.push(buffer);
@@ -28,6 +28,11 @@ impl Renderer {
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
         Ok(self.measured.take_times())
+    }
+
+    /// The same of what is done already, without waiting for the rest.
+    pub fn times_so_far(&mut self) -> Vec<PassTime> {
+        self.measured.take_times()
     }
 
     /// Every span since the last call, if they are kept, on the host's clock.

@@ -21,45 +21,59 @@ pub fn frames_a_lane(scene: &Scene) -> u64 {
 }
 
 impl Renderer {
-    /// Lays a slice behind those that wait, and sends them off when no more fit or it does not follow them.
-    pub(super) fn gather(&mut self, slice: u32, bytes: &[u8], image: u32) -> Result<(), GpuError> {
+    /// Where in the next lane's staging buffer this slice goes: behind those that wait, which are sent off first when it does not
+    /// follow them.
+    pub(super) fn gather(&mut self, slice: u32, image: u32) -> Result<usize, GpuError> {
         let follows = |s: &Slab| s.image == image && s.first + s.count == slice;
         if self.slab.as_ref().is_some_and(|slab| !follows(slab)) {
             self.flush()?;
         }
-        let slab = match &mut self.slab {
-            Some(slab) => slab,
-            None => {
-                let recorder = &mut self.lanes[self.next_lane].recorder;
-                recorder.collect(&self.timeline, &mut self.measured)?;
-                recorder.begin(&mut self.order, &self.timeline)?;
-                self.slab.insert(Slab { image, first: slice, count: 0 })
-            }
-        };
-        let staging = self.lanes[self.next_lane].staging.bytes_mut();
-        let at = slab.count as usize * bytes.len();
-        self.measured.host("stage", || staging[at..at + bytes.len()].copy_from_slice(bytes));
+        if self.slab.is_none() {
+            self.lanes[self.next_lane].collect(&self.timelines, &mut self.measured)?;
+        }
+        let slab = self.slab.get_or_insert(Slab { image, first: slice, count: 0 });
+        Ok(slab.count as usize * frame_bytes(&self.scene) as usize)
+    }
+
+    /// One more slice is there; sends them off when no more fit.
+    pub(super) fn gathered(&mut self) -> Result<(), GpuError> {
+        let Some(slab) = &mut self.slab else { return Ok(()) };
         slab.count += 1;
-        self.unseen[image as usize][slice as usize] = true;
-        match at + 2 * bytes.len() > staging.len() {
+        let next = (u64::from(slab.count) + 1) * frame_bytes(&self.scene);
+        match next > self.lanes[self.next_lane].staging.size {
             true => self.flush(),
             false => Ok(()),
         }
     }
 
-    /// Sends off what waits.
+    /// Sends off the slices that wait. The lines of one that is not whole are given up.
     pub(super) fn flush(&mut self) -> Result<(), GpuError> {
         let Some(Slab { image, first, count }) = self.slab.take() else { return Ok(()) };
-        let lane = self.next_lane;
-        self.next_lane = (lane + 1) % self.lanes.len();
-        let Lane { recorder, staging } = &mut self.lanes[lane];
-        if let Some(slot) = chain::copied(&self.scene)
-            && let Some(target) = self.slots.image(slot, image)
-        {
-            let place = Place { slot, copy: image, parts: first..first + count };
-            recorder.copy_in(&mut self.order, staging, target, place);
-            recorder.stamp("upload");
+        self.torn += u64::from(self.arriving.take().is_some());
+        let (Some(slot), true) = (chain::copied(&self.scene), count > 0) else { return Ok(()) };
+        let lane = &mut self.lanes[self.next_lane];
+        self.next_lane = (self.next_lane + 1) % FRAMES_IN_FLIGHT as usize;
+        let place = Place { slot, copy: image, parts: first..first + count };
+        lane.send(&mut self.order, &mut self.timelines, &self.slots, place, &mut self.measured)
+    }
+}
+
+impl Lane {
+    /// Copies what lies in the staging buffer to its place: all there is to do.
+    fn send(
+        &mut self,
+        order: &mut Order,
+        timelines: &mut Timelines,
+        slots: &Slots,
+        place: Place,
+        measured: &mut Measured,
+    ) -> Result<(), GpuError> {
+        let by = self.copier.as_mut().unwrap_or(&mut self.recorder);
+        by.begin(order, timelines)?;
+        if let Some(target) = slots.image(place.slot, place.copy) {
+            by.copy_in(order, &self.staging, target, place);
+            by.stamp("upload");
         }
-        self.measured.host("submit", || recorder.submit(&mut self.timeline))
+        measured.host("submit", || by.submit(order, timelines))
     }
 }

@@ -1,0 +1,15 @@
+//! Frames that arrive on their own clock, and the pictures of them: what a source says goes into volume images while those before are
+//! drawn. One thread listens ([`feed`]), one drives the device ([`Stream::step`]); [`turns`] says which image is whose, [`views`] in
+//! which geometry a volume is seen, [`statistics`] what came of it. Nothing here allocates, compiles or waits for the whole device once
+//! a geometry's first frame has been taken.
+
+pub mod feed;
+pub mod statistics;
+mod stream;
+pub mod turns;
+pub mod views;
+
+pub use feed::Feed;
+pub use statistics::Statistics;
+pub use stream::{Options, Shown, Step, Stream, StreamError};
+pub use turns::Update;

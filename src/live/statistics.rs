@@ -1,0 +1,154 @@
+//! What a stream did: counts, and how long frames took from their arrival to the pixels that show them.
+
+use super::turns::Counts;
+use crate::passes::PassTime;
+use hdrhistogram::Histogram;
+use std::fmt::Write as _;
+use std::time::Duration;
+
+/// Latencies up to a minute, in us, to three digits.
+const LONGEST: u64 = 60_000_000;
+
+/// Of a stream since it began, or since its statistics were taken last.
+#[derive(Clone, Debug)]
+pub struct Statistics {
+    /// Time that they cover.
+    pub time: Duration,
+    /// Frames that came.
+    pub frames: u64,
+    /// Frames that found no room while they waited.
+    pub lost: u64,
+    /// Frames that the renderer could not take, as those of the wrong size.
+    pub refused: u64,
+    pub pictures: u64,
+    pub volumes: Counts,
+    /// From the arrival of each frame to the end of the first picture that shows it, us.
+    pub latency: Histogram<u64>,
+    pub passes: Vec<PassTime>,
+}
+
+impl Default for Statistics {
+    fn default() -> Statistics {
+        // Bounds that the library takes: it never fails on them.
+        let latency = Histogram::new_with_bounds(1, LONGEST, 3).unwrap_or_else(|_| unreachable!());
+        Statistics {
+            time: Duration::ZERO,
+            frames: 0,
+            lost: 0,
+            refused: 0,
+            pictures: 0,
+            volumes: Counts::default(),
+            latency,
+            passes: Vec::new(),
+        }
+    }
+}
+
+impl Statistics {
+    pub(super) fn seen_after(&mut self, latency: Duration) {
+        self.latency.saturating_record((latency.as_micros() as u64).max(1));
+    }
+
+    /// The latency that this share of the frames does not exceed, ms.
+    pub fn latency_ms(&self, share: f64) -> f64 {
+        self.latency.value_at_quantile(share) as f64 / 1e3
+    }
+
+    /// Since `before`, which these go on from. Latencies and passes are those since then already.
+    pub fn since(&self, before: &Statistics) -> Statistics {
+        let counts = |now: Counts, then: Counts| Counts {
+            shown: now.shown - then.shown,
+            dropped: now.dropped - then.dropped,
+            incomplete: now.incomplete - then.incomplete,
+            left_out: now.left_out - then.left_out,
+        };
+        Statistics {
+            time: self.time.saturating_sub(before.time),
+            frames: self.frames - before.frames,
+            lost: self.lost - before.lost,
+            refused: self.refused - before.refused,
+            pictures: self.pictures - before.pictures,
+            volumes: counts(self.volumes, before.volumes),
+            ..self.clone()
+        }
+    }
+
+    /// One line. `floor`: the time that sound needs for a volume, s, where there is one.
+    pub fn line(&self, floor: Option<f64>) -> String {
+        let seconds = self.time.as_secs_f64().max(1e-9);
+        let rate = |n: u64| n as f64 / seconds;
+        let Counts { shown, dropped, incomplete, .. } = self.volumes;
+        let mut line = format!(
+            "frames {:.1}/s  volumes {:.2}/s  pictures {:.1}/s",
+            rate(self.frames),
+            rate(shown),
+            rate(self.pictures)
+        );
+        if let Some(floor) = floor {
+            let _ = write!(line, " ({:.0} % of what sound allows)", 100.0 * rate(shown) * floor);
+        }
+        let _ = write!(line, "  dropped {dropped}");
+        for (count, what) in [(incomplete, "incomplete"), (self.lost, "frames lost"), (self.refused, "frames refused")]
+        {
+            if count > 0 {
+                let _ = write!(line, ", {count} {what}");
+            }
+        }
+        if self.latency.is_empty() {
+            line.push_str("  no picture");
+        } else {
+            let [p50, p95, p99] = [0.5, 0.95, 0.99].map(|share| self.latency_ms(share));
+            let most = self.latency.max() as f64 / 1e3;
+            let _ = write!(line, "  latency ms p50 {p50:.1} p95 {p95:.1} p99 {p99:.1} max {most:.1}");
+        }
+        let mut passes: Vec<&PassTime> = self.passes.iter().filter(|p| p.total > 0.0).collect();
+        passes.sort_by(|a, b| b.total.total_cmp(&a.total));
+        let shown: Vec<_> = passes
+            .iter()
+            .take(4)
+            .map(|p| format!("{} {:.2} ms x {}", p.name, p.total / 1e6 / p.runs.max(1) as f64, p.runs))
+            .collect();
+        if !shown.is_empty() {
+            let _ = write!(line, "  {}", shown.join(", "));
+        }
+        line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_says_rates_drops_and_percentiles() {
+        let mut statistics = Statistics { time: Duration::from_secs(2), frames: 74, pictures: 4, ..Default::default() };
+        (1..=100).for_each(|n| statistics.seen_after(Duration::from_millis(n)));
+        statistics.volumes = Counts { shown: 2, dropped: 1, incomplete: 3, left_out: 0 };
+        statistics.passes = vec![PassTime { name: "scan_convert", runs: 74, total: 74e6 }];
+        let line = statistics.line(Some(0.25));
+        for part in [
+            "frames 37.0/s",
+            "volumes 1.00/s",
+            "pictures 2.0/s",
+            "25 % of what sound allows",
+            "dropped 1, 3 incomplete",
+            "p50 50.",
+            "p95 95.",
+            "p99 99.",
+            "max 100.",
+            "scan_convert 1.00 ms x 74",
+        ] {
+            assert!(line.contains(part), "{part}: {line}");
+        }
+        assert!(!line.contains("lost") && !line.contains('\n'), "{line}");
+    }
+
+    #[test]
+    fn latencies_beyond_all_bounds_are_kept_at_the_bound() {
+        let mut statistics = Statistics::default();
+        statistics.seen_after(Duration::from_secs(1_000_000));
+        statistics.seen_after(Duration::ZERO);
+        assert_eq!(statistics.latency.len(), 2);
+        assert!(statistics.latency_ms(1.0) >= 60_000.0);
+    }
+}

@@ -1,0 +1,334 @@
+//! Frames that arrive while pictures are drawn: what is shown is what was sent, whole, on one, two and three queues.
+
+use crate::common::*;
+use echolume::gpu::{Options, Renderer};
+use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
+use echolume::passes::{Slot, Texels};
+use echolume::probe::{Advance, Geometry, Probe};
+use echolume::scene::Settings;
+use echolume::source::live::{Event, Live};
+use echolume::source::recorder::Header;
+use echolume::source::{Frame, StoredType};
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// A device whose one queue stands for so many: the layers of 1.3.239 know no timeline semaphores, so where one queue plays several
+/// they call everything between submissions a hazard. Anything else fails the test all the same.
+struct Playing {
+    device: Device,
+    queues: usize,
+}
+
+impl Playing {
+    fn new(queues: usize) -> Playing {
+        let mut device = Device::new();
+        device.provoked = device.queue_count() < queues;
+        Playing { device, queues }
+    }
+}
+
+impl Drop for Playing {
+    fn drop(&mut self) {
+        let between = |m: &String| self.queues > 1 && m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2");
+        if !std::thread::panicking() {
+            let other: Vec<_> = self.device.messages().into_iter().filter(|m| !between(m)).collect();
+            assert!(other.is_empty(), "{} queues: {other:?}", self.queues);
+        }
+    }
+}
+
+/// A source that says what it was told to, at once.
+struct Told(VecDeque<Event>);
+
+impl Live for Told {
+    fn next(&mut self, _: Duration) -> Event {
+        self.0.pop_front().unwrap_or(Event::End(None))
+    }
+
+    fn can_wait(&self) -> bool {
+        true
+    }
+}
+
+/// The wobbler, whose motor goes on during a frame.
+fn moving(share: f64) -> Probe {
+    let probe = wobbler();
+    Probe { advance: Advance::Same(share * probe.slices.pitch()), ..probe }
+}
+
+fn header(share: f64) -> Header {
+    Header {
+        forward: Geometry::Sweep(moving(share)),
+        backward: Geometry::Sweep(moving(-share)),
+        stored: StoredType::U8,
+        range: [0.0, 255.0],
+    }
+}
+
+fn settings(toml: &str) -> Settings {
+    let small = "picture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8'";
+    toml::from_str(&match toml.split_once("slices.") {
+        Some((before, after)) => format!("{before}\n{small}, {after} }}"),
+        None => format!("{toml}\n{small} }}"),
+    })
+    .expect("settings")
+}
+
+/// A volume of a sweep, its frames in order of acquisition: every second one backwards, each sample from its place.
+fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
+    let (slices, bytes) = (9, 24 * 64);
+    let frame = |n: u32| {
+        let backward = number % 2 == 1;
+        let slice = if backward { slices - 1 - n } else { n } as usize;
+        let bytes = (0..bytes).map(|i| value(slice, i)).collect();
+        Frame { volume: number, number: n, slice, backward, time: None, bytes }
+    };
+    (0..slices).map(frame).collect()
+}
+
+/// Each slice carries the number of its sweep.
+fn stamped(number: u32) -> Vec<Frame> {
+    volume(number, |_, _| 10 * number as u8 + 5)
+}
+
+fn speckled(number: u32) -> Vec<Frame> {
+    let hash = |slice: usize, i: usize| (slice * 7919 + i * 104_729 + number as usize * 31) as u32;
+    volume(number, |slice, i| (hash(slice, i).wrapping_mul(2_654_435_761) >> 24) as u8)
+}
+
+/// Drives a stream to its end; `each` looks at it after each picture.
+fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> Vec<String> {
+    let (mut faults, begun) = (Vec::new(), Instant::now());
+    loop {
+        assert!(begun.elapsed() < Duration::from_secs(300), "the stream does not end");
+        match stream.step(Duration::from_millis(20)).expect("step") {
+            Step::Picture(shown) => each(stream, shown),
+            Step::Fault(fault) => faults.push(fault),
+            Step::Went => {}
+            Step::End(None) => return faults,
+            Step::End(Some(why)) => panic!("{why}"),
+        }
+    }
+}
+
+fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
+    let feed = Feed::new(Box::new(Told(events.into())), None).expect("thread");
+    Stream::new(device, feed, settings, options)
+}
+
+fn events(header: Header, frames: impl IntoIterator<Item = Frame>) -> Vec<Event> {
+    std::iter::once(Event::Begin(Box::new(header))).chain(frames.into_iter().map(Event::Frame)).collect()
+}
+
+fn volume_of(renderer: &mut Renderer) -> Texels {
+    renderer.read(Slot::Volume).expect("read").expect("there")
+}
+
+/// Prevents slices of another frame, of a frame that was torn, or of another volume image, whatever comes in which order: frames in
+/// any order, whole or line by line, into several volume images, while pictures are begun and ended in between, on one queue or as if
+/// there were three.
+#[test]
+fn every_slice_is_what_a_file_gives_after_any_interleaving() {
+    let mut noise = Noise(17);
+    for (queues, toml) in
+        (1..=3).flat_map(|q| ["mode = 'vr'", "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"].map(|t| (q, t)))
+    {
+        let playing = Playing::new(queues);
+        let device = &playing.device;
+        let views = live::views::Views::new(&header(0.3), &settings(toml), Update::Whole).expect("views");
+        let scene = views.first().clone();
+        let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+        let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
+        for round in 0..2 {
+            let volumes = [speckled(2 * round), speckled(2 * round + 1)];
+            let mut left: Vec<(usize, usize)> = (0..18).map(|n| (n / 9, n % 9)).collect();
+            let mut drawing = false;
+            while !left.is_empty() {
+                let (image, n) = left.swap_remove((noise.next() * left.len() as f64) as usize);
+                let frame = &volumes[image][n];
+                let slice = frame.slice as u32;
+                if noise.next() < 0.5 {
+                    renderer.frame(slice, &frame.bytes, image as u32).expect("frame");
+                } else {
+                    // A frame that is given up for being begun again, and then all of its lines.
+                    renderer.lines(slice, 0, &frame.bytes[..64 * 5], image as u32).expect("lines");
+                    let chunks = frame.bytes.chunks(64 * 7).enumerate();
+                    let whole =
+                        chunks.map(|(i, c)| renderer.lines(slice, 7 * i as u32, c, image as u32).expect("lines"));
+                    assert_eq!(whole.filter(|whole| *whole).count(), 1);
+                }
+                if noise.next() < 0.3 {
+                    match std::mem::replace(&mut drawing, noise.next() < 0.7) {
+                        true => drop(renderer.end_picture().expect("picture")),
+                        false => renderer.show((noise.next() * 2.0) as u32).expect("show"),
+                    }
+                    renderer.begin_picture().expect("picture");
+                }
+            }
+            for (image, frames) in volumes.iter().enumerate() {
+                let mut plain = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
+                frames.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
+                plain.show(0).expect("show");
+                renderer.show(image as u32).expect("show");
+                assert!(
+                    renderer.picture().expect("picture") == plain.picture().expect("picture"),
+                    "{queues} queues: {toml}"
+                );
+                assert_eq!(volume_of(&mut renderer), volume_of(&mut plain), "{queues} queues, image {image}: {toml}");
+            }
+        }
+        assert!(renderer.torn() > 0);
+    }
+}
+
+/// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
+#[test]
+fn a_whole_volume_is_never_mixed() {
+    for (images, queues) in [(2, 1), (3, 1), (2, 3), (3, 2)] {
+        let playing = Playing::new(queues);
+        let device = &playing.device;
+        let options = live::Options { update: Update::Whole, images, queues: Some(queues) };
+        let frames = (0..12).flat_map(stamped);
+        let mut stream =
+            stream(device, events(header(0.3), frames), settings("mode = 'mip'\nslices.everything = true"), options);
+        let mut shown = Vec::new();
+        let faults = run(&mut stream, |stream, picture| {
+            let volume = volume_of(stream.renderer().expect("begun"));
+            let expected = f64::from(10 * picture.volume as u8 + 5) / 255.0;
+            // Pixels outside the sector are 0.
+            let mixed = volume.values.iter().find(|v| **v != 0.0 && (**v - expected).abs() > 1e-6);
+            assert_eq!(mixed, None, "volume {} of {images} images, {queues} queues", picture.volume);
+            assert!(volume.values.iter().filter(|v| **v != 0.0).count() > 9 * 300);
+            shown.push(picture.volume);
+        });
+        assert!(faults.is_empty() && shown.windows(2).all(|w| w[0] < w[1]), "{shown:?} {faults:?}");
+        let Statistics { volumes, frames, pictures, latency, .. } = stream.statistics().expect("statistics");
+        assert_eq!((frames, volumes.shown + volumes.dropped + volumes.incomplete), (108, 12), "{volumes:?}");
+        assert_eq!(
+            (pictures, latency.len()),
+            (volumes.shown, 9 * volumes.shown),
+            "a latency for each frame that was shown"
+        );
+    }
+}
+
+/// Prevents work that grows with time: once all ways of a sweep have been seen, frames and pictures take no memory of the device, no
+/// pipeline and no wait for all of it.
+#[test]
+fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
+    let device = Device::new();
+    for (update, toml) in [
+        (Update::Whole, "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Rolling, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Whole, "mode = 'orthogonal'"),
+    ] {
+        let options = live::Options { update, ..live::Options::default() };
+        let mut stream = stream(&device, events(header(0.3), (0..10).flat_map(speckled)), settings(toml), options);
+        let count = || {
+            let counts = &device.counts;
+            [&counts.allocations, &counts.pipelines, &counts.waits_idle].map(|c| c.load(Ordering::Relaxed))
+        };
+        let (mut before, mut pictures) = (None, 0);
+        run(&mut stream, |_, shown| {
+            pictures += 1;
+            // Forwards, backwards, and rolling a mixture.
+            if shown.volume >= 2 {
+                assert_eq!(*before.get_or_insert_with(count), count(), "{update:?}: {toml}");
+            }
+        });
+        assert!(pictures > 3 && before.is_some(), "{update:?}: {pictures} pictures");
+    }
+}
+
+/// Prevents rolling volumes that end otherwise than whole ones, and slices that are made anew for no reason.
+#[test]
+fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
+    for queues in 1..=3 {
+        let playing = Playing::new(queues);
+        let device = &playing.device;
+        let toml = "mode = 'vr'\nslices.smooth = { elevation = 1.0 }";
+        let options = live::Options { update: Update::Rolling, queues: Some(queues), ..live::Options::default() };
+        let mut last = None;
+        let mut stream = stream(device, events(header(0.3), (0..4).flat_map(speckled)), settings(toml), options);
+        run(&mut stream, |_, shown| last = Some((shown.volume, shown.picture)));
+        let scene = stream.scene().expect("begun").clone();
+        let Geometry::Sweep(probe) = &scene.geometry else { panic!("a sweep") };
+        let back = vec![-0.3 * probe.slices.pitch(); 9];
+        assert_eq!(probe.advance, Advance::Each(back), "all slices are of volume 3, which was swept backwards");
+        let mut plain = Renderer::new(device, scene, &Options::default()).expect("renderer");
+        speckled(3).iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
+        plain.show(0).expect("show");
+        assert!(last == Some((3, plain.picture().expect("picture"))), "{queues} queues");
+        let counts = stream.statistics().expect("statistics").volumes;
+        assert_eq!((counts.shown, counts.dropped, counts.incomplete), (4, 0, 0));
+
+        // One more frame: smoothing across slices reaches three to either side, and nothing else is smoothed again.
+        let renderer = stream.renderer().expect("begun");
+        let work = |r: &mut Renderer| {
+            r.frame(4, &speckled(4)[4].bytes, 0)?;
+            r.show(0)?;
+            r.picture()
+        };
+        let done = renderer.recorded(work).expect("picture");
+        let made: Vec<_> = done.iter().filter(|(name, _)| *name == "tile_ranges").map(|(_, n)| n[2]).collect();
+        assert_eq!(made, [7], "{done:?}");
+    }
+}
+
+/// Prevents a stream that stops, or shows anything wrong, for what a source does wrong.
+#[test]
+fn what_is_wrong_is_said_and_left_out() {
+    let device = Device::new();
+    let mut events = events(header(0.0), stamped(1));
+    events.insert(0, Event::Frame(stamped(0).remove(0)));
+    let of = |change: &dyn Fn(&mut Frame)| {
+        let mut frame = stamped(2).remove(0);
+        change(&mut frame);
+        Event::Frame(frame)
+    };
+    events.push(of(&|f| f.bytes.truncate(1000)));
+    events.push(of(&|f| f.bytes.extend([0; 64])));
+    events.push(of(&|f| f.slice = 9));
+    events.push(of(&|f| f.slice = usize::MAX));
+    events.push(Event::Lines { frame: stamped(2).remove(3), first: 7 });
+    events.push(Event::Fault("the peer went away".into()));
+    events.push(Event::Begin(Box::new(header(0.3))));
+    events.extend(stamped(3).into_iter().map(Event::Frame));
+    // Another geometry, with frames of another size.
+    let other = Geometry::Sweep(linear());
+    events.push(Event::Begin(Box::new(Header { forward: other.clone(), backward: other, ..header(0.0) })));
+    let frame =
+        |n| Frame { volume: 4, number: n, slice: n as usize, backward: false, time: None, bytes: vec![45; 48 * 20] };
+    events.extend((0..7).map(|n| Event::Frame(frame(n))));
+    let mut stream = stream(&device, events, settings("mode = 'mip'"), live::Options::default());
+    let mut shown = Vec::new();
+    let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
+    assert_eq!(shown.last(), Some(&4), "{shown:?}: {faults:?}");
+    let expected =
+        ["before anything", "1000 bytes", "no whole lines", "slice 9", "slice", "from line 7", "the peer went away"];
+    assert_eq!(faults.len(), expected.len(), "{faults:?}");
+    for (fault, part) in faults.iter().zip(expected) {
+        assert!(fault.contains(part), "{part}: {fault}");
+    }
+}
+
+/// Prevents settings that reach pictures only with the next volume, or take the stream down.
+#[test]
+fn other_settings_are_drawn_of_the_volume_that_is_there() {
+    let device = Device::new();
+    let mut stream =
+        stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::Options::default());
+    let mut first = None;
+    while first.is_none() {
+        if let Step::Picture(shown) = stream.step(Duration::from_millis(20)).expect("step") {
+            first = Some(shown.picture);
+        }
+    }
+    assert!(stream.change(settings("mode = 'mip'\ncamera = { zoom = -1 }")).is_err());
+    stream.change(settings("mode = 'mip'\ncamera = { azimuth = 40 }")).expect("change");
+    let mut second = None;
+    run(&mut stream, |_, shown| second = Some((shown.volume, shown.picture)));
+    let (volume, second) = second.expect("drawn again");
+    assert!(volume == 0 && Some(&second) != first.as_ref());
+}
