@@ -109,7 +109,7 @@ impl Filter {
         let scene = scene(&grey, settings).map_err(input)?;
         self.check_targets()?;
 
-        let context = super::asked::open_device(self.device.clone(), self.validate)?;
+        let context = super::look::open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
         let colour = if grey.from_colour { ", colour became grey by the weights of Rec. 709" } else { "" };
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);

@@ -5,6 +5,7 @@ mod convert;
 mod devices;
 mod filter;
 mod info;
+mod look;
 mod phantom;
 mod probe;
 mod profile;
@@ -12,6 +13,7 @@ mod render;
 mod report;
 mod report_error;
 mod report_tables;
+mod stream;
 
 use clap::{Parser, Subcommand};
 use std::io::{ErrorKind, Write};
@@ -60,6 +62,8 @@ struct Arguments {
 enum Command {
     /// Render a recording, or without one a synthetic fetal head, to a picture
     Render(Box<render::Render>),
+    /// Render frames as they arrive: the phantom, a recording, a pipe, a scanner on the network
+    Stream(Box<stream::Stream>),
     /// Run the 2D filters on an ordinary picture, and measure what they do
     Filter(Box<filter::Filter>),
     /// Say where the time goes, pass by pass, and compare two such runs
@@ -107,6 +111,7 @@ pub fn run() -> ExitCode {
     };
     let done = start_log(arguments.verbose, arguments.log_file.as_deref()).and_then(|()| match arguments.command {
         Command::Render(render) => render.run(),
+        Command::Stream(stream) => stream.run(),
         Command::Filter(filter) => filter.run(),
         Command::Profile(profile) => profile.run(),
         Command::Report(report) => report.run(),

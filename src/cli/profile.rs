@@ -1,6 +1,7 @@
 //! `echolume profile`.
 
-use super::asked::{Asked, open_device};
+use super::asked::Asked;
+use super::look::open_device;
 use super::{Failure, failed, input, say};
 use echolume::gpu::Choice;
 use echolume::measuring::profile;

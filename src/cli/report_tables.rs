@@ -46,7 +46,7 @@ impl Tables {
         self.check_targets(growth_file.as_deref())?;
         let greys: Vec<Grey> =
             self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
-        let context = super::asked::open_device(self.device.clone(), false)?;
+        let context = super::look::open_device(self.device.clone(), false)?;
 
         let asked = Asked { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
         let bar = indicatif::ProgressBar::new(asked.volumes() as u64).with_message("volumes");

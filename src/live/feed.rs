@@ -29,6 +29,7 @@ pub struct Arrived {
 /// A source that is listened to.
 pub struct Feed {
     shared: Arc<Shared>,
+    can_wait: bool,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -45,6 +46,8 @@ struct Shared {
 struct Waiting {
     events: VecDeque<Arrived>,
     bytes: usize,
+    /// The volume whose frame came last.
+    newest: Option<u32>,
     /// Of this volume a frame was lost: the rest of it would be of no use.
     lost_volume: Option<u32>,
 }
@@ -72,6 +75,7 @@ impl Shared {
             while can_wait && is_full(&waiting) && !self.stop.load(Ordering::Relaxed) {
                 waiting = self.moved.wait_timeout(waiting, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
             }
+            waiting.newest = Some(frame.volume);
             if is_full(&waiting) {
                 waiting.lost_volume = Some(frame.volume);
             }
@@ -94,11 +98,11 @@ impl Feed {
     /// # Errors
     /// A thread that cannot be started.
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
-        let shared = Arc::new(Shared::default());
+        let (shared, can_wait) = (Arc::new(Shared::default()), source.can_wait());
         let theirs = shared.clone();
         let tape = record.map(|path| Tape { path: path.into(), files: 0, writer: None, header: None, lines: None });
         let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;
-        Ok(Feed { shared, thread: Some(thread) })
+        Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
 
     /// What came next, waiting for it at most so long.
@@ -113,6 +117,11 @@ impl Feed {
         drop(waiting);
         self.shared.moved.notify_all();
         Some(arrived)
+    }
+
+    /// Whether a volume that is about to be taken is stale: a whole one has come after it, and the source does not wait.
+    pub fn is_behind(&self, volume: u32) -> bool {
+        !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 
     /// Frames, or parts of frames that came line by line, for which there was no room.

@@ -73,6 +73,30 @@ impl Statistics {
         }
     }
 
+    /// Adds what happened later.
+    pub fn add(&mut self, later: &Statistics) {
+        self.time += later.time;
+        self.frames += later.frames;
+        self.lost += later.lost;
+        self.refused += later.refused;
+        self.pictures += later.pictures;
+        self.volumes.shown += later.volumes.shown;
+        self.volumes.dropped += later.volumes.dropped;
+        self.volumes.incomplete += later.volumes.incomplete;
+        self.volumes.left_out += later.volumes.left_out;
+        // Of the same bounds: nothing is lost.
+        let _ = self.latency.add(&later.latency);
+        for pass in &later.passes {
+            match self.passes.iter_mut().find(|p| p.name == pass.name) {
+                Some(sum) => {
+                    sum.runs += pass.runs;
+                    sum.total += pass.total;
+                }
+                None => self.passes.push(pass.clone()),
+            }
+        }
+    }
+
     /// One line. `floor`: the time that sound needs for a volume, s, where there is one.
     pub fn line(&self, floor: Option<f64>) -> String {
         let seconds = self.time.as_secs_f64().max(1e-9);

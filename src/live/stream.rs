@@ -180,6 +180,7 @@ impl Stream {
 
     fn lines(&mut self, frame: &Frame, first: usize, at: Instant) -> Result<Step, StreamError> {
         self.statistics.frames += u64::from(first == 0);
+        let feed = &self.feed;
         let Some(now) = &mut self.now else {
             return Ok(Step::Fault("a frame came before anything was said about its geometry".into()));
         };
@@ -189,7 +190,7 @@ impl Stream {
             let error = GpuError::FrameSlice { slice, slices: now.renderer.scene().slices() };
             return Ok(Step::Fault(error.to_string()));
         }
-        let Some(image) = now.turns.place(frame.volume) else { return Ok(Step::Went) };
+        let Some(image) = now.turns.place(frame.volume, || feed.is_behind(frame.volume)) else { return Ok(Step::Went) };
         match now.renderer.lines(slice, first as u32, &frame.bytes, image) {
             Ok(false) => {}
             Ok(true) => {
@@ -236,6 +237,11 @@ impl Stream {
         self.statistics.latency.reset();
         self.taken = now;
         Ok(since)
+    }
+
+    /// Volumes that were shown so far.
+    pub fn volumes_shown(&self) -> u64 {
+        self.now.as_ref().map_or(0, |now| now.turns.counts().shown)
     }
 
     /// The time that sound needs for a volume, s; none before the first frame and of what is not swept.

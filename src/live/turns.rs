@@ -88,15 +88,16 @@ impl Turns {
         self.counts
     }
 
-    /// The image that a frame of this volume goes into; none where it is left out.
-    pub fn place(&mut self, volume: u32) -> Option<u32> {
+    /// The image that a frame of this volume goes into; none where it is left out. Whether a volume that begins is `stale` already, and
+    /// left out whole, is asked once.
+    pub fn place(&mut self, volume: u32, stale: impl FnOnce() -> bool) -> Option<u32> {
         let of_now = self.filling.as_ref().map(|f| f.volume);
         if of_now != Some(volume) {
             if of_now.max(self.over).is_some_and(|newest| volume <= newest) {
                 self.counts.left_out += 1;
                 return None;
             }
-            self.begin(volume);
+            self.begin(volume, stale());
         }
         let image = self.filling.as_ref().and_then(|f| f.image);
         self.counts.left_out += u64::from(image.is_none());
@@ -104,13 +105,14 @@ impl Turns {
     }
 
     /// A newer volume: the one before it is over, whole or not.
-    fn begin(&mut self, volume: u32) {
+    fn begin(&mut self, volume: u32, stale: bool) {
         self.end();
         let taken = |image: &u32| self.shown == Some(*image) || self.ready.as_ref().is_some_and(|r| r.image == *image);
         let free = match self.update {
             Update::Whole => (0..self.images()).find(|image| !taken(image)),
             Update::Rolling => Some(0),
         };
+        let free = free.filter(|_| !stale);
         let there = vec![false; self.slices];
         self.filling = Some(Filling { volume, image: free, there, missing: self.slices });
     }
@@ -175,7 +177,7 @@ mod tests {
         }
 
         fn frame(&mut self, volume: u32, slice: usize) {
-            if let Some(image) = self.turns.place(volume) {
+            if let Some(image) = self.turns.place(volume, || false) {
                 self.carries[image as usize][slice] = volume;
                 self.turns.arrived(slice, volume % 2 == 1);
             }
@@ -234,6 +236,15 @@ mod tests {
         model.frame(0, 1);
         assert_eq!(model.carries, [[0, 0, 0, 1]], "a late frame does not put an old slice beside new ones");
         assert_eq!(model.turns.counts(), Counts { shown: 1, left_out: 1, ..Counts::default() });
+    }
+
+    #[test]
+    fn a_volume_that_is_stale_when_it_begins_is_left_out_whole() {
+        let mut turns = Turns::new(Update::Whole, 3, 2);
+        assert_eq!(turns.place(0, || true), None);
+        assert_eq!(turns.place(0, || panic!("was asked")), None);
+        assert_eq!(turns.place(1, || false), Some(0));
+        assert_eq!(turns.counts(), Counts { dropped: 1, left_out: 2, ..Counts::default() });
     }
 
     #[test]

@@ -75,7 +75,7 @@ impl Renderer {
         let (whole, line) = (self.frame_bytes(), self.frame_bytes() / self.scene.frame_size()[1] as usize);
         let at = first as usize * line;
         let follows = self.arriving.as_ref().is_some_and(|a| (a.slice, a.image, a.there) == (slice, image, at));
-        if bytes.len() % line != 0 || at + bytes.len() > whole || !(first == 0 || follows) {
+        if !bytes.len().is_multiple_of(line) || at + bytes.len() > whole || !(first == 0 || follows) {
             let there = self.arriving.as_ref().map_or(0, |a| a.there / line) as u32;
             return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), there });
         }

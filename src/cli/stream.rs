@@ -1,0 +1,205 @@
+//! `echolume stream`.
+
+use super::look::Look;
+use super::{Failure, failed, input, say};
+use echolume::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
+use echolume::picture;
+use echolume::source::live::{Live as Source, Pace, Paced};
+use echolume::source::phantom::{self, Phantom};
+use echolume::source::played::Kept;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Volumes of the phantom that are computed beforehand and played in turns: forth and back twice.
+const PHANTOM_VOLUMES: usize = 4;
+/// Volumes a second of the phantom, where nothing else is said.
+const PHANTOM_RATE: f64 = 1.0;
+/// Time between two lines of statistics.
+const EVERY: Duration = Duration::from_secs(1);
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Each second one line: frames, volumes and pictures a second, volumes dropped, latency from the arrival of a frame to \
+                        the pixels that show it, and the passes that took longest.\n\nExamples:\n  \
+                        echolume stream --null --volumes 20\n  \
+                        echolume stream --source sweep.frames --real-time --out pictures\n  \
+                        echolume stream --source phantom --rate 5 --update rolling --null --for 10s"
+)]
+pub struct Stream {
+    /// phantom; a recording (.mha, .mhd, .vol, .frames)
+    #[arg(long, value_name = "SOURCE", default_value = "phantom")]
+    source: String,
+    #[command(flatten)]
+    look: Look,
+    /// Geometry of the probe (TOML), where the source does not bring its own
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// Volumes a second of a recording or the phantom [default: as fast as they are taken; the phantom: 1]
+    #[arg(long, value_name = "N", conflicts_with = "real_time")]
+    rate: Option<f64>,
+    /// Play a recording as it was stamped
+    #[arg(long)]
+    real_time: bool,
+    /// Times that a recording is played
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    rounds: u32,
+    /// whole: volumes are shown when all of their frames have come; rolling: each frame at once
+    #[arg(long, value_name = "HOW", default_value = "whole")]
+    update: String,
+    /// Volume images that take turns where volumes are whole, 2 or 3
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=3))]
+    images: u32,
+    /// Queues of the device that share the work, 1 to 3 [default: all that it has for different work]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
+    queues: Option<u8>,
+    /// Write each picture into this folder (PNG, named by its volume)
+    #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
+    out: Option<PathBuf>,
+    /// Draw the pictures and keep none
+    #[arg(long)]
+    null: bool,
+    /// Write every frame that arrives to this file (.frames)
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// End after so many volumes
+    #[arg(long, value_name = "N")]
+    volumes: Option<u64>,
+    /// End after so long, such as 90s or 10m
+    #[arg(long = "for", value_name = "TIME")]
+    time: Option<humantime::Duration>,
+    /// Run with Vulkan validation; any message is a failure
+    #[arg(long)]
+    validate: bool,
+}
+
+impl Stream {
+    pub fn run(&self) -> Result<(), Failure> {
+        let update = match self.update.as_str() {
+            "whole" => Update::Whole,
+            "rolling" => Update::Rolling,
+            other => return Err(input(format!("--update {other}: must be whole or rolling"))),
+        };
+        let settings = self.look.layers(self.source == "phantom", &[])?.finish().map_err(input)?;
+        if let Some(folder) = &self.out {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+        }
+        if let Some(file) = &self.record {
+            self.check_record(file)?;
+        }
+        let source = self.open()?;
+        let context = self.look.device(self.validate)?;
+        let feed = Feed::new(source, self.record.as_deref())
+            .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
+        let options = Options { update, images: self.images, queues: self.queues.map(usize::from) };
+        let mut stream = Live::new(&context, feed, settings, options);
+        let done = self.go(&mut stream);
+        drop(stream);
+        done?;
+        match context.messages().first() {
+            None => Ok(()),
+            Some(first) => Err(failed(format!("validation: {first}"))),
+        }
+    }
+
+    fn go(&self, stream: &mut Live) -> Result<(), Failure> {
+        let began = Instant::now();
+        let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
+        let end = loop {
+            match stream.step(Duration::from_millis(50)).map_err(fault)? {
+                Step::Picture(shown) => self.keep(&shown)?,
+                Step::Fault(fault) => tracing::warn!("{fault}"),
+                Step::Went => {}
+                Step::End(why) => break why,
+            }
+            if told.elapsed() >= EVERY {
+                told = Instant::now();
+                let since = stream.take_statistics().map_err(fault)?;
+                say!("{:>6.1} s  {}", began.elapsed().as_secs_f64(), since.line(stream.acquisition_time()));
+                all.add(&since);
+                // After the first seconds everything that is kept is there.
+                if memory.is_none() && began.elapsed() > 5 * EVERY {
+                    memory = resident();
+                }
+            }
+            let volumes = stream.volumes_shown();
+            let enough = self.volumes.is_some_and(|n| volumes >= n);
+            if enough || self.time.is_some_and(|t| began.elapsed() >= *t) {
+                break None;
+            }
+        };
+        all.add(&stream.take_statistics().map_err(fault)?);
+        say!("in all    {}", all.line(stream.acquisition_time()));
+        let counts = all.volumes;
+        say!(
+            "{} frames, {} volumes shown, {} dropped, {} incomplete, {} pictures{}",
+            all.frames,
+            counts.shown,
+            counts.dropped,
+            counts.incomplete,
+            all.pictures,
+            match (memory, resident()) {
+                (Some(then), Some(now)) => format!("; memory {then} MiB after 5 s, {now} MiB at the end"),
+                _ => String::new(),
+            }
+        );
+        match end {
+            None => Ok(()),
+            Some(why) => Err(failed(format!("{}: {why}", self.source))),
+        }
+    }
+
+    fn keep(&self, shown: &Shown) -> Result<(), Failure> {
+        let Some(folder) = &self.out else { return Ok(()) };
+        let file = folder.join(format!("volume-{:06}.png", shown.volume));
+        shown.picture.save(&file).map_err(failed)
+    }
+
+    /// Refuses to write over anything that is no recording of frames, or that is being played.
+    fn check_record(&self, file: &Path) -> Result<(), Failure> {
+        let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
+        if file.extension().is_none_or(|e| e != "frames") {
+            return refuse("must end in .frames");
+        }
+        let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
+        match same(Path::new(&self.source)) {
+            true => refuse("would replace what is played"),
+            false => picture::check_target(file).map_err(failed),
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn Source>, Failure> {
+        let is_phantom = self.source == "phantom";
+        let pace = match (self.rate, self.real_time) {
+            (Some(rate), _) if !(rate > 0.0 && rate <= 1e6) => {
+                return Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")));
+            }
+            (Some(rate), _) => Pace::Volumes(rate),
+            (None, true) => Pace::Recorded,
+            (None, false) if is_phantom => Pace::Volumes(PHANTOM_RATE),
+            (None, false) => Pace::Fast,
+        };
+        if is_phantom {
+            let options = phantom::Options { volumes: PHANTOM_VOLUMES, ..phantom::Options::default() };
+            let phantom = Phantom::new(options).map_err(input)?;
+            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), pace, u32::MAX)));
+        }
+        let recording = echolume::source::open(Path::new(&self.source), self.probe.as_deref()).map_err(input)?;
+        Ok(Box::new(Paced::new(recording, pace, self.rounds)))
+    }
+}
+
+fn fault(error: StreamError) -> Failure {
+    match error {
+        StreamError::Scene(e) => input(e),
+        StreamError::Gpu(e) => failed(e),
+    }
+}
+
+/// Memory of this process that is in use, MiB; none where the system does not say.
+fn resident() -> Option<u64> {
+    let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
+    // Of 4 KiB on every system that has this file and that this runs on.
+    Some((pages * 4096) >> 20)
+}
