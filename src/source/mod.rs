@@ -1,4 +1,4 @@
-//! Where frames come from: files, the phantom, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
+//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
 //! any bytes give frames or an [`InputError`], never a panic, and no more memory is taken than the file's own bytes account
 //! for.
 
@@ -10,6 +10,7 @@ mod kretz;
 pub mod live;
 mod metaimage;
 pub mod phantom;
+pub mod piped;
 mod pixels;
 pub mod played;
 pub mod recorder;
