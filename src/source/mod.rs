@@ -1,10 +1,11 @@
-//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
+//! Where frames come from: files, the phantom, a pipe, tracked frames that are compounded, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
 //! any bytes give frames or an [`InputError`], never a panic, and no more memory is taken than the file's own bytes account
 //! for.
 
 mod contents;
 pub mod convert;
 pub mod error;
+pub mod freehand;
 pub mod igtl;
 mod kretz;
 pub mod live;
