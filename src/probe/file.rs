@@ -47,9 +47,21 @@ impl ProbeFile {
             let line = before.matches('\n').count() + 1;
             InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))
         })?;
-        let probe_file = ProbeFile { path: path.into(), tables };
-        probe_file.check()?;
-        Ok(probe_file)
+        ProbeFile { path: path.into(), tables }.checked()
+    }
+
+    /// The same tables as JSON objects, from within what `path` names.
+    ///
+    /// # Errors
+    /// As of [`ProbeFile::read`].
+    pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
+        let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
+        ProbeFile { path: path.into(), tables }.checked()
+    }
+
+    fn checked(self) -> Result<ProbeFile, InputError> {
+        self.check()?;
+        Ok(self)
     }
 
     /// The probe file beside a recording: `<stem>.probe.toml`, which is for this recording alone, or else `probe.toml`,

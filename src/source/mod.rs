@@ -1,15 +1,17 @@
-//! Where frames come from: files, the phantom, and OpenIGTLink, which is received and not rendered yet. Every reader is total:
+//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded. Every reader is total:
 //! any bytes give frames or an [`InputError`], never a panic, and no more memory is taken than the file's own bytes account
-//! for.
+//! for, or a live source says.
 
 mod contents;
 pub mod convert;
 pub mod error;
+pub mod freehand;
 pub mod igtl;
 mod kretz;
 pub mod live;
 mod metaimage;
 pub mod phantom;
+pub mod piped;
 mod pixels;
 pub mod played;
 pub mod recorder;

@@ -7,10 +7,10 @@ use std::sync::mpsc;
 use std::thread;
 
 /// What a server does with one connection.
-type Script = Box<dyn FnOnce(TcpStream) + Send>;
+pub type Script = Box<dyn FnOnce(TcpStream) + Send>;
 
 /// A server that plays one script per connection, one after the other; its address.
-fn serve(scripts: Vec<Script>) -> String {
+pub fn serve(scripts: Vec<Script>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     thread::spawn(move || {
@@ -28,28 +28,28 @@ fn nowhere() -> String {
 }
 
 /// Sends and closes.
-fn send(bytes: Vec<u8>) -> Script {
+pub fn send(bytes: Vec<u8>) -> Script {
     Box::new(move |mut stream| stream.write_all(&bytes).unwrap())
 }
 
 /// Sends and stays until the client goes.
-fn send_and_stay(bytes: Vec<u8>) -> Script {
+pub fn send_and_stay(bytes: Vec<u8>) -> Script {
     Box::new(move |mut stream| {
         stream.write_all(&bytes).unwrap();
         stay(&mut stream);
     })
 }
 
-fn stay(stream: &mut TcpStream) {
+pub fn stay(stream: &mut TcpStream) {
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     let _ = stream.read(&mut [0]);
 }
 
-fn quick() -> Options {
+pub fn quick() -> Options {
     Options { first_wait: Duration::from_millis(20), longest_wait: Duration::from_millis(200), ..Options::default() }
 }
 
-fn bytes(message: &Message) -> Vec<u8> {
+pub fn bytes(message: &Message) -> Vec<u8> {
     encode(message, Version::V1).unwrap()
 }
 

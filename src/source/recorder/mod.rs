@@ -62,7 +62,7 @@ impl Header {
 
     /// # Errors
     /// The field and what is wrong with it.
-    fn check(&self) -> Result<(), (&'static str, String)> {
+    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         for geometry in [&self.forward, &self.backward] {
             let checked = match geometry {
                 Geometry::Sweep(probe) => probe.check(),

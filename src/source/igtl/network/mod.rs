@@ -1,0 +1,226 @@
+//! OpenIGTLink as a live source: whole volumes as they come, and tracked 2D frames compounded into one.
+//!
+//! An IMAGE of several slices is a Cartesian volume; one that brings only some whole slices of it updates those. An IMAGE of one slice is a
+//! frame of a freehand sweep. Whichever changed is then given slice by slice under a new volume's number, always all of its slices, so that
+//! whoever receives them has a whole volume every time and need not know what is behind it.
+
+mod faults;
+mod samples;
+mod sweep;
+mod whole;
+
+use super::client::{self, Client, Statistics};
+use super::decode::BODY_LIMIT;
+use super::message::Message;
+use crate::source::live::{Event, Live};
+use crate::source::recorder::Header;
+use crate::source::{Frame, freehand};
+use faults::{Faults, Kind};
+use std::io;
+use std::time::{Duration, Instant};
+use sweep::Sweep;
+use whole::Whole;
+
+/// How often statistics are looked at while nothing comes.
+const POLL: Duration = Duration::from_millis(100);
+
+/// Where the pose of a 2D frame comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Poses {
+    /// TRANSFORM and TDATA messages, chosen as [`Pairing::new`](super::Pairing::new) says: device, tolerance and patience in s.
+    Messages { device: Option<String>, tolerance: f64, patience: f64 },
+    /// The image's own matrix.
+    Image,
+}
+
+/// How a [`Network`] behaves.
+#[derive(Clone, Debug)]
+pub struct NetworkOptions {
+    pub client: client::Options,
+    pub poses: Poses,
+    pub freehand: freehand::Options,
+    /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
+    pub first: usize,
+    /// A sweep is given out so often, s, while frames come ...
+    pub update: f64,
+    /// ... or after so many frames.
+    pub frames: usize,
+    /// Largest volume, bytes as it is stored.
+    pub volume_bytes: usize,
+}
+
+impl Default for NetworkOptions {
+    fn default() -> NetworkOptions {
+        NetworkOptions {
+            client: client::Options::default(),
+            poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
+            freehand: freehand::Options { margin: 20.0, ..freehand::Options::default() },
+            first: 100,
+            update: 0.5,
+            frames: 64,
+            volume_bytes: BODY_LIMIT,
+        }
+    }
+}
+
+/// What comes from an OpenIGTLink server, which is connected to again whenever it is lost.
+///
+/// Nothing is taken from the client while slices are given out; what then does not fit its queue is lost by whole messages, and counted.
+/// What is amiss comes as [`Event::Fault`], each kind at most once a second and with how often it was. It never ends by itself.
+///
+/// Memory: the [`Client`]'s, one volume of at most `volume_bytes` and the message it came in, the first frames of a sweep (256 MiB), and
+/// what a [`Compounder`](freehand::Compounder) and a [`Pairing`](super::Pairing) take.
+pub struct Network {
+    client: Client,
+    /// What the faults have been told of.
+    known: Statistics,
+    last_error: Option<String>,
+    /// There ever was a connection.
+    connected: bool,
+    /// Connections.
+    lost: u64,
+    faults: Faults,
+    whole: Option<Whole>,
+    sweep: Sweep,
+    volume_bytes: usize,
+    /// Given with the last `Begin`.
+    begun: Option<Header>,
+    giving: Option<Giving>,
+    volumes: u32,
+}
+
+/// A volume whose slices are given out.
+struct Giving {
+    of_sweep: bool,
+    begin: bool,
+    volume: u32,
+    next: usize,
+    time: Option<f64>,
+}
+
+impl Network {
+    /// Starts connecting, as [`Client::connect`] does.
+    ///
+    /// # Errors
+    /// The operating system starts no thread.
+    pub fn connect(address: &str, options: NetworkOptions) -> io::Result<Network> {
+        Ok(Network {
+            client: Client::connect(address, options.client.clone())?,
+            known: Statistics::default(),
+            last_error: None,
+            connected: false,
+            lost: 0,
+            faults: Faults::new(address),
+            whole: None,
+            volume_bytes: options.volume_bytes,
+            sweep: Sweep::new(options),
+            begun: None,
+            giving: None,
+            volumes: 0,
+        })
+    }
+
+    /// Of the connection.
+    pub fn statistics(&self) -> Statistics {
+        self.client.statistics()
+    }
+
+    /// Tells the faults what has happened to the connection since the last time.
+    fn look(&mut self) {
+        let now = self.client.statistics();
+        let error = self.client.last_error();
+        let why = error.as_deref().unwrap_or("no reason is known");
+        let (known, faults) = (&self.known, &mut self.faults);
+        faults.note(Kind::Checksum, now.checksum_failures - known.checksum_failures, why);
+        faults.note(Kind::Malformed, now.malformed - known.malformed, why);
+        faults.note(Kind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
+        faults.note(Kind::Again, now.reconnects - known.reconnects, "");
+        // Every connection but the one that stands was lost, however short it was.
+        self.connected |= now.connected || now.bytes > 0 || now.reconnects > 0;
+        let lost = now.reconnects + u64::from(self.connected) - u64::from(now.connected);
+        faults.note(Kind::Lost, lost.saturating_sub(self.lost), why);
+        let is_told = lost > self.lost || error == self.last_error;
+        if !now.connected && !is_told && error.is_some() {
+            faults.note(Kind::Unreachable, 1, why);
+        }
+        (self.known, self.last_error, self.lost) = (now, error, lost);
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Image(image) if image.size[2] > 1 => {
+                let time = (image.time > 0.0).then_some(image.time);
+                match Whole::take(&mut self.whole, image, self.volume_bytes) {
+                    Ok(replaced) => {
+                        self.faults.note(Kind::Samples, replaced, "they read as 0");
+                        self.give(false, time);
+                    }
+                    Err(fault) => self.faults.note(Kind::Image, 1, &fault),
+                }
+            }
+            other => self.sweep.take(other, &mut self.faults),
+        }
+    }
+
+    /// Begins to give a volume out.
+    fn give(&mut self, of_sweep: bool, time: Option<f64>) {
+        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(Whole::header) };
+        let Some(header) = header else { return };
+        if let Err((field, fault)) = header.check() {
+            return self.faults.note(Kind::Image, 1, &format!("{field} {fault}"));
+        }
+        let begin = self.begun.as_ref() != Some(&header);
+        self.begun = Some(header);
+        self.giving = Some(Giving { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.volumes = self.volumes.wrapping_add(1);
+    }
+
+    /// What is next of the volume that is given out.
+    fn given(&mut self) -> Option<Event> {
+        let giving = self.giving.as_mut()?;
+        if std::mem::take(&mut giving.begin) {
+            return self.begun.clone().map(|header| Event::Begin(Box::new(header)));
+        }
+        let k = giving.next;
+        giving.next += 1;
+        let slice = match giving.of_sweep {
+            true => self.sweep.slice(k),
+            false => self.whole.as_ref().and_then(|whole| whole.slice(k)),
+        };
+        let Some(slice) = slice else {
+            self.giving = None;
+            return None;
+        };
+        let (volume, time, bytes) = (giving.volume, giving.time, slice.to_vec());
+        Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
+    }
+}
+
+impl Live for Network {
+    fn next(&mut self, patience: Duration) -> Event {
+        let started = Instant::now();
+        loop {
+            self.look();
+            if let Some(fault) = self.faults.due() {
+                return Event::Fault(fault);
+            }
+            if let Some(event) = self.given() {
+                return event;
+            }
+            if let Some(time) = self.sweep.update(&mut self.faults) {
+                self.give(true, time);
+                continue;
+            }
+            let left = patience.saturating_sub(started.elapsed());
+            match self.client.next(left.min(POLL)) {
+                Some(received) => self.take(received.message),
+                None if left.is_zero() => return Event::Idle,
+                None => {}
+            }
+        }
+    }
+
+    fn can_wait(&self) -> bool {
+        false
+    }
+}
