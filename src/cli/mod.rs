@@ -1,5 +1,6 @@
 //! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage.
 
+mod arriving;
 mod asked;
 mod convert;
 mod devices;

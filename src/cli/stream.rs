@@ -1,19 +1,13 @@
 //! `echolume stream`.
 
+use super::arriving::Arriving;
 use super::look::Look;
 use super::{Failure, failed, input, say};
 use echolume::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
 use echolume::picture;
-use echolume::source::live::{Live as Source, Pace, Paced};
-use echolume::source::phantom::{self, Phantom};
-use echolume::source::played::Kept;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Volumes of the phantom that are computed beforehand and played in turns: forth and back twice.
-const PHANTOM_VOLUMES: usize = 4;
-/// Volumes a second of the phantom, where nothing else is said.
-const PHANTOM_RATE: f64 = 1.0;
 /// Time between two lines of statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
@@ -23,26 +17,15 @@ const EVERY: Duration = Duration::from_secs(1);
                         the pixels that show it, and the passes that took longest.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
+                        tools/pipe_frames.py | echolume stream --source - --null\n  \
+                        echolume stream --source igtl://localhost:18944 --record exam.frames --null\n  \
                         echolume stream --source phantom --rate 5 --update rolling --null --for 10s"
 )]
 pub struct Stream {
-    /// phantom; a recording (.mha, .mhd, .vol, .frames)
-    #[arg(long, value_name = "SOURCE", default_value = "phantom")]
-    source: String,
+    #[command(flatten)]
+    source: Arriving,
     #[command(flatten)]
     look: Look,
-    /// Geometry of the probe (TOML), where the source does not bring its own
-    #[arg(long, value_name = "FILE")]
-    probe: Option<PathBuf>,
-    /// Volumes a second of a recording or the phantom [default: as fast as they are taken; the phantom: 1]
-    #[arg(long, value_name = "N", conflicts_with = "real_time")]
-    rate: Option<f64>,
-    /// Play a recording as it was stamped
-    #[arg(long)]
-    real_time: bool,
-    /// Times that a recording is played
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    rounds: u32,
     /// whole: volumes are shown when all of their frames have come; rolling: each frame at once
     #[arg(long, value_name = "HOW", default_value = "whole")]
     update: String,
@@ -79,7 +62,7 @@ impl Stream {
             "rolling" => Update::Rolling,
             other => return Err(input(format!("--update {other}: must be whole or rolling"))),
         };
-        let settings = self.look.layers(self.source == "phantom", &[])?.finish().map_err(input)?;
+        let settings = self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -87,7 +70,7 @@ impl Stream {
         if let Some(file) = &self.record {
             self.check_record(file)?;
         }
-        let source = self.open()?;
+        let source = self.source.open()?;
         let context = self.look.device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
@@ -145,7 +128,7 @@ impl Stream {
         );
         match end {
             None => Ok(()),
-            Some(why) => Err(failed(format!("{}: {why}", self.source))),
+            Some(why) => Err(failed(format!("{}: {why}", self.source.shown()))),
         }
     }
 
@@ -162,30 +145,10 @@ impl Stream {
             return refuse("must end in .frames");
         }
         let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-        match same(Path::new(&self.source)) {
+        match same(self.source.path()) {
             true => refuse("would replace what is played"),
             false => picture::check_target(file).map_err(failed),
         }
-    }
-
-    fn open(&self) -> Result<Box<dyn Source>, Failure> {
-        let is_phantom = self.source == "phantom";
-        let pace = match (self.rate, self.real_time) {
-            (Some(rate), _) if !(rate > 0.0 && rate <= 1e6) => {
-                return Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")));
-            }
-            (Some(rate), _) => Pace::Volumes(rate),
-            (None, true) => Pace::Recorded,
-            (None, false) if is_phantom => Pace::Volumes(PHANTOM_RATE),
-            (None, false) => Pace::Fast,
-        };
-        if is_phantom {
-            let options = phantom::Options { volumes: PHANTOM_VOLUMES, ..phantom::Options::default() };
-            let phantom = Phantom::new(options).map_err(input)?;
-            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), pace, u32::MAX)));
-        }
-        let recording = echolume::source::open(Path::new(&self.source), self.probe.as_deref()).map_err(input)?;
-        Ok(Box::new(Paced::new(recording, pace, self.rounds)))
     }
 }
 
