@@ -1,4 +1,4 @@
-//! Every pass by the device's own time stamps.
+//! Every pass by the device's own time stamps, and frames on their way in by the wall's.
 //!
 //! `cargo bench --bench gpu` measures all, `cargo bench --bench gpu -- 'raycast|light'` those whose `pass/scene` matches; what
 //! comes after `--` is criterion's: `--save-baseline before` and later `--baseline before` say what a change cost.
@@ -13,6 +13,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod ingestion;
 mod scenes;
 
 use common::Run;
@@ -86,6 +87,7 @@ fn all(run: Run) -> Result<(), String> {
     for pass in measure::MEASURES {
         bench(&mut criterion, &context, &scene, pass, "noise", || Ok(noise(&scene, pass)));
     }
+    ingestion::bench(&mut criterion, &rendering, &phantom, run)?;
     criterion.final_summary();
     match context.messages().into_iter().chain(rendering.messages()).next() {
         Some(message) => Err(format!("validation: {message}")),

@@ -107,6 +107,7 @@ pub const SCENES: &[Stated] = &[
     sweep("largest", &["mode=mip"], &["raycast_projection"]),
     sweep("mean", &["mode=mean"], &["raycast_projection"]),
     sweep("three planes", &["mode=orthogonal"], &["raycast_planes_toned"]),
+    sweep("three planes in floats", &["mode=orthogonal", "post.floats=true"], &["raycast_planes"]),
     sweep("slabs of 3 mm", &["mode=tomography", "planes.thickness=3"], &["raycast_planes_toned"]),
     sweep("block", &["mode=cube", "cube.inset.near=5", "camera.azimuth=30", "camera.elevation=20"], &["raycast_cube"]),
     sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),

@@ -2,6 +2,7 @@
 
 mod budget;
 mod common;
+mod stream;
 
 use common::*;
 use std::collections::BTreeSet;

@@ -1,0 +1,116 @@
+//! `echolume stream`: sources that come, go, and lie.
+
+use crate::common::*;
+use std::fs;
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+const SMALL: [&str; 6] = ["--mode", "mip", "--size", "48x40", "--set", "slices.pixels=64"];
+
+/// A pipe of so many frames of two slices' volumes, 4 lines of 16 samples.
+fn piped(frames: usize, cut: usize) -> Vec<u8> {
+    let head = r#"{"echolume": 1, "type": "u8", "cartesian": {"size": [16, 4, 2], "spacing": [1, 1, 1], "origin": [0, 0, 0]}}"#;
+    let samples = (0..frames * 64).map(|i| (i / 64 * 20) as u8);
+    let mut bytes: Vec<u8> = head.bytes().chain([b'\n']).chain(samples).collect();
+    bytes.truncate(bytes.len() - cut);
+    bytes
+}
+
+fn fed(arguments: &[&str], input: &[u8]) -> (Option<i32>, String, String) {
+    let mut command = Command::new(PROGRAM);
+    let child = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = child.expect("start the program");
+    // Whoever refuses the first line reads no further.
+    let _ = child.stdin.take().expect("a pipe").write_all(input);
+    let output = child.wait_with_output().expect("the program ends");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn a_recording_of_a_stream_is_replayed_to_the_same_pictures_bit_for_bit() {
+    let folder = Folder::new("stream");
+    let (first, tape, second) = (folder.path("first"), folder.path("tape.frames"), folder.path("second"));
+    let said = done(
+        &[&["stream", "--source", SWEEP, "--rounds", "3", "--out", &first, "--record", &tape], &SMALL[..]].concat(),
+    );
+    assert!(said.contains("93 frames, 3 volumes shown, 0 dropped, 0 incomplete, 3 pictures"), "{said}");
+    for how in [&["--rounds", "1"][..], &["--rate", "20"], &["--real-time", "--update", "rolling"]] {
+        done(&[&["stream", "--source", &tape, "--out", &second, "--validate"], how, &SMALL[..]].concat());
+        // The last volume is always shown.
+        let last = "volume-000002.png";
+        let read = |folder: &str| fs::read(format!("{folder}/{last}")).expect("a picture");
+        assert!(read(&first) == read(&second), "{how:?}");
+        fs::remove_dir_all(&second).expect("remove the pictures");
+    }
+    // A picture of what was recorded is that of the recording.
+    let rendered = folder.path("rendered.png");
+    done(&[&["render", SWEEP, "-o", &rendered], &SMALL[..]].concat());
+    let pixels = |file: &str| image::open(file).expect("a picture").to_rgba8();
+    assert!(pixels(&rendered) == pixels(&format!("{first}/volume-000000.png")));
+}
+
+#[test]
+fn a_pipe_is_drawn_to_its_last_whole_volume_and_what_is_wrong_with_it_is_said() {
+    let folder = Folder::new("pipe");
+    let out = folder.path("out");
+    let stream = ["stream", "--source", "-", "--mode", "mip", "--size", "24x24", "--out", &out];
+    let (code, said, err) = fed(&stream, &piped(7, 0));
+    assert_eq!((code, err.as_str()), (Some(0), ""), "{said}");
+    assert!(said.contains("7 frames, 3 volumes shown, 0 dropped, 1 incomplete, 3 pictures"), "{said}");
+    assert!(fs::exists(format!("{out}/volume-000002.png")).expect("look"));
+    for (input, named) in [
+        (piped(7, 30), "cut short"),
+        (b"hello".to_vec(), "header"),
+        (piped(0, 1), "header"),
+        (Vec::new(), "header"),
+        (
+            br#"{"echolume": 1, "samples": 1152921504606846976, "lines": 2, "frames": 2, "type": "u8"}"#.to_vec(),
+            "samples",
+        ),
+        (vec![b'x'; 1 << 20], "header"),
+    ] {
+        let (code, _, err) = fed(&stream, &input);
+        assert_eq!((code, err.lines().count()), (Some(1), 1), "{named}: {err}");
+        assert!(err.contains(named) && err.contains("standard input"), "{named}: {err}");
+    }
+}
+
+#[test]
+fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
+    let folder = Folder::new("refused");
+    for (arguments, named) in [
+        (&["--null", "--source", "none.mha"][..], "none.mha"),
+        (&["--null", "--update", "sideways"], "--update sideways"),
+        (&["--null", "--rate", "0"], "--rate 0"),
+        (&["--null", "--rate", "nan"], "--rate"),
+        (&["--null", "--images", "4"], "--images"),
+        (&["--null", "--queues", "0"], "--queues"),
+        (&["--null", "--record", "tape.mha"], ".frames"),
+        (&["--null", "--record", "none/tape.frames"], "none/tape.frames"),
+        (&["--null", "--source", "igtl://"], "igtl://HOST"),
+        (&["--null", "--source", "igtl://localhost", "--clip", "1,2"], "--clip 1,2"),
+        (&["--null", "--source", "igtl://localhost", "--spacing", "-1"], "--spacing"),
+        (&["--null", "--mode", "sideways"], "sideways"),
+        (&["--null", "--for", "tomorrow"], "--for"),
+        (&[], "--out"),
+        (&["--null", "--out", "x"], "--null"),
+    ] {
+        let all = [&["stream"], arguments].concat();
+        let (code, _, err) = finish(Command::new(PROGRAM).args(&all).current_dir(&folder.0));
+        assert!(code == Some(2) || (code == Some(1) && named.contains("none/")), "{all:?}: {code:?} {err}");
+        assert!(err.contains(named) && !err.contains("panicked"), "{all:?}: {err}");
+    }
+    assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
+
+#[test]
+fn the_phantom_streams_until_it_is_told_to_end() {
+    let said = done(&[&["stream", "--null", "--rate", "4", "--volumes", "3", "--validate"], &SMALL[..]].concat());
+    let last = said.lines().last().expect("a line");
+    assert!(last.contains(" 3 volumes shown") || last.contains(" 4 volumes shown"), "{said}");
+    let said =
+        done(&[&["stream", "--null", "--rate", "4", "--for", "2500ms", "--update", "rolling"], &SMALL[..]].concat());
+    assert!(said.lines().filter(|l| l.contains(" s  frames ")).count() >= 1, "{said}");
+    assert!(said.contains("what sound allows") && said.contains("latency ms p50"), "{said}");
+}
