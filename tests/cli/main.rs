@@ -2,6 +2,7 @@
 
 mod budget;
 mod common;
+mod frames;
 
 use common::*;
 use std::collections::BTreeSet;
