@@ -239,13 +239,13 @@ fn patience_is_kept_and_dropping_does_not_hang() {
     let short = Duration::from_millis(50);
     let started = Instant::now();
     assert!(matches!(piped.next(short), Event::Idle));
-    assert!((short..short * 10).contains(&started.elapsed()), "{:?}", started.elapsed());
+    assert!((short..SOON).contains(&started.elapsed()), "{:?}", started.elapsed());
     writer.write_all(&stream(&keys(), &[1; 8])).unwrap();
     assert!(matches!(piped.next(SOON), Event::Begin(_)) && matches!(piped.next(SOON), Event::Frame(_)));
     assert!(matches!(piped.next(Duration::ZERO), Event::Idle));
     let started = Instant::now();
     drop(piped);
-    assert!(started.elapsed() < Duration::from_secs(1));
+    assert!(started.elapsed() < SOON);
     // The other end hears of it with the next byte, or the one after.
     while writer.write_all(&[1; 8]).is_ok() {
         assert!(started.elapsed() < SOON);
@@ -271,9 +271,13 @@ fn what_is_not_taken_does_not_pile_up() {
         let came = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let start = Cursor::new(stream(&changed(changes), &[]));
         let piped = Piped::new(Endless(start, came.clone()), None).unwrap();
-        std::thread::sleep(Duration::from_millis(300));
-        let (frame, most) = (512 * 256, came.load(std::sync::atomic::Ordering::Relaxed));
-        assert!((3 * frame..6 * frame).contains(&most), "{most}");
+        let (frame, started) = (512 * 256, Instant::now());
+        let so_far = || came.load(std::sync::atomic::Ordering::Relaxed);
+        while so_far() < 4 * frame && started.elapsed() < SOON {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(100));
+        assert!((4 * frame..6 * frame).contains(&so_far()), "{}", so_far());
         drop(piped);
     }
 }

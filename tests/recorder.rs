@@ -196,6 +196,14 @@ fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
         (Header { range: [0.0, f64::NAN], ..header() }, "range"),
         (Header { backward: grid([16, 6, 5]), forward: grid([16, 5, 5]), ..header() }, "backward"),
         (Header { backward: grid([1 << 20, 1 << 20, 1]), forward: grid([1 << 20, 1 << 20, 1]), ..header() }, "forward"),
+        (Header { forward: grid([16, 6, 1 << 60]), ..header() }, "slices"),
+        (
+            Header {
+                forward: Geometry::Sweep(Probe { slices: Axis::centred(1e-30, 1 << 60), ..probe(0.0) }),
+                ..header()
+            },
+            "slices",
+        ),
         (Header { forward: Geometry::Sweep(Probe { sample_pitch: -1.0, ..probe(0.0) }), ..header() }, "sample_pitch"),
     ] {
         let path = folder.file("never.frames");

@@ -3,19 +3,21 @@
 use super::{Failure, failed, input, say};
 use echolume::picture::check_target;
 use echolume::probe::Geometry;
+use echolume::source;
 use echolume::source::convert::{Volume, VolumeFile, lattice};
 use echolume::source::recorder::{Header, Writer};
-use echolume::source::{self, Recording};
-use std::path::PathBuf;
+use echolume::source::sequence::{self, Sequence};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
                         echolume convert sweep.mha sweep.frames    (checksummed, appended frame by frame; a file that is there is not replaced)\n  \
+                        echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
                         echolume render volume.mha --mode mip -o mip.png    (what was written is read like any recording)")]
 pub struct Convert {
-    /// MetaImage (.mha, .mhd) or Kretz (.vol) file
+    /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
     input: PathBuf,
-    /// The volume to write (.mha, .nrrd), or .frames for every frame as it is
+    /// The volume to write (.mha, .nrrd), or .frames for every frame as it is, or with --sequence .mha
     output: PathBuf,
     /// Distance between voxels along every axis, mm [default: between samples of a line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -26,6 +28,9 @@ pub struct Convert {
     /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the recording
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
+    /// Write the frames of all whole volumes as a PLUS sequence, their geometry into NAME.probe.toml beside it
+    #[arg(long, conflicts_with_all = ["spacing", "volume"])]
+    sequence: bool,
 }
 
 impl Convert {
@@ -33,18 +38,17 @@ impl Convert {
         if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("frames")) {
             return self.record();
         }
+        if self.sequence {
+            return self.sequence();
+        }
         VolumeFile::of(&self.output).map_err(input)?;
-        let mut recording = Recording::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
         let shown = self.input.display();
         if self.volume >= recording.volumes() {
             let there = recording.volumes();
             return Err(input(format!("{shown}: --volume {}: there are {there}, numbered from 0", self.volume)));
         }
-        let read = [Some(&self.input), self.probe.as_ref()];
-        let same = |file: &PathBuf| self.output.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-        if let Some(file) = read.into_iter().flatten().find(|file| same(file)) {
-            return Err(input(format!("output {}: would replace an input", file.display())));
-        }
+        self.replaces_no_input(&self.output)?;
         let geometry = recording.geometry(self.volume);
         let usual = match &geometry {
             Geometry::Sweep(probe) => probe.sample_pitch,
@@ -54,22 +58,58 @@ impl Convert {
         check_target(&self.output).map_err(failed)?;
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
-        for _ in 0..recording.frames_per_volume() {
-            let Some(frame) = recording.next_frame().map_err(input)? else { break };
+        let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
+        while there < each {
+            // In a file of frames some may be missing, and the next is another volume's.
+            let next = recording.next_frame().map_err(input)?;
+            let Some(frame) = next.filter(|frame| *number.get_or_insert(frame.volume) == frame.volume) else { break };
             volume.take(frame);
+            there += 1;
         }
         let bar = indicatif::ProgressBar::new(grid.size[2] as u64).with_message("slices");
         volume.write(&grid, recording.sample_type(), &self.output, || bar.inc(1)).map_err(failed)?;
         bar.finish_and_clear();
         let ([x, y, z], [spacing, ..]) = (grid.size, grid.spacing);
-        say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm", self.output.display());
+        let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
+        say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{missing}", self.output.display());
+        Ok(())
+    }
+
+    fn replaces_no_input(&self, output: &Path) -> Result<(), Failure> {
+        let read = [Some(&self.input), self.probe.as_ref()];
+        let same = |file: &PathBuf| output.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
+        match read.into_iter().flatten().find(|file| same(file)) {
+            Some(file) => Err(input(format!("output {}: would replace an input", file.display()))),
+            None => Ok(()),
+        }
+    }
+
+    /// The frames of all whole volumes.
+    fn sequence(&self) -> Result<(), Failure> {
+        if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
+            return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
+        }
+        self.replaces_no_input(&self.output)?;
+        self.replaces_no_input(&sequence::beside(&self.output))?;
+        check_target(&self.output).map_err(failed)?;
+        let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
+        let (frames, volumes) = (sequence.frames(), sequence.volumes());
+        let bar = indicatif::ProgressBar::new(volumes as u64).with_message("volumes");
+        sequence.write(&mut *recording, &self.output, || bar.inc(1)).map_err(failed)?;
+        bar.finish_and_clear();
+        let left_out = match sequence.left_out() {
+            0 => String::new(),
+            n => format!("; {n} volumes are left out, with frames missing or swept the same way twice"),
+        };
+        say!("sequence: {}, {frames} frames of {volumes} volumes{left_out}", self.output.display());
         Ok(())
     }
 
     /// Every frame of every volume, as they are.
     fn record(&self) -> Result<(), Failure> {
-        if self.spacing.is_some() || self.volume != 0 {
-            return Err(input("--spacing and --volume are of a volume; .frames takes every frame as it is"));
+        if self.spacing.is_some() || self.volume != 0 || self.sequence {
+            return Err(input("--spacing, --volume and --sequence are of .mha; .frames takes every frame as it is"));
         }
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
         let first = recording.geometry(0);
@@ -81,7 +121,8 @@ impl Convert {
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = indicatif::ProgressBar::new((recording.volumes() * recording.frames_per_volume()) as u64);
         while let Some(there) = frame {
-            writer.frame(&there, there.time.unwrap_or(0.0)).map_err(failed)?;
+            let arrived = recording.arrival().or(there.time).unwrap_or(0.0);
+            writer.frame(&there, arrived).map_err(failed)?;
             bar.inc(1);
             frame = recording.next_frame().map_err(input)?;
         }

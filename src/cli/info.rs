@@ -1,12 +1,12 @@
 //! `echolume info FILE`.
 
 use super::{Failure, input, say};
-use echolume::source::Recording;
+use echolume::source;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Info {
-    /// MetaImage (.mha, .mhd) or Kretz (.vol) file
+    /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
     file: PathBuf,
     /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the file
     #[arg(long, value_name = "FILE")]
@@ -15,8 +15,7 @@ pub struct Info {
 
 impl Info {
     pub fn run(&self) -> Result<(), Failure> {
-        let recording = Recording::open(&self.file, self.probe.as_deref()).map_err(input)?;
-        let facts = recording.facts();
+        let facts = source::facts(&self.file, self.probe.as_deref()).map_err(input)?;
         let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
         for (name, value) in facts {
             say!("{name:width$}  {value}");

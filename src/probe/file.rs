@@ -3,6 +3,7 @@
 //! Numbers of samples, lines and frames are not in it: they come from the recording.
 
 mod tables;
+mod text;
 
 use super::motor::MotorTable;
 use super::{Advance, Array, Axis, Motion, Probe, Volumes};

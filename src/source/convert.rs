@@ -43,12 +43,7 @@ impl VolumeFile {
         let [ox, oy, oz] = grid.origin;
         match self {
             VolumeFile::MetaImage => {
-                let kind = match sample {
-                    SampleType::U8 => "MET_UCHAR",
-                    SampleType::U16 => "MET_USHORT",
-                    SampleType::I16 => "MET_SHORT",
-                    SampleType::F32 => "MET_FLOAT",
-                };
+                let kind = sample.metaimage();
                 format!(
                     "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
                      TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {ox} {oy} {oz}\nElementSpacing = {dx} {dy} {dz}\n\

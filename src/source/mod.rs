@@ -17,6 +17,7 @@ pub mod played;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
+pub mod sequence;
 mod unfinished;
 mod words;
 
@@ -63,11 +64,7 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
     } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
         metaimage::read(path)
     } else if recorder::Replay::is_one(&start) {
-        Err(InputError::new(
-            path,
-            "file",
-            "holds frames as they arrived; render, profile and report read those, this command does not",
-        ))
+        Err(InputError::new(path, "file", "holds frames as they arrived, not a recording"))
     } else {
         Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
     }
@@ -78,15 +75,30 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
 /// # Errors
 /// As of [`recorder::Replay::open`] and [`Recording::open`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
+    match is_frames(path) {
+        true => Ok(Box::new(recorder::Replay::open(path)?)),
+        false => Ok(Box::new(Recording::open(path, probe)?)),
+    }
+}
+
+/// What such a file is, for people to read: title and value. Never a patient's name or number.
+///
+/// # Errors
+/// As of [`open`], and what cannot be read of a file of frames, all of which is gone through.
+pub fn facts(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, String)>, InputError> {
+    match is_frames(path) {
+        true => recorder::Replay::open(path)?.facts(),
+        false => Ok(Recording::open(path, probe)?.facts()),
+    }
+}
+
+fn is_frames(path: &Path) -> bool {
     let mut start = Vec::new();
     // What cannot be read here is named by the reader. Opening a pipe may wait for ever.
     if fs::metadata(path).is_ok_and(|m| m.is_file()) {
         let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
     }
-    match recorder::Replay::is_one(&start) {
-        true => Ok(Box::new(recorder::Replay::open(path)?)),
-        false => Ok(Box::new(Recording::open(path, probe)?)),
-    }
+    recorder::Replay::is_one(&start)
 }
 
 /// Where frames come from, in order of acquisition.
@@ -94,6 +106,10 @@ pub trait Source: Send {
     /// Where the samples of a volume lie; the direction of its sweep decides about the motor's advance.
     fn geometry(&self, volume: usize) -> Geometry;
     fn stored_type(&self) -> StoredType;
+    /// What a sample is in the file that it comes from.
+    fn sample_type(&self) -> SampleType {
+        self.stored_type().into()
+    }
     /// Stored values that become 0 and 1.
     fn range(&self) -> [f64; 2];
     fn volumes(&self) -> usize;
@@ -115,6 +131,10 @@ impl Source for Recording {
 
     fn stored_type(&self) -> StoredType {
         self.stored_type()
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.sample_type()
     }
 
     fn range(&self) -> [f64; 2] {

@@ -36,9 +36,29 @@ impl SampleType {
         }
     }
 
+    /// A MetaImage's word for it.
+    pub(super) fn metaimage(self) -> &'static str {
+        match self {
+            SampleType::U8 => "MET_UCHAR",
+            SampleType::U16 => "MET_USHORT",
+            SampleType::I16 => "MET_SHORT",
+            SampleType::F32 => "MET_FLOAT",
+        }
+    }
+
     /// Stored value minus the file's value.
     pub fn shift(self) -> f64 {
         if self == SampleType::I16 { I16_SHIFT } else { 0.0 }
+    }
+}
+
+impl From<StoredType> for SampleType {
+    fn from(stored: StoredType) -> SampleType {
+        match stored {
+            StoredType::U8 => SampleType::U8,
+            StoredType::U16 => SampleType::U16,
+            StoredType::F32 => SampleType::F32,
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod budget;
 mod common;
+mod frames;
 mod stream;
 
 use common::*;

@@ -211,6 +211,22 @@ fn frames_without_a_pose_are_told_and_a_few_frames_do_not_wait_for_ever() {
 }
 
 #[test]
+fn poses_without_end_do_not_use_up_more_than_the_patience() {
+    let script: Script = Box::new(|mut stream| {
+        use std::io::Write;
+        let many: Vec<u8> = (0..1000).flat_map(|n| bytes(&transform("Probe", f64::from(n), 0.0))).collect();
+        while stream.write_all(&many).is_ok() {}
+    });
+    let mut network = Network::connect(&serve(vec![script]), options()).unwrap();
+    received(&network, 1000);
+    for patience in [0, 20] {
+        let started = Instant::now();
+        while !matches!(network.next(Duration::from_millis(patience)), Event::Idle) {}
+        assert!(started.elapsed() < Duration::from_secs(5), "{:?}", started.elapsed());
+    }
+}
+
+#[test]
 fn a_killed_peer_is_told_and_frames_come_again() {
     let good = bytes(&Message::Image(image(1.0, [4, 3, 2])));
     let cut = [good.clone(), good[..100].to_vec()].concat();

@@ -1,27 +1,14 @@
 //! The phantom as a file: a PLUS sequence and its probe file.
 
 use super::{ARRAY_RADIUS, FAN_ANGLE_DEG, Phantom, SECTOR_ANGLE_DEG, SOUND_SPEED, WOBBLE_RADIUS};
-use crate::source::InputError;
-use crate::source::unfinished::{Unfinished, unwritable};
+use crate::source::sequence::{self, MOST_FRAMES};
+use crate::source::unfinished::unwritable;
+use crate::source::{InputError, SampleType};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
 
-/// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
-const MOST_FRAMES: usize = 20_000;
-
 pub(super) fn sweep(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    if !ending.eq_ignore_ascii_case("mha") {
-        return Err(InputError::new(path, "file", "must end in .mha"));
-    }
-    if path.is_dir() {
-        return Err(InputError::new(path, "file", "is a folder"));
-    }
-    let mut beside = path.file_stem().unwrap_or_default().to_os_string();
-    beside.push(".probe.toml");
-    let beside = path.with_file_name(beside);
-
     let frames = phantom.options().frames * phantom.volumes();
     if frames > MOST_FRAMES {
         return Err(InputError::new(
@@ -30,50 +17,38 @@ pub(super) fn sweep(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
             format!("make {frames} frames, a file holds at most {MOST_FRAMES}"),
         ));
     }
-    let (mut samples, mut file) = Unfinished::create(path)?;
-    file.write_all(header(phantom).as_bytes()).map_err(|e| unwritable(path, &e))?;
-    for volume in 0..phantom.volumes() {
-        for frame in phantom.volume(volume) {
-            file.write_all(&frame.bytes).map_err(|e| unwritable(path, &e))?;
+    sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
+        for volume in 0..phantom.volumes() {
+            for frame in phantom.volume(volume) {
+                file.write_all(&frame.bytes).map_err(|e| unwritable(path, &e))?;
+            }
         }
-    }
-    samples.finish(file)?;
-    let (mut probe, mut file) = Unfinished::create(&beside)?;
-    file.write_all(probe_file(phantom).as_bytes()).map_err(|e| unwritable(&beside, &e))?;
-    probe.finish(file)?;
-    // The geometry first: frames never stand there without it.
-    probe.rename()?;
-    samples.rename()
+        Ok(())
+    })
 }
 
-/// MetaImage with the fields of PLUS; and the keys of a pre-scan sweep where those can say all, so that the file stands alone.
+/// The keys of a pre-scan sweep where those can say all, so that the file stands alone.
 fn header(phantom: &Phantom) -> String {
     let options = phantom.options();
     let probe = phantom.probe(0);
     let frames = options.frames * phantom.volumes();
-    let mut text = format!(
-        "ObjectType = Image\nNDims = 3\nDimSize = {} {} {frames}\nElementType = MET_UCHAR\nElementSpacing = 1 1 1\n\
-         BinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
-         UltrasoundImageOrientation = FM\nUltrasoundImageType = BRIGHTNESS\n",
-        options.samples, options.lines
-    );
-    let mut say = |line: String| {
-        text.push_str(&line);
-        text.push('\n');
-    };
+    let mut more = String::new();
     if phantom.volumes() == 1 && options.speed_ratio == 0.0 {
-        // Metres and radians.
-        say(format!("IsTransducerConvex = True\nTransducerRadius = {}", ARRAY_RADIUS / 1e3));
-        say(format!("ScanLinePitch = {}\nAxialResolution = {}", probe.lines.pitch(), probe.sample_pitch / 1e3));
-        say(format!("MotorType = TiltingMotor\nMotorRadius = {}", WOBBLE_RADIUS / 1e3));
-        say(format!("FramePitch = {}", probe.slices.pitch()));
+        // Metres and radians. Writing to a String cannot fail.
+        let _ = write!(
+            more,
+            "IsTransducerConvex = True\nTransducerRadius = {}\nScanLinePitch = {}\nAxialResolution = {}\n\
+             MotorType = TiltingMotor\nMotorRadius = {}\nFramePitch = {}\n",
+            ARRAY_RADIUS / 1e3,
+            probe.lines.pitch(),
+            probe.sample_pitch / 1e3,
+            WOBBLE_RADIUS / 1e3,
+            probe.slices.pitch()
+        );
     }
     let frame_time = probe.acquisition_time() / options.frames as f64;
-    for frame in 0..frames {
-        say(format!("Seq_Frame{frame:04}_Timestamp = {:.6}", frame as f64 * frame_time));
-    }
-    text.push_str("ElementDataFile = LOCAL\n");
-    text
+    let times = (0..frames).map(|n| (n, format!("{:.6}", n as f64 * frame_time)));
+    sequence::header([options.samples, options.lines, frames], SampleType::U8, &more, times)
 }
 
 fn probe_file(phantom: &Phantom) -> String {

@@ -14,6 +14,7 @@
 //! Without an index, or with one that is damaged, the frames are gone through once. A frame whose checksum is wrong is left out and
 //! counted; where the lengths lead nowhere, what is behind is lost.
 
+mod facts;
 mod read;
 mod write;
 
@@ -34,6 +35,8 @@ const END: &[u8; 4] = b"XEND";
 const FRAME_HEAD: usize = 40;
 /// Longest header, bytes: tables of lines and slices.
 const LONGEST_HEADER: u32 = 16 << 20;
+/// Most frames a volume: as many as any reader takes.
+const MOST_SLICES: usize = 1 << 16;
 /// Largest frame, bytes.
 const LARGEST_FRAME: u64 = 1 << 30;
 
@@ -64,6 +67,10 @@ impl Header {
     /// The field and what is wrong with it.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         for geometry in [&self.forward, &self.backward] {
+            // First, since the rest looks at each.
+            if geometry.slices() > MOST_SLICES {
+                return Err(("slices", format!("are {}, at most {MOST_SLICES} a volume", geometry.slices())));
+            }
             let checked = match geometry {
                 Geometry::Sweep(probe) => probe.check(),
                 Geometry::Cartesian(grid) => grid.check(),
@@ -76,9 +83,6 @@ impl Header {
         }
         if self.frame_bytes().is_none() {
             return Err(("forward", format!("makes frames of more than {LARGEST_FRAME} bytes")));
-        }
-        if self.forward.slices() > u32::MAX as usize {
-            return Err(("forward", "has more slices than a file numbers".into()));
         }
         let [low, high] = self.range;
         match low.is_finite() && high.is_finite() && low < high {

@@ -1,0 +1,196 @@
+//! Polar frames as a PLUS sequence (.mha), with their geometry in NAME.probe.toml beside it.
+
+use super::unfinished::{Unfinished, unwritable};
+use super::{InputError, SampleType, Source};
+use crate::probe::{Geometry, ProbeFile, Volumes};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
+pub(super) const MOST_FRAMES: usize = 20_000;
+const LONGEST_HEADER: usize = 1 << 20;
+
+/// What of a source makes a sequence.
+pub struct Sequence {
+    kept: Vec<Kept>,
+    left_out: usize,
+    /// Of a volume.
+    frames: usize,
+    header: String,
+    probe: String,
+}
+
+/// Where the geometry of a sequence goes.
+pub fn beside(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push(".probe.toml");
+    path.with_file_name(name)
+}
+
+impl Sequence {
+    /// Goes through a source for its whole volumes: the header says how many there are. `path`: where it came from.
+    ///
+    /// # Errors
+    /// A source that is no sweep or has no whole volume, more frames than a sequence takes, a probe that no file can say.
+    pub fn of(source: &mut dyn Source, path: &Path) -> Result<Sequence, InputError> {
+        let fault = |field: &str, fault: String| InputError::new(path, field, fault);
+        let (kept, left_out) = choose(source, path)?;
+        let Some(first) = kept.first() else {
+            return Err(fault("volumes", format!("none of {} is whole", source.volumes())));
+        };
+        let Geometry::Sweep(probe) = source.geometry(first.place) else {
+            return Err(fault("geometry", "the frames are pictures, not scan lines; leave --sequence out".into()));
+        };
+        let frames = source.frames_per_volume();
+        let volumes = Volumes {
+            both_ways: kept.iter().any(|v| v.backward != first.backward),
+            first_backward: first.backward,
+            ..Volumes::forward(frames, kept.len())
+        };
+        let text = ProbeFile::text(&probe, &volumes, source.range()).map_err(|e| fault("geometry", e))?;
+        let times = kept.iter().flat_map(|v| &v.times).enumerate();
+        let times = times.filter_map(|(n, time)| time.map(|t| (n, format!("{t:?}"))));
+        let size = [probe.samples, probe.lines.len(), frames * kept.len()];
+        let header = header(size, source.stored_type().into(), "", times);
+        if header.len() > LONGEST_HEADER {
+            return Err(fault(
+                "time stamps",
+                format!("make a header of {} bytes, at most 1 MiB is read", header.len()),
+            ));
+        }
+        Ok(Sequence { kept, left_out, frames, header, probe: text })
+    }
+
+    pub fn volumes(&self) -> usize {
+        self.kept.len()
+    }
+
+    pub fn frames(&self) -> usize {
+        self.kept.len() * self.frames
+    }
+
+    /// Volumes that a sequence cannot say: with frames missing, or swept the same way twice where others are swept both ways.
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// Writes the frames of the same source, in order of acquisition. `each` hears of every volume that is written.
+    ///
+    /// # Errors
+    /// A source that cannot be read any more, another ending than .mha, a disk that is full; then no file is left.
+    pub fn write(&self, source: &mut dyn Source, path: &Path, each: impl Fn()) -> Result<(), InputError> {
+        write_both(path, &self.header, &self.probe, |file| {
+            for volume in &self.kept {
+                source.skip_to_volume(volume.place)?;
+                for _ in 0..self.frames {
+                    let frame = source.next_frame()?.filter(|frame| frame.volume == volume.number);
+                    let gone = || InputError::new(path, "frames", "the input is not what it was a moment ago");
+                    file.write_all(&frame.ok_or_else(gone)?.bytes).map_err(|e| unwritable(path, &e))?;
+                }
+                each();
+            }
+            Ok(())
+        })
+    }
+}
+
+/// A volume that is whole.
+struct Kept {
+    /// From 0, in order.
+    place: usize,
+    /// What its frames say.
+    number: u32,
+    backward: bool,
+    times: Vec<Option<f64>>,
+}
+
+/// The volumes that make a sequence, and how many do not.
+fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<Kept>, usize), InputError> {
+    let mut whole: Vec<Kept> = Vec::new();
+    for place in 0..source.volumes() {
+        // Where all of a volume is damaged, the next one is read in its stead, and once more in its own place.
+        let next = volume(source, place)?.filter(|v| whole.last().is_none_or(|before| before.number != v.number));
+        whole.extend(next);
+        if whole.len() * source.frames_per_volume() > MOST_FRAMES {
+            let fault = format!("make more than {MOST_FRAMES} frames, which a file does not hold");
+            return Err(InputError::new(path, "volumes", fault));
+        }
+    }
+    if whole.iter().any(|v| v.backward != whole[0].backward) {
+        // A probe file says of both ways only that they take turns.
+        whole.dedup_by_key(|v| v.backward);
+    }
+    let left_out = source.volumes() - whole.len();
+    Ok((whole, left_out))
+}
+
+/// A volume if all of its frames are there, in order.
+fn volume(source: &mut dyn Source, place: usize) -> Result<Option<Kept>, InputError> {
+    source.skip_to_volume(place)?;
+    let count = source.frames_per_volume();
+    let mut kept: Option<Kept> = None;
+    for n in 0..count {
+        let Some(frame) = source.next_frame()? else { return Ok(None) };
+        let volume = kept.get_or_insert_with(|| Kept {
+            place,
+            number: frame.volume,
+            backward: frame.backward,
+            times: Vec::new(),
+        });
+        let slice = if frame.backward { count - 1 - n } else { n };
+        let is_next = frame.volume == volume.number && frame.backward == volume.backward;
+        if !is_next || (frame.number as usize, frame.slice) != (n, slice) {
+            return Ok(None);
+        }
+        volume.times.push(frame.time.filter(|t| t.is_finite()));
+    }
+    Ok(kept)
+}
+
+/// MetaImage with the fields of PLUS: samples, lines and frames, lines of its own, and time stamps by frame, s.
+pub(super) fn header(
+    [samples, lines, frames]: [usize; 3],
+    sample: SampleType,
+    more: &str,
+    times: impl Iterator<Item = (usize, String)>,
+) -> String {
+    let kind = sample.metaimage();
+    let mut text = format!(
+        "ObjectType = Image\nNDims = 3\nDimSize = {samples} {lines} {frames}\nElementType = {kind}\nElementSpacing = 1 1 1\n\
+         BinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n\
+         UltrasoundImageOrientation = FM\nUltrasoundImageType = BRIGHTNESS\n{more}"
+    );
+    for (frame, time) in times {
+        text.push_str(&format!("Seq_Frame{frame:04}_Timestamp = {time}\n"));
+    }
+    text.push_str("ElementDataFile = LOCAL\n");
+    text
+}
+
+/// The sequence and its probe file, both or none.
+pub(super) fn write_both(
+    path: &Path,
+    header: &str,
+    probe: &str,
+    samples: impl FnOnce(&mut BufWriter<File>) -> Result<(), InputError>,
+) -> Result<(), InputError> {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    if !ending.eq_ignore_ascii_case("mha") {
+        return Err(InputError::new(path, "file", "must end in .mha"));
+    }
+    if path.is_dir() {
+        return Err(InputError::new(path, "file", "is a folder"));
+    }
+    let (mut sequence, mut file) = Unfinished::create(path)?;
+    file.write_all(header.as_bytes()).map_err(|e| unwritable(path, &e))?;
+    samples(&mut file)?;
+    sequence.finish(file)?;
+    let beside = beside(path);
+    let (mut geometry, mut file) = Unfinished::create(&beside)?;
+    file.write_all(probe.as_bytes()).map_err(|e| unwritable(&beside, &e))?;
+    geometry.finish(file)?;
+    // The geometry first: frames never stand there without it.
+    geometry.rename()?;
+    sequence.rename()
+}
