@@ -61,11 +61,12 @@ fn a_pipe_is_drawn_to_its_last_whole_volume_and_what_is_wrong_with_it_is_said() 
     assert!(fs::exists(format!("{out}/volume-000002.png")).expect("look"));
     for (input, named) in [
         (piped(7, 30), "cut short"),
-        (b"hello".to_vec(), "header"),
+        (b"hello\n".to_vec(), "pipe_frames.py"),
         (piped(0, 1), "header"),
         (Vec::new(), "header"),
         (
-            br#"{"echolume": 1, "samples": 1152921504606846976, "lines": 2, "frames": 2, "type": "u8"}"#.to_vec(),
+            b"{\"echolume\": 1, \"samples\": 1152921504606846976, \"lines\": 2, \"frames\": 2, \"type\": \"u8\"}\n"
+                .to_vec(),
             "samples",
         ),
         (vec![b'x'; 1 << 20], "header"),
@@ -90,7 +91,7 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
         (&["--null", "--record", "none/tape.frames"], "none/tape.frames"),
         (&["--null", "--source", "igtl://"], "igtl://HOST"),
         (&["--null", "--source", "igtl://localhost", "--clip", "1,2"], "--clip 1,2"),
-        (&["--null", "--source", "igtl://localhost", "--spacing", "-1"], "--spacing"),
+        (&["--null", "--source", "igtl://localhost", "--spacing", "0"], "--spacing"),
         (&["--null", "--mode", "sideways"], "sideways"),
         (&["--null", "--for", "tomorrow"], "--for"),
         (&[], "--out"),
