@@ -88,6 +88,9 @@ struct Now {
     backward: Vec<bool>,
     /// The last volume that was shown.
     volume: Option<u32>,
+    /// Frames that waited when the last picture was done, and that the next one shows: beginning it after the first of them would
+    /// fall ever further behind.
+    behind: usize,
 }
 
 impl Stream {
@@ -114,9 +117,17 @@ impl Stream {
         if let Some(now) = &mut self.now {
             if now.drawing.is_some() {
                 if !now.renderer.is_drawing()? {
+                    now.behind = if now.turns.is_rolling() { self.feed.waiting() } else { 0 };
                     return Ok(Step::Picture(now.finish(&mut self.statistics)?));
                 }
                 patience = patience.min(Duration::from_micros(200));
+            } else if now.behind > 0 {
+                now.behind -= 1;
+                if let Some(Arrived { event, at }) = self.feed.next(Duration::ZERO) {
+                    return self.take(event, at);
+                }
+                now.behind = 0;
+                return Ok(Step::Went);
             } else if now.begin()? {
                 return Ok(Step::Went);
             }
@@ -174,6 +185,7 @@ impl Stream {
             drawing: None,
             changed: false,
             volume: None,
+            behind: 0,
         });
         Ok(())
     }

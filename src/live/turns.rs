@@ -74,6 +74,10 @@ impl Turns {
         }
     }
 
+    pub fn is_rolling(&self) -> bool {
+        self.update == Update::Rolling
+    }
+
     /// How many volume images are used.
     pub fn images(&self) -> u32 {
         self.backward.len() as u32

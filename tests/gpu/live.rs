@@ -38,11 +38,12 @@ impl Drop for Playing {
     }
 }
 
-/// A source that says what it was told to, at once.
-struct Told(VecDeque<Event>);
+/// A source that says what it was told to, one thing after such a pause.
+struct Told(VecDeque<Event>, Duration);
 
 impl Live for Told {
     fn next(&mut self, _: Duration) -> Event {
+        std::thread::sleep(self.1);
         self.0.pop_front().unwrap_or(Event::End(None))
     }
 
@@ -113,7 +114,9 @@ fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> V
 }
 
 fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
-    let feed = Feed::new(Box::new(Told(events.into())), None).expect("thread");
+    // Where each frame is shown there is time for a picture between some of them.
+    let pause = Duration::from_millis(if options.update == Update::Rolling { 3 } else { 0 });
+    let feed = Feed::new(Box::new(Told(events.into(), pause)), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
 
