@@ -115,7 +115,7 @@ fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> V
 
 fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
     // Where each frame is shown there is time for a picture between some of them.
-    let pause = Duration::from_millis(if options.update == Update::Rolling { 3 } else { 0 });
+    let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
     let feed = Feed::new(Box::new(Told(events.into(), pause)), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
