@@ -15,7 +15,7 @@ pub struct Counts {
     pub farther: u64,
     /// Left out: without a time, or the motor's position was not known at theirs, or not soon enough.
     pub unknown: u64,
-    /// Left out: of a pass or a slice that was over.
+    /// Left out: of a pass or a slice before the newest.
     pub late: u64,
     /// Slices that no frame came nearest to, and that a neighbour's frame stands in for.
     pub filled: u64,
@@ -48,7 +48,7 @@ impl Counts {
             (self.filled, "slices had no frame of their own and were given a neighbour's"),
             (self.incomplete, "passes missed more than two slices in a row and stayed incomplete"),
             (self.unknown, "frames were left out, the motor's position at their time not being known"),
-            (self.late, "frames were left out, coming after their pass or slice"),
+            (self.late, "frames were left out, coming after those of a later pass or slice"),
         ];
         let parts: Vec<String> =
             parts.iter().filter(|(count, _)| *count > 0).map(|(n, what)| format!("{n} {what}")).collect();

@@ -65,11 +65,13 @@ impl Passes {
                 }
             }
             Place::Pass { angle, direction, pass } => {
-                if self
-                    .over
-                    .max(self.now.as_ref().map(|now| now.number))
-                    .is_some_and(|newest| pass < newest || (Some(pass) == self.over))
-                {
+                let newest = self.over.max(self.now.as_ref().map(|now| now.number));
+                if Some(pass) == self.over {
+                    // The array stood at the end, and still moved on a little.
+                    counts.turning += 1;
+                    return;
+                }
+                if newest.is_some_and(|newest| pass < newest) {
                     counts.late += 1;
                     return;
                 }
@@ -258,8 +260,9 @@ mod tests {
         all.frame(frame(0), Place::Turning { angle: 6.5 }, &mut counts, &mut out);
         assert_eq!((counts.whole, counts.turning), (2, 2));
         all.frame(frame(0), at(6.0, 2), &mut counts, &mut out);
+        all.frame(frame(0), at(6.0, 0), &mut counts, &mut out);
         all.frame(frame(0), Place::Outside, &mut counts, &mut out);
-        assert_eq!((out.len(), counts.late, counts.unknown), (14, 1, 1));
+        assert_eq!((out.len(), counts.turning, counts.late, counts.unknown), (14, 3, 1, 1));
     }
 
     proptest! {
