@@ -1,12 +1,16 @@
 //! Where frames come from on their own clock: the arguments of every command that renders live.
 
+use super::driven::{Driven, Driving};
 use super::{Failure, failed, input};
+use echolume::probe::Geometry;
+use echolume::source::Source;
 use echolume::source::freehand;
 use echolume::source::igtl::{Network, NetworkOptions, Poses};
 use echolume::source::live::{Live, Pace, Paced};
 use echolume::source::phantom::{self, Phantom};
 use echolume::source::piped::Piped;
 use echolume::source::played::Kept;
+use echolume::source::swept::FreeRunning;
 use std::path::{Path, PathBuf};
 
 /// Volumes of the phantom that are computed beforehand and played in turns: forth and back twice.
@@ -45,6 +49,8 @@ pub struct Arriving {
     /// Widest gap between tracked frames that is bridged, mm
     #[arg(long, value_name = "MM", default_value_t = 2.0)]
     hole: f64,
+    #[command(flatten)]
+    driven: Driven,
 }
 
 impl Arriving {
@@ -66,32 +72,67 @@ impl Arriving {
     }
 
     pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
-        let pace = match (self.rate, self.real_time) {
-            (Some(rate), _) if !(rate > 0.0 && rate <= 1e6) => {
-                return Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")));
-            }
-            (Some(rate), _) => Pace::Volumes(rate),
-            (None, true) => Pace::Recorded,
-            (None, false) if self.is_phantom() => Pace::Volumes(PHANTOM_RATE),
-            (None, false) => Pace::Fast,
-        };
+        let network = self.source.strip_prefix(NETWORK);
+        let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
+        let driving = self.driven.checked(self.probe.as_ref(), is_file.then(|| self.path()))?;
         if self.is_phantom() {
-            let options = phantom::Options { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::Options::default() };
-            let phantom = Phantom::new(options).map_err(input)?;
-            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), pace, u32::MAX)));
+            return self.phantom(driving.as_ref());
         }
-        if self.source == "-" {
-            return Ok(Box::new(Piped::new(std::io::stdin(), self.probe.as_deref()).map_err(input)?));
-        }
-        if let Some(address) = self.source.strip_prefix(NETWORK) {
+        let source: Box<dyn Live> = if self.source == "-" {
+            Box::new(Piped::new(std::io::stdin(), self.probe.as_deref()).map_err(input)?)
+        } else if let Some(address) = network {
             if address.is_empty() {
                 return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));
             }
+            if driving.is_some() {
+                return Err(input(format!(
+                    "--source {}: brings its own places; --motor is for frames without",
+                    self.source
+                )));
+            }
             let network = Network::connect(address, self.network()?);
-            return Ok(Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?));
+            Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
+        } else {
+            let recording = echolume::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
+            // A free-running probe is as fast as sound lets it.
+            let rate = self.rate.or(driving.as_ref().and_then(|_| fastest(&*recording)));
+            Box::new(Paced::new(recording, self.pace(rate)?, self.rounds))
+        };
+        match driving {
+            Some(driving) => {
+                let motor = driving.start()?;
+                Ok(driving.place(source, motor, is_file))
+            }
+            None => Ok(source),
         }
-        let recording = echolume::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
-        Ok(Box::new(Paced::new(recording, pace, self.rounds)))
+    }
+
+    fn pace(&self, rate: Option<f64>) -> Result<Pace, Failure> {
+        match rate {
+            _ if self.real_time => Ok(Pace::Recorded),
+            Some(rate) if !(rate > 0.0 && rate <= 1e6) => {
+                Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")))
+            }
+            Some(rate) => Ok(Pace::Volumes(rate)),
+            None => Ok(Pace::Fast),
+        }
+    }
+
+    /// Volumes of the phantom in turns, or where a motor is driven what its array sees.
+    fn phantom(&self, driving: Option<&Driving>) -> Result<Box<dyn Live>, Failure> {
+        let options = phantom::Options { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::Options::default() };
+        let Some(driving) = driving else {
+            let pace = self.pace(self.rate.or(Some(PHANTOM_RATE)))?;
+            let phantom = Phantom::new(options).map_err(input)?;
+            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), pace, u32::MAX)));
+        };
+        if self.rate.is_some() || self.real_time {
+            return Err(input("--rate and --real-time: sound and the motor are the phantom's pace with --motor"));
+        }
+        let phantom = FreeRunning::phantom(options, driving.speed).map_err(input)?;
+        let motor = driving.start()?;
+        let source = FreeRunning::new(phantom, motor.watch().clone());
+        Ok(driving.place(Box::new(source), motor, false))
     }
 
     fn network(&self) -> Result<NetworkOptions, Failure> {
@@ -118,5 +159,13 @@ impl Arriving {
             Some(clip) => Ok(Some(clip)),
             None => Err(input(format!("--clip {text}: must read X,Y,W,H in pixels, as 100,40,520,440"))),
         }
+    }
+}
+
+/// Volumes a second of a sweep as fast as sound lets it; none of what is not swept.
+fn fastest(source: &dyn Source) -> Option<f64> {
+    match source.geometry(0) {
+        Geometry::Sweep(probe) => Some(1.0 / probe.acquisition_time()),
+        Geometry::Cartesian(_) => None,
     }
 }

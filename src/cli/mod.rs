@@ -4,6 +4,7 @@ mod arriving;
 mod asked;
 mod convert;
 mod devices;
+mod driven;
 mod filter;
 mod info;
 mod look;
@@ -14,6 +15,7 @@ mod render;
 mod report;
 mod report_error;
 mod report_tables;
+mod serial;
 mod stream;
 
 use clap::{Parser, Subcommand};

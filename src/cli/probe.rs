@@ -1,12 +1,10 @@
 //! `echolume probe`: the motor.
 
+use super::serial::{Serial, fault, table};
 use super::{Failure, failed, input, say};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use echolume::picture::check_target;
-use echolume::probe::ProbeFile;
-use echolume::probe::motor::{
-    Drive, Fault, Held, MotorError, MotorTable, Parity, Position, Settings, StopBits, Sweep, port,
-};
+use echolume::probe::motor::{Drive, Fault, Held, MotorError, MotorTable, Position, Settings, Sweep, port};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -53,24 +51,8 @@ struct Line {
     /// The probe file, whose [motor] table says what hangs on the module; home and sweep need it
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Bits a second
-    #[arg(long, value_name = "N", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
-    baud: u32,
-    #[arg(long, value_name = "PARITY", default_value = "none")]
-    parity: ParityName,
-    /// 1 or 2
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
-    stop_bits: u8,
-    /// Longest wait for a reply, ms
-    #[arg(long, value_name = "MS", default_value_t = 500, value_parser = clap::value_parser!(u64).range(20..=10_000))]
-    timeout: u64,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ParityName {
-    None,
-    Even,
-    Odd,
+    #[command(flatten)]
+    serial: Serial,
 }
 
 #[derive(Args)]
@@ -123,34 +105,9 @@ impl Probe {
     }
 }
 
-/// Bad input where the fault is in what was asked, failed where it is in the motor.
-fn fault(error: MotorError) -> Failure {
-    match error.fault {
-        Fault::OutOfRange(_) => input(error),
-        _ => failed(error),
-    }
-}
-
-fn table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure> {
-    let Some(file) = file else { return Ok(None) };
-    let probe = ProbeFile::read(file).map_err(input)?;
-    let table = probe.motor().cloned();
-    table.map(Some).ok_or_else(|| input(format!("{}: has no [motor] table", file.display())))
-}
-
 impl Line {
     fn settings(&self) -> Settings {
-        Settings {
-            path: self.port.clone(),
-            baud: self.baud,
-            parity: match self.parity {
-                ParityName::None => Parity::None,
-                ParityName::Even => Parity::Even,
-                ParityName::Odd => Parity::Odd,
-            },
-            stop_bits: if self.stop_bits == 2 { StopBits::Two } else { StopBits::One },
-            timeout: Duration::from_millis(self.timeout),
-        }
+        self.serial.settings(&self.port)
     }
 
     /// The table of the probe file, or where nothing is moved any module's at the usual address.

@@ -18,6 +18,7 @@ pub mod recorder;
 pub mod recording;
 pub mod samples;
 pub mod sequence;
+pub mod swept;
 mod unfinished;
 mod words;
 

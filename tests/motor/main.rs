@@ -1,10 +1,11 @@
 //! The motor: the protocol, units, positions to angles; and home, sweep, stop and every fault over a simulated module on a
-//! pseudo-terminal, through the library and through the program. No assertion is on how long anything takes.
+//! pseudo-terminal, through the library and through the program; frames that the motor places. No assertion is on how long anything takes.
 
 mod frames;
 mod library;
 mod program;
 mod pure;
+mod swept;
 
 use echolume::probe::ProbeFile;
 use echolume::probe::motor::simulate::{Options, Simulator};

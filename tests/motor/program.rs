@@ -199,6 +199,12 @@ fn wrong_input_is_refused_before_the_port_is_touched() {
         (&["probe", "simulate", "--fault", "fire"], "fire"),
         (&["probe", "status"], "--port"),
         (&["probe", "status", "--port", path, "--baud", "3"], "--baud"),
+        (&["stream", "--null", "--motor", path], "--angle"),
+        (&["stream", "--null", "--homed"], "--motor"),
+        (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1"], "[motor] table"),
+        (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1", "--probe", plain], "[motor] table"),
+        (&["stream", "--null", "--motor", path, "--angle", "99", "--sweeps", "1", "--probe", PROBE], "--angle 99"),
+        (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "9", "--probe", PROBE], "--sweeps 9"),
     ] {
         let (code, _, err) = run(Command::new(PROGRAM).args(arguments).stdin(Stdio::null()).stderr(Stdio::piped()));
         assert!(code == Some(2) && err.contains(named), "{arguments:?}: {err}");

@@ -2,7 +2,7 @@
 //! and nothing goes on moving after a fault.
 
 use super::fault::{Fault, MotorError, Stopped};
-use super::guard::Guard;
+use super::guard::{Guard, Interrupter};
 use super::port::{Answer, Port, Settings};
 use super::sweep::{Direction, Position, Sweep};
 use super::table::{MotorTable, Side};
@@ -91,6 +91,11 @@ impl Drive {
     ) -> Result<usize, MotorError> {
         let swept = self.sweep_all(sweep, start, seen);
         self.done("sweep", swept)
+    }
+
+    /// Ends from another thread whatever this one is doing. The motor is stopped within one request and its reply.
+    pub fn interrupter(&self) -> Interrupter {
+        self.guard.interrupter().clone()
     }
 
     /// Opens the port and stops the motor before anything else is asked, whichever module it is.

@@ -76,6 +76,22 @@ impl Drop for Held {
     }
 }
 
+/// Interrupts what a motor is doing from any thread, as a signal would. Clones are one and the same.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupter(Arc<AtomicBool>);
+
+impl Interrupter {
+    /// Whatever the motor is doing ends with [`Fault::Interrupted`] before the next request, the motor stopped; so does all that it
+    /// is asked to do later.
+    pub fn interrupt(&self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+
+    fn is_set(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
 /// The only way to the module: whatever may set the motor in motion goes through it, so it knows what has to be stopped.
 pub struct Guard {
     port: Port,
@@ -86,17 +102,19 @@ pub struct Guard {
     /// The module may be looking for its reference.
     searching: bool,
     held: Held,
+    interrupter: Interrupter,
 }
 
 impl Guard {
     pub fn new(port: Port, table: &MotorTable) -> Guard {
-        Guard { port, address: table.address, motor: table.motor, moving: false, searching: false, held: Held::take() }
+        let (held, interrupter) = (Held::take(), Interrupter::default());
+        Guard { port, address: table.address, motor: table.motor, moving: false, searching: false, held, interrupter }
     }
 
     /// Sends a request; see [`Port::ask`].
     ///
     /// # Errors
-    /// Those of [`Port::ask`], and [`Fault::Interrupted`] once a signal has come.
+    /// Those of [`Port::ask`], and [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
     pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
         self.interrupted()?;
         // Before it is sent: what was not answered may have been carried out.
@@ -115,9 +133,17 @@ impl Guard {
     }
 
     /// # Errors
-    /// [`Fault::Interrupted`] once a signal has come.
+    /// [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
     pub fn interrupted(&self) -> Result<(), Fault> {
-        self.held.signal().map_or(Ok(()), |signal| Err(Fault::Interrupted(signal)))
+        match self.held.signal() {
+            Some(signal) => Err(Fault::Interrupted(signal)),
+            None if self.interrupter.is_set() => Err(Fault::Interrupted("the program")),
+            None => Ok(()),
+        }
+    }
+
+    pub fn interrupter(&self) -> &Interrupter {
+        &self.interrupter
     }
 
     pub fn port(&self) -> &Port {

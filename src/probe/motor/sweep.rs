@@ -109,8 +109,8 @@ pub enum Place {
 /// Positions over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    positions: Vec<Position>,
-    longest_gap: f64,
+    pub(super) positions: Vec<Position>,
+    pub(super) longest_gap: f64,
 }
 
 impl Track {
@@ -133,6 +133,23 @@ impl Track {
 
     pub fn positions(&self) -> &[Position] {
         &self.positions
+    }
+
+    /// Adds a position behind the others. One that is not finite, or not later than the last, is left out: false.
+    pub fn push(&mut self, position: Position) -> bool {
+        let later = self.positions.last().is_none_or(|last| position.time > last.time);
+        let fits = later && position.time.is_finite() && position.angle.is_finite();
+        if fits {
+            self.positions.push(position);
+        }
+        fits
+    }
+
+    /// Forgets the oldest positions, now and then: at least `newest` stay, and never more than twice as many.
+    pub fn forget_all_but(&mut self, newest: usize) {
+        if self.positions.len() > 2 * newest {
+            self.positions.drain(..self.positions.len() - newest);
+        }
     }
 
     /// Where the array was at a time, linearly between the two positions around it. The error is at most a dt^2 / 8 for an

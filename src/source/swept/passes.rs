@@ -1,0 +1,294 @@
+//! Frames of known angle become the slices of a pass. Pure.
+
+use super::Counts;
+use crate::probe::Axis;
+use crate::probe::motor::{Direction, Place};
+use crate::source::Frame;
+use crate::source::live::Event;
+use std::collections::VecDeque;
+
+/// Missing slices in a row that are filled at most.
+pub(super) const MOST_FILLED: usize = 2;
+
+/// The passes over a slice axis, in order of time.
+pub(super) struct Passes {
+    /// rad.
+    slices: Axis,
+    now: Option<Pass>,
+    /// The last pass that is over.
+    over: Option<usize>,
+}
+
+struct Pass {
+    number: usize,
+    direction: Direction,
+    /// The frame that is nearest so far to the slice that the array is at. The nearer counts and not the later, since
+    /// it shows more nearly what lies there. It is given when a frame of the next slice shows that none can be nearer.
+    nearest: Option<Near>,
+    /// The one that was given last.
+    given: Option<Near>,
+    slices: usize,
+}
+
+#[derive(Clone)]
+struct Near {
+    /// Place in the order of the pass.
+    step: usize,
+    /// rad.
+    angle: f64,
+    frame: Frame,
+}
+
+impl Passes {
+    /// `slices`: rad, at least two.
+    pub fn new(slices: Axis) -> Passes {
+        Passes { slices, now: None, over: None }
+    }
+
+    /// The fractional place of an angle (rad) in the order of a pass.
+    fn step(&self, angle: f64, direction: Direction) -> f64 {
+        let index = self.slices.index_of(angle);
+        if direction == Direction::Forward { index } else { self.slices.len() as f64 - 1.0 - index }
+    }
+
+    /// A frame and where the array was at its first line. What is thereby known goes `out`.
+    pub fn frame(&mut self, frame: Frame, place: Place, counts: &mut Counts, out: &mut VecDeque<Event>) {
+        let last = self.slices.len() as f64 - 1.0;
+        match place {
+            Place::Outside => counts.unknown += 1,
+            Place::Turning { angle } => {
+                counts.turning += 1;
+                // At the far end of a pass it is over: nothing is gained by waiting for the next to begin.
+                let step = self.now.as_ref().map(|now| self.step(angle.to_radians(), now.direction));
+                if step.is_some_and(|step| step > (last - MOST_FILLED as f64).max(last / 2.0)) {
+                    self.end(counts, out);
+                }
+            }
+            Place::Pass { angle, direction, pass } => {
+                let newest = self.over.max(self.now.as_ref().map(|now| now.number));
+                if Some(pass) == self.over {
+                    // The array stood at the end, and still moved on a little.
+                    counts.turning += 1;
+                    return;
+                }
+                if newest.is_some_and(|newest| pass < newest) {
+                    counts.late += 1;
+                    return;
+                }
+                if self.now.as_ref().is_some_and(|now| now.number != pass) {
+                    self.end(counts, out);
+                }
+                let angle = angle.to_radians();
+                let step = self.step(angle, direction);
+                if !(-0.5..=last + 0.5).contains(&step) {
+                    counts.beyond += 1;
+                    if step > last {
+                        self.end(counts, out);
+                    }
+                    return;
+                }
+                let near = Near { step: step.round().clamp(0.0, last) as usize, angle, frame };
+                let mut now =
+                    self.now.take().unwrap_or(Pass { number: pass, direction, nearest: None, given: None, slices: 0 });
+                match now.nearest.take() {
+                    Some(other) if near.step < other.step => {
+                        counts.late += 1;
+                        now.nearest = Some(other);
+                    }
+                    Some(other) if near.step == other.step => {
+                        counts.farther += 1;
+                        let nearer = self.distance(&near, &now) < self.distance(&other, &now);
+                        now.nearest = Some(if nearer { near } else { other });
+                    }
+                    other => {
+                        if let Some(other) = other {
+                            self.give(&mut now, other, counts, out);
+                        }
+                        now.nearest = Some(near);
+                    }
+                }
+                self.now = Some(now);
+            }
+        }
+    }
+
+    /// The pass that goes on, if any, is over.
+    pub fn end(&mut self, counts: &mut Counts, out: &mut VecDeque<Event>) {
+        let Some(mut now) = self.now.take() else { return };
+        if let Some(nearest) = now.nearest.take() {
+            self.give(&mut now, nearest, counts, out);
+        }
+        if let Some(given) = now.given.take() {
+            let missing = given.step + 1..self.slices.len();
+            if missing.len() <= MOST_FILLED {
+                for step in missing {
+                    counts.filled += 1;
+                    out.push_back(self.event(&mut now, step, given.frame.clone()));
+                }
+            }
+        }
+        let whole = now.slices == self.slices.len();
+        counts.whole += u64::from(whole);
+        counts.incomplete += u64::from(!whole);
+        self.over = Some(now.number);
+    }
+
+    /// Gives a frame, and before it those that stand in for missing slices: each that of the neighbour whose angle is nearer.
+    fn give(&self, now: &mut Pass, near: Near, counts: &mut Counts, out: &mut VecDeque<Event>) {
+        let before = now.given.take();
+        let missing = before.as_ref().map_or(0, |given| given.step + 1)..near.step;
+        if missing.len() <= MOST_FILLED {
+            for step in missing {
+                counts.filled += 1;
+                let at = self.slices.at(self.slice(step, now.direction) as f64);
+                let stands_in = match &before {
+                    Some(given) if (given.angle - at).abs() < (near.angle - at).abs() => given,
+                    _ => &near,
+                };
+                out.push_back(self.event(now, step, stands_in.frame.clone()));
+            }
+        }
+        counts.placed += 1;
+        out.push_back(self.event(now, near.step, near.frame.clone()));
+        now.given = Some(near);
+    }
+
+    fn event(&self, now: &mut Pass, step: usize, frame: Frame) -> Event {
+        now.slices += 1;
+        Event::Frame(Frame {
+            volume: u32::try_from(now.number).unwrap_or(u32::MAX),
+            number: step as u32,
+            slice: self.slice(step, now.direction),
+            backward: now.direction == Direction::Backward,
+            ..frame
+        })
+    }
+
+    fn slice(&self, step: usize, direction: Direction) -> usize {
+        if direction == Direction::Forward { step } else { self.slices.len() - 1 - step }
+    }
+
+    /// From the middle of its slice, rad.
+    fn distance(&self, near: &Near, now: &Pass) -> f64 {
+        (near.angle - self.slices.at(self.slice(near.step, now.direction) as f64)).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Seven slices from -6 to 6 deg.
+    fn slices() -> Axis {
+        Axis::centred(2f64.to_radians(), 7)
+    }
+
+    fn frame(tag: u8) -> Frame {
+        Frame { volume: 9, number: 9, slice: 9, backward: false, time: None, bytes: vec![tag] }
+    }
+
+    /// Passes of these angles, deg, every second one backwards; frames are tagged by their place in the list.
+    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, Counts) {
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+        let mut tag = 0;
+        for (pass, angles) in passes.iter().enumerate() {
+            let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
+            for angle in *angles {
+                all.frame(frame(tag), Place::Pass { angle: *angle, direction, pass }, &mut counts, &mut out);
+                tag += 1;
+            }
+        }
+        all.end(&mut counts, &mut out);
+        let frames = out.into_iter().filter_map(|e| if let Event::Frame(frame) = e { Some(frame) } else { None });
+        (frames.collect(), counts)
+    }
+
+    fn slices_and_tags(frames: &[Frame]) -> Vec<(usize, u8)> {
+        frames.iter().map(|f| (f.slice, f.bytes[0])).collect()
+    }
+
+    #[test]
+    fn a_way_back_is_another_volume_and_its_slices_run_down() {
+        let forth = [-6.1, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
+        let back = forth.map(|a| -a);
+        let (frames, counts) = swept(&[&forth, &back]);
+        assert_eq!((frames.len(), counts.whole, counts.placed, counts.filled), (14, 2, 14, 0));
+        for (n, frame) in frames.iter().enumerate() {
+            let (volume, number) = (n / 7, n % 7);
+            assert_eq!((frame.volume as usize, frame.number as usize, frame.backward), (volume, number, volume == 1));
+            assert_eq!(frame.slice, if volume == 1 { 6 - number } else { number });
+            assert_eq!(frame.bytes, [n as u8]);
+        }
+    }
+
+    #[test]
+    fn of_two_frames_at_a_slice_the_nearer_counts_whichever_comes_first() {
+        let (frames, counts) = swept(&[&[-6.0, -5.2, -4.4, -3.9, -2.0, -1.2, 0.0, 2.0, 4.0, 6.0, 6.9]]);
+        assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 3), (2, 4), (3, 6), (4, 7), (5, 8), (6, 9)]);
+        assert_eq!((counts.farther, counts.whole), (4, 1));
+    }
+
+    #[test]
+    fn up_to_two_missing_slices_are_given_the_nearer_neighbours_frame_and_three_are_not() {
+        let (frames, counts) = swept(&[&[-4.0, -2.0, 3.7, 6.0]]);
+        assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2), (5, 2), (6, 3)]);
+        assert_eq!((counts.filled, counts.placed, counts.whole, counts.incomplete), (3, 4, 1, 0));
+        let (frames, counts) = swept(&[&[-6.0, 2.0, 2.1]]);
+        assert_eq!(slices_and_tags(&frames), [(0, 0), (4, 1), (5, 1), (6, 1)]);
+        assert_eq!((counts.filled, counts.whole, counts.incomplete, counts.farther), (2, 0, 1, 1));
+        let (frames, counts) = swept(&[&[0.0, 2.0]]);
+        assert_eq!(slices_and_tags(&frames), [(3, 0), (4, 1), (5, 1), (6, 1)], "three are missing at the start");
+        assert_eq!(counts.incomplete, 1);
+    }
+
+    #[test]
+    fn what_lies_half_a_pitch_beyond_the_sweep_or_at_a_turn_is_left_out_and_ends_the_pass() {
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+        let at = |angle, pass| Place::Pass { angle, direction: Direction::Forward, pass };
+        for angle in [-9.0, -7.01, -6.9, -4.0, -2.0, 0.0, 2.0, 4.0, 6.9] {
+            all.frame(frame(0), at(angle, 0), &mut counts, &mut out);
+        }
+        assert_eq!((counts.beyond, out.len()), (2, 6), "the last may still be bettered");
+        all.frame(frame(0), at(7.1, 0), &mut counts, &mut out);
+        assert_eq!((counts.beyond, out.len(), counts.whole), (3, 7, 1));
+        for angle in [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0] {
+            all.frame(frame(0), at(angle, 2), &mut counts, &mut out);
+        }
+        all.frame(frame(0), Place::Turning { angle: -6.5 }, &mut counts, &mut out);
+        assert_eq!(counts.whole, 1);
+        all.frame(frame(0), Place::Turning { angle: 6.5 }, &mut counts, &mut out);
+        assert_eq!((counts.whole, counts.turning), (2, 2));
+        all.frame(frame(0), at(6.0, 2), &mut counts, &mut out);
+        all.frame(frame(0), at(6.0, 0), &mut counts, &mut out);
+        all.frame(frame(0), Place::Outside, &mut counts, &mut out);
+        assert_eq!((out.len(), counts.turning, counts.late, counts.unknown), (14, 3, 1, 1));
+    }
+
+    proptest! {
+        /// Whatever places come: volumes are numbered upwards, no slice is given twice, and none lies beyond the last.
+        #[test]
+        fn no_order_of_places_gives_a_slice_twice(
+            places in prop::collection::vec((-9.0..9.0_f64, 0..4_usize, 0..6_u8), 0..200),
+        ) {
+            let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+            for (angle, pass, kind) in places {
+                let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
+                let place = match kind {
+                    0 => Place::Turning { angle },
+                    1 => Place::Outside,
+                    _ => Place::Pass { angle, direction, pass },
+                };
+                all.frame(frame(0), place, &mut counts, &mut out);
+            }
+            all.end(&mut counts, &mut out);
+            let mut before: Option<(u32, u32)> = None;
+            for event in out {
+                let Event::Frame(frame) = event else { panic!("only frames") };
+                prop_assert!(frame.slice < 7);
+                prop_assert!(before.is_none_or(|b| b < (frame.volume, frame.number)));
+                before = Some((frame.volume, frame.number));
+            }
+        }
+    }
+}
