@@ -119,6 +119,11 @@ impl Feed {
         Some(arrived)
     }
 
+    /// Whether the source loses nothing by being kept waiting.
+    pub fn can_wait(&self) -> bool {
+        self.can_wait
+    }
+
     /// Frames and other events that wait.
     pub fn waiting(&self) -> usize {
         self.shared.lock().events.len()

@@ -121,6 +121,11 @@ impl Stream {
                     return Ok(Step::Picture(now.finish(&mut self.statistics)?));
                 }
                 patience = patience.min(Duration::from_micros(200));
+                if self.feed.can_wait() && now.turns.is_waiting() {
+                    // Another volume would take its place.
+                    std::thread::sleep(patience);
+                    return Ok(Step::Went);
+                }
             } else if now.behind > 0 {
                 now.behind -= 1;
                 if let Some(Arrived { event, at }) = self.feed.next(Duration::ZERO) {

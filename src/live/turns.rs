@@ -74,6 +74,11 @@ impl Turns {
         }
     }
 
+    /// Whether a whole volume waits to be shown.
+    pub fn is_waiting(&self) -> bool {
+        self.update == Update::Whole && self.ready.is_some()
+    }
+
     pub fn is_rolling(&self) -> bool {
         self.update == Update::Rolling
     }

@@ -38,8 +38,8 @@ impl Drop for Playing {
     }
 }
 
-/// A source that says what it was told to, one thing after such a pause.
-struct Told(VecDeque<Event>, Duration);
+/// A source that says what it was told to, one thing after such a pause, and can wait or not.
+struct Told(VecDeque<Event>, Duration, bool);
 
 impl Live for Told {
     fn next(&mut self, _: Duration) -> Event {
@@ -48,7 +48,7 @@ impl Live for Told {
     }
 
     fn can_wait(&self) -> bool {
-        true
+        self.2
     }
 }
 
@@ -116,7 +116,11 @@ fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> V
 fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
     // Where each frame is shown there is time for a picture between some of them.
     let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
-    let feed = Feed::new(Box::new(Told(events.into(), pause)), None).expect("thread");
+    stream_of(device, Told(events.into(), pause, true), settings, options)
+}
+
+fn stream_of(device: &Device, source: Told, settings: Settings, options: live::Options) -> Stream {
+    let feed = Feed::new(Box::new(source), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
 
@@ -188,13 +192,13 @@ fn every_slice_is_what_a_file_gives_after_any_interleaving() {
 /// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
 #[test]
 fn a_whole_volume_is_never_mixed() {
-    for (images, queues) in [(2, 1), (3, 1), (2, 3), (3, 2)] {
+    for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
         let playing = Playing::new(queues);
         let device = &playing.device;
         let options = live::Options { update: Update::Whole, images, queues: Some(queues) };
-        let frames = (0..12).flat_map(stamped);
-        let mut stream =
-            stream(device, events(header(0.3), frames), settings("mode = 'mip'\nslices.everything = true"), options);
+        let source = Told(events(header(0.3), (0..12).flat_map(stamped)).into(), Duration::ZERO, waits);
+        let settings = settings("mode = 'mip'\nslices.everything = true");
+        let mut stream = stream_of(device, source, settings, options);
         let mut shown = Vec::new();
         let faults = run(&mut stream, |stream, picture| {
             let volume = volume_of(stream.renderer().expect("begun"));
@@ -208,6 +212,7 @@ fn a_whole_volume_is_never_mixed() {
         assert!(faults.is_empty() && shown.windows(2).all(|w| w[0] < w[1]), "{shown:?} {faults:?}");
         let Statistics { volumes, frames, pictures, latency, .. } = stream.statistics().expect("statistics");
         assert_eq!((frames, volumes.shown + volumes.dropped + volumes.incomplete), (108, 12), "{volumes:?}");
+        assert!(!waits || volumes.shown == 12, "a source that can wait loses nothing: {volumes:?}");
         assert_eq!(
             (pictures, latency.len()),
             (volumes.shown, 9 * volumes.shown),
