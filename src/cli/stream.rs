@@ -91,7 +91,15 @@ impl Stream {
         let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
         let mut pictures = 0;
         let end = loop {
-            match stream.step(Duration::from_millis(50)).map_err(fault)? {
+            let step = match stream.step(Duration::from_millis(50)) {
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() => {
+                    tracing::warn!("{lost}; going on with the next volume on the device opened anew");
+                    stream.revive(&self.look.device(self.validate)?).map_err(fault)?;
+                    continue;
+                }
+                step => step.map_err(fault)?,
+            };
+            match step {
                 Step::Picture(shown) => {
                     self.keep(&shown, update, pictures)?;
                     pictures += 1;

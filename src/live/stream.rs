@@ -166,17 +166,36 @@ impl Stream {
         Ok(Step::Went)
     }
 
-    /// Another geometry, or the first: everything is made for it.
-    fn begin(&mut self, header: Header) -> Result<(), StreamError> {
-        if self.now.as_ref().is_some_and(|now| now.header == header) {
-            return Ok(());
+    /// Goes on with another device, or the same one anew after it was lost: with the volume that begins next.
+    ///
+    /// # Errors
+    /// A device that cannot hold what the geometry needs.
+    pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
+        self.context = context.clone();
+        match self.now.as_ref().map(|now| now.header.clone()) {
+            Some(header) => self.make(header),
+            None => Ok(()),
         }
+    }
+
+    /// Another geometry, or the first.
+    fn begin(&mut self, header: Header) -> Result<(), StreamError> {
+        match self.now.as_ref().is_some_and(|now| now.header == header) {
+            true => Ok(()),
+            false => self.make(header),
+        }
+    }
+
+    /// Makes everything for a geometry.
+    fn make(&mut self, header: Header) -> Result<(), StreamError> {
         let views = Views::new(&header, &self.settings, self.options.update)?;
         // Before the new one: both may not fit the device.
-        let before = self.now.take().map(|now| now.turns.counts());
+        let before = self.now.take().map(|now| now.turns);
         let slices = views.first().slices() as usize;
         let mut turns = Turns::new(self.options.update, self.options.images, slices);
-        turns.go_on_from(before.unwrap_or_default());
+        if let Some(before) = before {
+            turns.go_on_from(before);
+        }
         let options =
             gpu::Options { volume_images: turns.images(), queues: self.options.queues, ..gpu::Options::default() };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;

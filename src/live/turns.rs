@@ -88,9 +88,11 @@ impl Turns {
         self.backward.len() as u32
     }
 
-    /// Counts go on from those of the geometry before.
-    pub fn go_on_from(&mut self, counts: Counts) {
-        self.counts = counts;
+    /// Counts go on from those before another geometry or device; a volume of then that was not shown will not be.
+    pub fn go_on_from(&mut self, mut before: Turns) {
+        before.end();
+        before.counts.dropped += u64::from(before.is_waiting());
+        (self.counts, self.over) = (before.counts, before.over);
     }
 
     pub fn counts(&self) -> Counts {

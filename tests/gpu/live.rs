@@ -340,3 +340,34 @@ fn other_settings_are_drawn_of_the_volume_that_is_there() {
     let (volume, second) = second.expect("drawn again");
     assert!(volume == 0 && Some(&second) != first.as_ref());
 }
+
+/// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
+#[test]
+fn a_lost_device_costs_a_volume_and_not_the_stream() {
+    use echolume::gpu::faults::Seam;
+    let (device, other) = (Device::new(), Device::new());
+    let options = live::Options::default();
+    let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
+    let (mut shown, mut lost) = (Vec::new(), 0);
+    loop {
+        match stream.step(Duration::from_millis(20)) {
+            Ok(Step::Picture(picture)) => {
+                shown.push(picture.volume);
+                if shown.len() == 2 {
+                    device.faults.inject(Seam::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
+                }
+            }
+            Ok(Step::End(why)) => break assert_eq!(why, None),
+            Ok(_) => {}
+            Err(live::StreamError::Gpu(error)) if error.is_device_lost() => {
+                lost += 1;
+                stream.revive(&other).expect("made anew");
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert!(lost == 1 && shown.first() == Some(&0) && shown.last() == Some(&5), "{lost} lost, {shown:?}");
+    let counts = stream.statistics().expect("statistics").volumes;
+    assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
+    assert!(counts.incomplete >= 1, "{counts:?}");
+}
