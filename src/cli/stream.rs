@@ -36,7 +36,7 @@ pub struct Stream {
     /// Queues of the device that share the work, 1 to 3 [default: all that it has for different work]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
     queues: Option<u8>,
-    /// Write each picture into this folder (PNG, named by its volume)
+    /// Write each picture into this folder (PNG, named by its volume; rolling: by its number)
     #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
     out: Option<PathBuf>,
     /// Draw the pictures and keep none
@@ -77,7 +77,7 @@ impl Stream {
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let options = Options { update, images: self.images, queues: self.queues.map(usize::from) };
         let mut stream = Live::new(&context, feed, settings, options);
-        let done = self.go(&mut stream);
+        let done = self.go(&mut stream, update);
         drop(stream);
         done?;
         match context.messages().first() {
@@ -86,12 +86,24 @@ impl Stream {
         }
     }
 
-    fn go(&self, stream: &mut Live) -> Result<(), Failure> {
+    fn go(&self, stream: &mut Live, update: Update) -> Result<(), Failure> {
         let began = Instant::now();
         let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
+        let mut pictures = 0;
         let end = loop {
-            match stream.step(Duration::from_millis(50)).map_err(fault)? {
-                Step::Picture(shown) => self.keep(&shown)?,
+            let step = match stream.step(Duration::from_millis(50)) {
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() => {
+                    tracing::warn!("{lost}; going on with the next volume on the device opened anew");
+                    stream.revive(&self.look.device(self.validate)?).map_err(fault)?;
+                    continue;
+                }
+                step => step.map_err(fault)?,
+            };
+            match step {
+                Step::Picture(shown) => {
+                    self.keep(&shown, update, pictures)?;
+                    pictures += 1;
+                }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
                 Step::Went => {}
                 Step::End(why) => break why,
@@ -133,9 +145,13 @@ impl Stream {
         }
     }
 
-    fn keep(&self, shown: &Shown) -> Result<(), Failure> {
+    fn keep(&self, shown: &Shown, update: Update, number: u64) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
-        let file = folder.join(format!("volume-{:06}.png", shown.volume));
+        let name = match update {
+            Update::Whole => format!("volume-{:06}.png", shown.volume),
+            Update::Rolling => format!("picture-{number:06}.png"),
+        };
+        let file = folder.join(name);
         shown.picture.save(&file).map_err(failed)
     }
 

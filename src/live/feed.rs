@@ -119,6 +119,16 @@ impl Feed {
         Some(arrived)
     }
 
+    /// Whether the source loses nothing by being kept waiting.
+    pub fn can_wait(&self) -> bool {
+        self.can_wait
+    }
+
+    /// Frames and other events that wait.
+    pub fn waiting(&self) -> usize {
+        self.shared.lock().events.len()
+    }
+
     /// Whether a volume that is about to be taken is stale: a whole one has come after it, and the source does not wait.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))

@@ -88,6 +88,9 @@ struct Now {
     backward: Vec<bool>,
     /// The last volume that was shown.
     volume: Option<u32>,
+    /// Frames that waited when the last picture was done, and that the next one shows: beginning it after the first of them would
+    /// fall ever further behind.
+    behind: usize,
 }
 
 impl Stream {
@@ -114,9 +117,22 @@ impl Stream {
         if let Some(now) = &mut self.now {
             if now.drawing.is_some() {
                 if !now.renderer.is_drawing()? {
+                    now.behind = if now.turns.is_rolling() { self.feed.waiting() } else { 0 };
                     return Ok(Step::Picture(now.finish(&mut self.statistics)?));
                 }
                 patience = patience.min(Duration::from_micros(200));
+                if self.feed.can_wait() && now.turns.is_waiting() {
+                    // Another volume would take its place.
+                    std::thread::sleep(patience);
+                    return Ok(Step::Went);
+                }
+            } else if now.behind > 0 {
+                now.behind -= 1;
+                if let Some(Arrived { event, at }) = self.feed.next(Duration::ZERO) {
+                    return self.take(event, at);
+                }
+                now.behind = 0;
+                return Ok(Step::Went);
             } else if now.begin()? {
                 return Ok(Step::Went);
             }
@@ -150,17 +166,36 @@ impl Stream {
         Ok(Step::Went)
     }
 
-    /// Another geometry, or the first: everything is made for it.
-    fn begin(&mut self, header: Header) -> Result<(), StreamError> {
-        if self.now.as_ref().is_some_and(|now| now.header == header) {
-            return Ok(());
+    /// Goes on with another device, or the same one anew after it was lost: with the volume that begins next.
+    ///
+    /// # Errors
+    /// A device that cannot hold what the geometry needs.
+    pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
+        self.context = context.clone();
+        match self.now.as_ref().map(|now| now.header.clone()) {
+            Some(header) => self.make(header),
+            None => Ok(()),
         }
+    }
+
+    /// Another geometry, or the first.
+    fn begin(&mut self, header: Header) -> Result<(), StreamError> {
+        match self.now.as_ref().is_some_and(|now| now.header == header) {
+            true => Ok(()),
+            false => self.make(header),
+        }
+    }
+
+    /// Makes everything for a geometry.
+    fn make(&mut self, header: Header) -> Result<(), StreamError> {
         let views = Views::new(&header, &self.settings, self.options.update)?;
         // Before the new one: both may not fit the device.
-        let before = self.now.take().map(|now| now.turns.counts());
+        let before = self.now.take().map(|now| now.turns);
         let slices = views.first().slices() as usize;
         let mut turns = Turns::new(self.options.update, self.options.images, slices);
-        turns.go_on_from(before.unwrap_or_default());
+        if let Some(before) = before {
+            turns.go_on_from(before);
+        }
         let options =
             gpu::Options { volume_images: turns.images(), queues: self.options.queues, ..gpu::Options::default() };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
@@ -174,6 +209,7 @@ impl Stream {
             drawing: None,
             changed: false,
             volume: None,
+            behind: 0,
         });
         Ok(())
     }

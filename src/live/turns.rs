@@ -74,14 +74,25 @@ impl Turns {
         }
     }
 
+    /// Whether a whole volume waits to be shown.
+    pub fn is_waiting(&self) -> bool {
+        self.update == Update::Whole && self.ready.is_some()
+    }
+
+    pub fn is_rolling(&self) -> bool {
+        self.update == Update::Rolling
+    }
+
     /// How many volume images are used.
     pub fn images(&self) -> u32 {
         self.backward.len() as u32
     }
 
-    /// Counts go on from those of the geometry before.
-    pub fn go_on_from(&mut self, counts: Counts) {
-        self.counts = counts;
+    /// Counts go on from those before another geometry or device; a volume of then that was not shown will not be.
+    pub fn go_on_from(&mut self, mut before: Turns) {
+        before.end();
+        before.counts.dropped += u64::from(before.is_waiting());
+        (self.counts, self.over) = (before.counts, before.over);
     }
 
     pub fn counts(&self) -> Counts {

@@ -2,7 +2,7 @@
 //! and others 2017, who filter only what a picture shows). The camera does not enter: it may turn at any time.
 
 use super::{Layout, Mode, RING, Scene, SliceGrid};
-use crate::probe::{Advance, Array, Geometry, Motion, Probe};
+use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -238,18 +238,9 @@ fn slices(scene: &Scene, probe: &Probe, position: Span) -> Span {
     };
     // The slice that is at a place when a line fires falls or rises with the line all the way.
     let lines = [0.0, (probe.lines.len() - 1) as f64];
-    // Swept either way: what is made of a volume does not depend on the direction of the one before it.
-    let way = |sign: f64| match &probe.advance {
-        Advance::None => Advance::None,
-        Advance::Same(a) => Advance::Same(sign * a),
-        Advance::Each(table) => Advance::Each(table.iter().map(|a| sign * a.abs()).collect()),
-    };
-    let ways = [-1.0, 1.0].map(|sign| Probe { advance: way(sign), ..probe.clone() });
-    let at = |position: f64| {
-        let indices = ways.iter().flat_map(|probe| lines.map(|line| probe.slice_index(position, line)));
-        indices.fold((f64::MAX, f64::MIN), |(low, high), index| (low.min(index), high.max(index)))
-    };
-    Span(at(position.0 - slack).0, at(position.1 + slack).1)
+    let at = |position: f64| lines.map(|line| probe.slice_index(position, line));
+    let ([a, b], [c, d]) = (at(position.0 - slack), at(position.1 + slack));
+    Span(a.min(b), c.max(d))
 }
 
 /// Corners of what planes (outward normals and limits) leave of a box.

@@ -38,16 +38,17 @@ impl Drop for Playing {
     }
 }
 
-/// A source that says what it was told to, at once.
-struct Told(VecDeque<Event>);
+/// A source that says what it was told to, one thing after such a pause, and can wait or not.
+struct Told(VecDeque<Event>, Duration, bool);
 
 impl Live for Told {
     fn next(&mut self, _: Duration) -> Event {
+        std::thread::sleep(self.1);
         self.0.pop_front().unwrap_or(Event::End(None))
     }
 
     fn can_wait(&self) -> bool {
-        true
+        self.2
     }
 }
 
@@ -113,7 +114,13 @@ fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> V
 }
 
 fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
-    let feed = Feed::new(Box::new(Told(events.into())), None).expect("thread");
+    // Where each frame is shown there is time for a picture between some of them.
+    let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
+    stream_of(device, Told(events.into(), pause, true), settings, options)
+}
+
+fn stream_of(device: &Device, source: Told, settings: Settings, options: live::Options) -> Stream {
+    let feed = Feed::new(Box::new(source), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
 
@@ -185,13 +192,13 @@ fn every_slice_is_what_a_file_gives_after_any_interleaving() {
 /// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
 #[test]
 fn a_whole_volume_is_never_mixed() {
-    for (images, queues) in [(2, 1), (3, 1), (2, 3), (3, 2)] {
+    for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
         let playing = Playing::new(queues);
         let device = &playing.device;
         let options = live::Options { update: Update::Whole, images, queues: Some(queues) };
-        let frames = (0..12).flat_map(stamped);
-        let mut stream =
-            stream(device, events(header(0.3), frames), settings("mode = 'mip'\nslices.everything = true"), options);
+        let source = Told(events(header(0.3), (0..12).flat_map(stamped)).into(), Duration::ZERO, waits);
+        let settings = settings("mode = 'mip'\nslices.everything = true");
+        let mut stream = stream_of(device, source, settings, options);
         let mut shown = Vec::new();
         let faults = run(&mut stream, |stream, picture| {
             let volume = volume_of(stream.renderer().expect("begun"));
@@ -205,6 +212,7 @@ fn a_whole_volume_is_never_mixed() {
         assert!(faults.is_empty() && shown.windows(2).all(|w| w[0] < w[1]), "{shown:?} {faults:?}");
         let Statistics { volumes, frames, pictures, latency, .. } = stream.statistics().expect("statistics");
         assert_eq!((frames, volumes.shown + volumes.dropped + volumes.incomplete), (108, 12), "{volumes:?}");
+        assert!(!waits || volumes.shown == 12, "a source that can wait loses nothing: {volumes:?}");
         assert_eq!(
             (pictures, latency.len()),
             (volumes.shown, 9 * volumes.shown),
@@ -331,4 +339,35 @@ fn other_settings_are_drawn_of_the_volume_that_is_there() {
     run(&mut stream, |_, shown| second = Some((shown.volume, shown.picture)));
     let (volume, second) = second.expect("drawn again");
     assert!(volume == 0 && Some(&second) != first.as_ref());
+}
+
+/// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
+#[test]
+fn a_lost_device_costs_a_volume_and_not_the_stream() {
+    use echolume::gpu::faults::Seam;
+    let (device, other) = (Device::new(), Device::new());
+    let options = live::Options::default();
+    let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
+    let (mut shown, mut lost) = (Vec::new(), 0);
+    loop {
+        match stream.step(Duration::from_millis(20)) {
+            Ok(Step::Picture(picture)) => {
+                shown.push(picture.volume);
+                if shown.len() == 2 {
+                    device.faults.inject(Seam::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
+                }
+            }
+            Ok(Step::End(why)) => break assert_eq!(why, None),
+            Ok(_) => {}
+            Err(live::StreamError::Gpu(error)) if error.is_device_lost() => {
+                lost += 1;
+                stream.revive(&other).expect("made anew");
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert!(lost == 1 && shown.first() == Some(&0) && shown.last() == Some(&5), "{lost} lost, {shown:?}");
+    let counts = stream.statistics().expect("statistics").volumes;
+    assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
+    assert!(counts.incomplete >= 1, "{counts:?}");
 }

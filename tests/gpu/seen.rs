@@ -148,8 +148,8 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
             cases += 1;
         }
         println!("{name}: {:.2} of the least box on average over {cases} scenes", shares / f64::from(cases));
-        // Of nine slices, the way of the motor within a frame alone may be one.
-        assert!(cases > 20 && shares / f64::from(cases) < 2.0, "{name}");
+        // Of nine slices, the way of the motor within a frame may be one on each side: the box reaches as far as a sweep either way.
+        assert!(cases > 20 && shares / f64::from(cases) < 3.0, "{name}");
     }
 }
 

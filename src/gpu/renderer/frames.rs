@@ -90,8 +90,7 @@ impl Renderer {
         let offset = match chain::copied(&self.scene) {
             Some(_) => self.gather(slice, image)?,
             None if first == 0 => {
-                let lane = &mut self.lanes[self.next_lane];
-                lane.collect(&self.timelines, &mut self.measured)?;
+                self.free_lane()?;
                 0
             }
             None => 0,
@@ -110,6 +109,17 @@ impl Renderer {
         }
         self.unseen[image as usize][slice as usize] = true;
         Ok(true)
+    }
+
+    /// Waits until the next lane is free, and adds up what it measured.
+    pub(super) fn free_lane(&mut self) -> Result<(), GpuError> {
+        let lane = &mut self.lanes[self.next_lane];
+        // lavapipe waits for all of the device before it gives any time stamp (Mesa 22.3, `lvp_GetQueryPoolResults`), and so for a picture
+        // that is on its way: the lane's times are then left out, of which frames in between pictures have enough.
+        match self.drawing && self.context.candidate.is_software() {
+            true => lane.first().wait(&self.timelines),
+            false => lane.collect(&self.timelines, &mut self.measured),
+        }
     }
 
     /// The frame that lies in the next lane's staging buffer, to its layer and through stage 1.

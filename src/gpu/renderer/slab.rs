@@ -29,7 +29,7 @@ impl Renderer {
             self.flush()?;
         }
         if self.slab.is_none() {
-            self.lanes[self.next_lane].collect(&self.timelines, &mut self.measured)?;
+            self.free_lane()?;
         }
         let slab = self.slab.get_or_insert(Slab { image, first: slice, count: 0 });
         Ok(slab.count as usize * frame_bytes(&self.scene) as usize)

@@ -68,7 +68,10 @@ impl Stream {
     /// A line that is no such header, or whose frames cannot be: too large, without a place, without a range. Nothing is allocated for them.
     pub fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<Stream, InputError> {
         let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
-        let value: serde_json::Value = serde_json::from_slice(line).map_err(no_json)?;
+        let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
+            let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
+            InputError::new(Path::new(NAME), "header", fault)
+        })?;
         // Before the keys, which another version may have others of.
         match value.get("echolume").map(serde_json::Value::as_u64) {
             Some(Some(VERSION)) => {}
