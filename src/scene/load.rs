@@ -171,7 +171,16 @@ fn merge(under: &mut Table, over: Table) {
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let before = error.span().and_then(|span| text.get(..span.start));
     let place = before.map_or(String::new(), |b| format!("line {}: ", b.matches('\n').count() + 1));
-    format!("{place}{}", error.message().lines().collect::<Vec<_>>().join(" "))
+    // A key that is named may hold anything.
+    let message = error.message().lines().collect::<Vec<_>>().join(" ");
+    message.chars().fold(place, |mut line, c| {
+        if c.is_control() {
+            line.extend(c.escape_default())
+        } else {
+            line.push(c)
+        }
+        line
+    })
 }
 
 #[cfg(test)]

@@ -79,6 +79,9 @@ fn a_pass_takes_the_time_that_its_rate_leaves() {
         (f64::NAN, 1.0, None, "--angle"),
         (61.0, 5.1, None, "--rate"),
         (61.0, -1.0, None, "--rate"),
+        // The speed would be lost in rounding, and the time of a pass no time.
+        (61.0, 1e-9, None, "--rate"),
+        (1e-300, 1.0, None, "--angle"),
         (61.0, f64::INFINITY, None, "--rate"),
         (61.0, 5.0, None, "at most"),
         (61.0, 2.0, Some(0), "--volumes"),

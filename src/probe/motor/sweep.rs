@@ -6,6 +6,11 @@ use super::fault::Fault;
 use super::table::MotorTable;
 use std::time::Duration;
 
+/// Fewest passes a second: slower ones would take longer than anything is waited for.
+const SLOWEST: f64 = 1e-3;
+/// Narrowest sweep, degrees.
+const NARROWEST: f64 = 1e-3;
+
 /// A sweep to be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
@@ -25,15 +30,15 @@ impl Sweep {
     pub fn speed(&self, table: &MotorTable, round_trip: Duration) -> Result<f64, Fault> {
         let Sweep { angle, rate, volumes } = *self;
         let refuse = |fault: String| Err(Fault::OutOfRange(fault));
-        if !(angle > 0.0 && angle <= table.largest_angle_deg) {
+        if !(NARROWEST..=table.largest_angle_deg).contains(&angle) {
             return refuse(format!(
-                "--angle {angle}: must be above 0, up to the probe's {} deg",
+                "--angle {angle}: must be {NARROWEST} to {} deg, the probe's widest",
                 table.largest_angle_deg
             ));
         }
-        if !(rate > 0.0 && rate <= table.largest_rate) {
+        if !(SLOWEST..=table.largest_rate).contains(&rate) {
             return refuse(format!(
-                "--rate {rate}: must be above 0, up to the probe's {} volumes/s",
+                "--rate {rate}: must be {SLOWEST} to {} volumes/s, the probe's most",
                 table.largest_rate
             ));
         }
@@ -43,7 +48,7 @@ impl Sweep {
         // At the turn: the end is noticed, and the way back is asked for.
         let turn = 2.5 * round_trip.max(PERIOD).as_secs_f64();
         let (time, acceleration) = (1.0 / rate - turn, table.acceleration_deg_per_s2);
-        // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2.
+        // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2, written so that nothing cancels.
         let least = (4.0 * angle / acceleration).sqrt();
         if time < least {
             return refuse(format!(
@@ -52,7 +57,7 @@ impl Sweep {
             ));
         }
         let at = acceleration * time;
-        let speed = (at - (at * at - 4.0 * acceleration * angle).max(0.0).sqrt()) / 2.0;
+        let speed = 2.0 * acceleration * angle / (at + (at * at - 4.0 * acceleration * angle).max(0.0).sqrt());
         if speed > table.largest_speed_deg_per_s {
             let most = table.largest_speed_deg_per_s;
             return refuse(format!(

@@ -161,7 +161,8 @@ impl Replay {
     fn rebuild(&mut self, first: u64, length: u64) -> std::io::Result<()> {
         self.rebuilt = true;
         let record = self.record_bytes();
-        let mut bytes = vec![0; record as usize];
+        // A header may claim frames that the file has no room for.
+        let mut bytes = vec![0; if first + record <= length { record as usize } else { 0 }];
         let mut at = first;
         self.file.seek(SeekFrom::Start(at))?;
         while at + record <= length {

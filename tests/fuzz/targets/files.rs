@@ -1,0 +1,86 @@
+//! Recordings.
+
+use super::{told, written};
+use echolume::source::recorder::Replay;
+use echolume::source::{InputError, Recording, Source};
+use std::path::Path;
+
+/// What is read of an input that goes on: a few bytes of zlib make a thousand times as many.
+const MOST_READ: usize = 8 << 20;
+
+/// A probe that fits most frames, for sweeps that bring none.
+const PROBE: &[u8] = b"[array]\nkind = 'curved'\nradius_mm = 40\n[lines]\nsector_angle_deg = 70\n[depth]\nend_mm = 120\n\
+                       [motion]\nkind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60\nspeed_ratio = 0.4\nboth_ways = true\n";
+
+fn read(mut source: impl Source) -> Result<String, InputError> {
+    let (volumes, mut bytes) = (source.volumes(), 0);
+    let slices = source.geometry(0).slices();
+    while let Some(frame) = source.next_frame()? {
+        assert!(frame.slice < slices, "slice {} of {slices}", frame.slice);
+        bytes += frame.bytes.len();
+        if bytes > MOST_READ {
+            break;
+        }
+    }
+    source.skip_to_volume(volumes / 2)?;
+    // Its first frame may be damaged.
+    source.next_frame()?;
+    Ok(format!("{} volumes", volumes.min(3)))
+}
+
+fn outcome(result: Result<String, InputError>) -> String {
+    result.unwrap_or_else(told)
+}
+
+fn recording(path: &Path, probe: Option<&Path>) -> String {
+    outcome(Recording::open(path, probe).and_then(|recording| {
+        let _ = recording.facts();
+        read(recording)
+    }))
+}
+
+pub fn metaimage(bytes: &[u8]) -> String {
+    let (path, probe) = (written("input.mha", bytes), written("fan.toml", PROBE));
+    recording(&path, None) + &recording(&path, Some(&probe))
+}
+
+pub fn kretz(bytes: &[u8]) -> String {
+    recording(&written("input.vol", bytes), None)
+}
+
+/// A file of frames as it came, and with checksums that let its words through.
+pub fn frames(bytes: &[u8]) -> String {
+    let once = |bytes: &[u8]| {
+        let path = written("input.frames", bytes);
+        outcome(Replay::open(&path).and_then(|replay| {
+            let whole = read(replay)?;
+            Replay::open(&path)?.facts().map(|_| whole)
+        }))
+    };
+    let mut right = bytes.to_vec();
+    mend(&mut right);
+    once(bytes) + &once(&right)
+}
+
+/// Sets the header's length and checksum, and those of the frames behind it as long as one leads to the next. None where there is no room.
+fn mend(bytes: &mut [u8]) -> Option<()> {
+    // The header is JSON: it ends with the brace before the first frame.
+    let frame = bytes.windows(4).position(|w| w == b"FRAM").unwrap_or(bytes.len());
+    let length = frame.checked_sub(20)?;
+    bytes.get_mut(12..16)?.copy_from_slice(&(length as u32).to_le_bytes());
+    let mut at = sum(bytes, 0, 16 + length)?;
+    while bytes.get(at..at + 4)? == b"FRAM" {
+        let length = u32::from_le_bytes(bytes.get(at + 20..at + 24)?.try_into().ok()?) as usize;
+        at = sum(bytes, at, at.checked_add(40)?.checked_add(length)?)?;
+    }
+    None
+}
+
+/// Writes the CRC-32 of a range behind it, and says where that ends.
+fn sum(bytes: &mut [u8], from: usize, to: usize) -> Option<usize> {
+    let crc = bytes.get(from..to)?.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
+    });
+    bytes.get_mut(to..to + 4)?.copy_from_slice(&(!crc).to_le_bytes());
+    Some(to + 4)
+}

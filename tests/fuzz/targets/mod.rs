@@ -1,0 +1,155 @@
+//! Everything that reads what comes from outside, as functions of any bytes. Each must come to an end without a panic; it says in words
+//! what became of the bytes, so that inputs with a new outcome can be told from more of the same.
+//!
+//! `tests/fuzz` runs them with mutated seeds, `tools/fuzz` under libFuzzer.
+
+mod files;
+mod motor;
+mod network;
+mod scenes;
+mod voxels;
+
+use std::path::{Path, PathBuf};
+
+pub struct Target {
+    pub name: &'static str,
+    pub run: fn(&[u8]) -> String,
+    /// Seeds are lines of text: numbers and words are exchanged too.
+    pub text: bool,
+    /// Memory that it may take beside its input, bytes.
+    pub memory: usize,
+    /// Times that it is run within the tests: about one and a half seconds.
+    pub rounds: u32,
+    /// Seeds beside those in `tests/fuzz/seeds/<name>`: files and folders from the top.
+    pub also: &'static [&'static str],
+}
+
+const MIB: usize = 1 << 20;
+
+pub const TARGETS: &[Target] = &[
+    Target {
+        name: "igtl",
+        run: network::messages,
+        text: false,
+        memory: 16 * MIB,
+        rounds: 300_000,
+        also: &["tests/data/openigtlink"],
+    },
+    Target { name: "pairing", run: network::pairing, text: false, memory: 16 * MIB, rounds: 300_000, also: &[] },
+    Target { name: "piped", run: network::piped, text: true, memory: 64 * MIB, rounds: 6_000, also: &[] },
+    Target { name: "frames", run: files::frames, text: true, memory: 64 * MIB, rounds: 40_000, also: &[] },
+    Target {
+        name: "metaimage",
+        run: files::metaimage,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 50_000,
+        also: &[
+            "tests/data/wobbler-4dc7/sweep.mha",
+            "tests/data/bone-l14/bone.mha",
+            "tests/data/ultrasonix-curvilinear/brightness.mha",
+        ],
+    },
+    Target {
+        name: "kretz",
+        run: files::kretz,
+        text: false,
+        memory: 64 * MIB,
+        rounds: 100_000,
+        also: &["tests/data/wobbler-4dc7/sweep.vol"],
+    },
+    Target {
+        name: "probe",
+        run: motor::probe_file,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 80_000,
+        also: &[
+            "tests/motor/probe.toml",
+            "tests/data/wobbler-4dc7/probe.toml",
+            "tests/data/ultrasonix-curvilinear/probe.toml",
+        ],
+    },
+    Target { name: "motor", run: motor::motor_table, text: true, memory: 64 * MIB, rounds: 70_000, also: &[] },
+    Target { name: "tmcl", run: motor::replies, text: false, memory: MIB, rounds: 100_000, also: &[] },
+    Target {
+        name: "scene",
+        run: scenes::scene_file,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 30_000,
+        also: &["src/scene/presets"],
+    },
+    Target { name: "set", run: scenes::assignments, text: true, memory: 64 * MIB, rounds: 4_000, also: &[] },
+    Target { name: "transfer", run: scenes::transfer_file, text: true, memory: 64 * MIB, rounds: 100_000, also: &[] },
+    Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },
+];
+
+/// Writes what is to be read from a file, and gives its path: in a folder of this process, the same for every input.
+fn written(name: &str, bytes: &[u8]) -> PathBuf {
+    let folder = folder();
+    std::fs::create_dir_all(&folder).expect("a folder for inputs");
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).expect("an input is written");
+    path
+}
+
+/// Where inputs that must be files lie.
+pub fn folder() -> PathBuf {
+    let memory = Path::new("/dev/shm");
+    let under = if memory.is_dir() { memory.to_path_buf() } else { std::env::temp_dir() };
+    under.join(format!("echolume-fuzz-{}", std::process::id()))
+}
+
+/// What an error must be: one line of bounded length that cannot write to a terminal.
+fn told(error: impl std::fmt::Display) -> String {
+    let line = error.to_string();
+    assert!(!line.chars().any(char::is_control), "{line:?}");
+    assert!(line.len() < 4000, "{} bytes: {line}", line.len());
+    line
+}
+
+/// Bytes taken one after the other as whatever is needed; 0 behind the last.
+struct Bytes<'a>(&'a [u8]);
+
+impl Bytes<'_> {
+    fn u8(&mut self) -> u8 {
+        let Some((first, rest)) = self.0.split_first() else { return 0 };
+        self.0 = rest;
+        *first
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// At most this many: none behind the last.
+    fn take(&mut self, count: usize) -> &[u8] {
+        let (taken, rest) = self.0.split_at(count.min(self.0.len()));
+        self.0 = rest;
+        taken
+    }
+
+    /// Mostly a number as they occur, now and then one that does not.
+    fn number(&mut self) -> f64 {
+        const EXTREME: [f64; 12] = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            1e-9,
+            1e6,
+            -1e6,
+            1e300,
+            f64::MIN_POSITIVE,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+        ];
+        match self.u8() {
+            n @ 0..200 => (f64::from(n) - 100.0) / 16.0 + f64::from(self.u8()) / 4096.0,
+            n @ 200..250 => EXTREME[usize::from(n) % EXTREME.len()],
+            _ => f64::from_le_bytes(std::array::from_fn(|_| self.u8())),
+        }
+    }
+}
