@@ -74,7 +74,8 @@ impl Arriving {
     pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
         let network = self.source.strip_prefix(NETWORK);
         let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
-        let driving = self.driven.checked(self.probe.as_ref(), is_file.then(|| self.path()))?;
+        let fan = self.is_phantom().then_some(phantom::FAN_ANGLE_DEG);
+        let driving = self.driven.checked(self.probe.as_deref(), is_file.then(|| self.path()), fan)?;
         if self.is_phantom() {
             return self.phantom(driving.as_ref());
         }

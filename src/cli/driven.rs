@@ -1,19 +1,22 @@
 //! A motor that turns the array beside a stream of frames, and places them: the arguments, and what follows from them.
 
-use super::serial::{Serial, fault, table};
+use super::serial::{Serial, fault, motor_of};
 use super::{Failure, failed, input};
 use echolume::probe::ProbeFile;
 use echolume::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
 use echolume::source::live::Live;
 use echolume::source::swept::{Clock, Options, Swept};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+/// The motor's sweep, of what the frames lie over.
+const WIDER: f64 = 1.05;
 
 #[derive(clap::Args)]
 pub struct Driven {
     /// Serial port of the motor that turns the array: frames are placed by where it is. Needs a probe file with a [motor] table
-    #[arg(long, value_name = "PORT", requires_all = ["angle", "sweeps"])]
+    #[arg(long, value_name = "PORT", requires = "sweeps")]
     motor: Option<String>,
-    /// The motor's sweep from end to end, degrees; a pitch wider than the frames lie, so that none is taken while it turns round
+    /// The motor's sweep from end to end, degrees [default: a twentieth wider than the frames lie, which leaves it room to turn round]
     #[arg(long, value_name = "DEG", requires = "motor")]
     angle: Option<f64>,
     /// Passes of the motor over the angle, and so volumes, a second
@@ -43,15 +46,27 @@ pub struct Driving<'a> {
 }
 
 impl Driven {
-    /// What is to be driven, if anything. `recording`: the file that is played, whose own probe file may say how.
-    pub fn checked(&self, probe: Option<&PathBuf>, recording: Option<&Path>) -> Result<Option<Driving<'_>>, Failure> {
-        let (Some(port), Some(angle), Some(rate)) = (&self.motor, self.angle, self.sweeps) else { return Ok(None) };
+    /// What is to be driven, if anything. `recording`: the file that is played, whose own probe file may say how. `fan`: what the
+    /// frames lie over, degrees, where that does not come from the probe file.
+    pub fn checked(
+        &self,
+        probe: Option<&Path>,
+        recording: Option<&Path>,
+        fan: Option<f64>,
+    ) -> Result<Option<Driving<'_>>, Failure> {
+        let (Some(port), Some(rate)) = (&self.motor, self.sweeps) else { return Ok(None) };
         if !(0.0..=10_000.0).contains(&self.delay) {
             return Err(input(format!("--delay {}: must be 0 to 10000 ms", self.delay)));
         }
-        let beside = recording.and_then(ProbeFile::beside);
-        let table = table(probe.or(beside.as_ref()))?
-            .ok_or_else(|| input("--motor needs --probe FILE, whose [motor] table says how far to turn"))?;
+        let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::beside)) else {
+            return Err(input("--motor needs --probe FILE, whose [motor] table says how far to turn"));
+        };
+        let probe = ProbeFile::read(&file).map_err(input)?;
+        let table = motor_of(&probe)?;
+        let widened = || fan.or(probe.fan_angle()).map(|fan| (WIDER * fan).min(table.largest_angle_deg));
+        let Some(angle) = self.angle.or_else(widened) else {
+            return Err(input(format!("--angle DEG is needed: {} has no fan", file.display())));
+        };
         let (settings, sweep) = (self.serial.settings(port), Sweep { angle, rate, volumes: None });
         // The sweep names the flags of `echolume probe sweep`.
         let speed = sweep.speed(&table, settings.round_trip());

@@ -57,7 +57,10 @@ pub fn fault(error: MotorError) -> Failure {
 /// The [motor] table of a probe file, where one is given.
 pub fn table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure> {
     let Some(file) = file else { return Ok(None) };
-    let probe = ProbeFile::read(file).map_err(input)?;
-    let table = probe.motor().cloned();
-    table.map(Some).ok_or_else(|| input(format!("{}: has no [motor] table", file.display())))
+    motor_of(&ProbeFile::read(file).map_err(input)?).map(Some)
+}
+
+/// The [motor] table, which must be there.
+pub fn motor_of(probe: &ProbeFile) -> Result<MotorTable, Failure> {
+    probe.motor().cloned().ok_or_else(|| input(format!("{}: has no [motor] table", probe.path().display())))
 }

@@ -20,7 +20,7 @@ const EVERY: Duration = Duration::from_secs(1);
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
                         echolume stream --source igtl://localhost:18944 --record exam.frames --null\n  \
                         echolume stream --source phantom --rate 5 --update rolling --null --for 10s\n  \
-                        echolume stream --motor /dev/ttyUSB0 --angle 64 --sweeps 1 --probe probe.toml --source - --out pictures"
+                        echolume stream --motor /dev/ttyUSB0 --sweeps 1 --probe probe.toml --source - --out pictures"
 )]
 pub struct Stream {
     #[command(flatten)]

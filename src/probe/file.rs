@@ -85,6 +85,13 @@ impl ProbeFile {
         self.tables.samples.range
     }
 
+    /// What the frames of a fan lie over, from the first to the last, degrees.
+    pub fn fan_angle(&self) -> Option<f64> {
+        let motion = &self.tables.motion;
+        let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
+        motion.fan_angle_deg.or(table)
+    }
+
     /// How the motor is driven, where the file says so.
     pub fn motor(&self) -> Option<&MotorTable> {
         self.tables.motor.as_ref()

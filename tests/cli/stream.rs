@@ -117,3 +117,41 @@ fn the_phantom_streams_until_it_is_told_to_end() {
     assert!(said.lines().filter(|l| l.contains(" s  frames ")).count() >= 1, "{said}");
     assert!(said.contains("what sound allows") && said.contains("latency ms p50"), "{said}");
 }
+
+/// As two terminals would: a simulated motor in one, and what it sweeps in the other, until SIGINT.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
+    use echolume::probe::motor::simulate::{Options, Simulator};
+    use echolume::probe::motor::tmcl::command;
+    use rustix::process::{Pid, Signal, kill_process};
+    use std::io::{BufRead, BufReader};
+
+    let folder = Folder::new("motor");
+    let tape = folder.path("exam.frames");
+    let simulator = Simulator::start(Options::default()).expect("a pseudo-terminal");
+    let probe = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/motor/probe.toml");
+    let mut child = Command::new(PROGRAM)
+        .args(["stream", "--null", "--probe", probe, "--sweeps", "1", "--timeout", "2000", "--record", &tape])
+        .args(SMALL)
+        .arg("--motor")
+        .arg(simulator.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("start the program");
+    let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
+    let shown = lines.find(|line| line.contains(" s  frames ") && !line.contains("volumes 0.00/s"));
+    assert!(shown.is_some(), "no volume was shown");
+    kill_process(Pid::from_child(&child), Signal::INT).expect("send a signal");
+    let last = lines.last().expect("a last line");
+    assert!(last.contains("volumes shown"), "{last}");
+    let output = child.wait_with_output().expect("the program ends");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let received = simulator.received();
+    let at = |wanted: u8| received.iter().rposition(|r| r.command == wanted);
+    assert!(at(command::STOP) > at(command::MOVE_TO), "the motor was told to stop last");
+    let said = done(&["info", &tape]);
+    assert!(said.contains("index") && said.contains("as it was written"), "{said}");
+}

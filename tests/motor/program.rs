@@ -199,7 +199,7 @@ fn wrong_input_is_refused_before_the_port_is_touched() {
         (&["probe", "simulate", "--fault", "fire"], "fire"),
         (&["probe", "status"], "--port"),
         (&["probe", "status", "--port", path, "--baud", "3"], "--baud"),
-        (&["stream", "--null", "--motor", path], "--angle"),
+        (&["stream", "--null", "--motor", path], "--sweeps"),
         (&["stream", "--null", "--homed"], "--motor"),
         (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1"], "[motor] table"),
         (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1", "--probe", plain], "[motor] table"),

@@ -25,7 +25,8 @@ use std::path::Path;
 const ARRAY_RADIUS: f64 = 40.0;
 const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
-const FAN_ANGLE_DEG: f64 = 61.0;
+/// From its first frame to the last.
+pub const FAN_ANGLE_DEG: f64 = 61.0;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
 /// m/s.
