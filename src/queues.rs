@@ -37,6 +37,8 @@ pub struct Queues {
 #[derive(Clone, Debug, Default)]
 struct Queue {
     tracker: Tracker,
+    /// A submission is being recorded.
+    recording: bool,
     /// What the submission that is being recorded touches.
     open: Vec<Access>,
     /// What its submissions touched last, with the value at which it is done, and what that submission had waited for.
@@ -81,10 +83,14 @@ impl Queues {
         me.tracker.before(accesses)
     }
 
-    /// What this queue recorded last was not submitted: its next operation waits for everything before it.
-    pub fn doubt(&mut self, queue: usize) {
-        self.each[queue].open.clear();
-        self.each[queue].tracker.doubt();
+    /// A submission of this queue is recorded from here on. If the one before was not submitted, the next operation waits for everything
+    /// before it.
+    pub fn begin(&mut self, queue: usize) {
+        let me = &mut self.each[queue];
+        if std::mem::replace(&mut me.recording, true) {
+            me.open.clear();
+            me.tracker.doubt();
+        }
     }
 
     /// What the submission that is being recorded on this queue has to wait for, and nothing that another of these waits implies.
@@ -106,6 +112,7 @@ impl Queues {
 
     /// The submission that was recorded on this queue is on its way, behind these waits, and done at this value of its timeline.
     pub fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
+        self.each[queue].recording = false;
         if self.count() == 1 {
             return;
         }
@@ -274,8 +281,9 @@ mod tests {
     fn what_was_not_submitted_is_not_waited_for() {
         let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
         let access = vec![Access::of_slot(Slot::Volume, 0, 0..1, true, Worker::Compute)];
+        queues.begin(1);
         queues.before(1, &access);
-        queues.doubt(1);
+        queues.begin(1);
         assert_eq!(submit(&mut queues, &mut values, 0, access).3, []);
     }
 }

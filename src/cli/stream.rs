@@ -3,9 +3,11 @@
 use super::arriving::Arriving;
 use super::look::Look;
 use super::{Failure, failed, input, say};
+use echolume::gpu::Context;
 use echolume::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
 use echolume::picture;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Time between two lines of statistics.
@@ -72,12 +74,12 @@ impl Stream {
             self.check_record(file)?;
         }
         let source = self.source.open()?;
-        let context = self.look.device(self.validate)?;
+        let mut context = self.look.device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let options = Options { update, images: self.images, queues: self.queues.map(usize::from) };
         let mut stream = Live::new(&context, feed, settings, options);
-        let done = self.go(&mut stream, update);
+        let done = self.go(&mut stream, update, &mut context);
         drop(stream);
         done?;
         match context.messages().first() {
@@ -86,19 +88,24 @@ impl Stream {
         }
     }
 
-    fn go(&self, stream: &mut Live, update: Update) -> Result<(), Failure> {
+    /// `context`: another one after its device was lost.
+    fn go(&self, stream: &mut Live, update: Update, context: &mut Arc<Context>) -> Result<(), Failure> {
         let began = Instant::now();
         let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
-        let mut pictures = 0;
+        let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
-                Err(StreamError::Gpu(lost)) if lost.is_device_lost() => {
+                // A device that is lost again before it drew anything is not the device's fault.
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && lost_at != Some(pictures) => {
                     tracing::warn!("{lost}; going on with the next volume on the device opened anew");
-                    stream.revive(&self.look.device(self.validate)?).map_err(fault)?;
+                    lost_at = Some(pictures);
+                    *context = self.look.device(self.validate)?;
+                    stream.revive(context).map_err(fault)?;
                     continue;
                 }
                 step => step.map_err(fault)?,
             };
+            let drew = matches!(step, Step::Picture(_));
             match step {
                 Step::Picture(shown) => {
                     self.keep(&shown, update, pictures)?;
@@ -118,8 +125,12 @@ impl Stream {
                     memory = resident();
                 }
             }
-            let volumes = stream.volumes_shown();
-            let enough = self.volumes.is_some_and(|n| volumes >= n);
+            // A volume counts when its picture begins; rolling when its last frame has come, which the picture after may show.
+            if self.volumes.is_some_and(|n| stream.volumes_shown() >= n) {
+                enough_at.get_or_insert(pictures);
+            }
+            let more = if update == Update::Whole { 0 } else { 1 };
+            let enough = drew && enough_at.is_some_and(|at| pictures > at + more);
             if enough || self.time.is_some_and(|t| began.elapsed() >= *t) {
                 break None;
             }
@@ -162,8 +173,11 @@ impl Stream {
             return refuse("must end in .frames");
         }
         let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-        match same(self.source.path()) {
-            true => refuse("would replace what is played"),
+        if same(self.source.path()) {
+            return refuse("would replace what is played");
+        }
+        match file.exists() {
+            true => refuse("is there already and is not written over; give another name"),
             false => picture::check_target(file).map_err(failed),
         }
     }

@@ -61,8 +61,6 @@ pub struct Recorder {
     label: &'static str,
     /// The queue that it is submitted to.
     queue: usize,
-    /// Begun and not submitted.
-    recording: bool,
 }
 
 impl Recorder {
@@ -93,7 +91,6 @@ impl Recorder {
             collected_to: 0,
             label,
             queue,
-            recording: false,
         };
         recorder.commands = commands.doing(|| "create commands".into())?[0];
         context.name(recorder.commands, label);
@@ -102,9 +99,7 @@ impl Recorder {
 
     /// Waits until the last submission is done, then starts anew.
     pub fn begin(&mut self, order: &mut Order, timelines: &Timelines) -> Result<(), GpuError> {
-        if std::mem::replace(&mut self.recording, true) {
-            order.queues.doubt(self.queue);
-        }
+        order.queues.begin(self.queue);
         self.wait(timelines)?;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the device is done with this pool's only command buffer.
@@ -174,7 +169,6 @@ impl Recorder {
         timeline.submitted += 1;
         timeline.doing = self.label.to_string();
         self.done_at = timeline.submitted;
-        self.recording = false;
         order.queues.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }

@@ -100,7 +100,14 @@ impl Feed {
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
         let (shared, can_wait) = (Arc::new(Shared::default()), source.can_wait());
         let theirs = shared.clone();
-        let tape = record.map(|path| Tape { path: path.into(), files: 0, writer: None, header: None, lines: None });
+        let tape = record.map(|path| Tape {
+            path: path.into(),
+            files: 0,
+            writer: None,
+            header: None,
+            lines: None,
+            failing: false,
+        });
         let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;
         Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
@@ -153,12 +160,21 @@ impl Drop for Feed {
 
 fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
     let can_wait = source.can_wait();
+    let _ended = Ended(shared);
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
         let at = Instant::now();
         if let Some(Err(fault)) = tape.as_mut().map(|tape| tape.write(&event, at)) {
-            tape = None;
-            shared.put(Arrived { event: Event::Fault(format!("the recording ends: {fault}")), at }, can_wait);
+            // Without a file nothing can be written; a frame that cannot be leaves the next one its chance, and is told of once.
+            let ends = matches!(event, Event::Begin(_));
+            let told = tape.as_mut().is_some_and(|tape| std::mem::replace(&mut tape.failing, true));
+            tape = tape.filter(|_| !ends);
+            if !told {
+                let what = if ends { "the recording ends" } else { "the recording lacks a frame" };
+                shared.put(Arrived { event: Event::Fault(format!("{what}: {fault}")), at }, can_wait);
+            }
+        } else if let Some(tape) = &mut tape {
+            tape.failing = false;
         }
         let ends = matches!(event, Event::End(_));
         if ends && let Some(Err(fault)) = tape.take().map(Tape::finish) {
@@ -176,6 +192,18 @@ fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
     }
 }
 
+/// Whatever becomes of the thread, its end is told.
+struct Ended<'a>(&'a Shared);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let event = Event::End(Some("the source broke down".into()));
+            self.0.put(Arrived { event, at: Instant::now() }, false);
+        }
+    }
+}
+
 /// The file that everything is written to.
 struct Tape {
     path: PathBuf,
@@ -184,6 +212,8 @@ struct Tape {
     header: Option<Header>,
     /// A frame whose lines are arriving.
     lines: Option<Frame>,
+    /// The last frame could not be written.
+    failing: bool,
 }
 
 impl Tape {
@@ -194,14 +224,8 @@ impl Tape {
         match event {
             Event::Begin(header) if self.header.as_ref() != Some(header) => {
                 self.finish_one()?;
-                self.files += 1;
-                let path = match self.files {
-                    1 => self.path.clone(),
-                    n => {
-                        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-                        self.path.with_file_name(format!("{stem}-{n}.frames"))
-                    }
-                };
+                self.lines = None;
+                let path = self.free_name();
                 self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
                 self.header = Some((**header).clone());
                 Ok(())
@@ -209,7 +233,7 @@ impl Tape {
             Event::Frame(frame) => self.frame(frame, seconds),
             Event::Lines { frame, first } => {
                 match &mut self.lines {
-                    Some(there) if *first > 0 && (there.volume, there.slice) == (frame.volume, frame.slice) => {
+                    Some(there) if follows(there, frame, *first, self.header.as_ref()) => {
                         there.bytes.extend(&frame.bytes);
                     }
                     lines => *lines = Some(frame.clone()),
@@ -224,6 +248,21 @@ impl Tape {
         }
     }
 
+    /// The name that was given, or with the next number that is free: an exam is never written over.
+    fn free_name(&mut self) -> PathBuf {
+        loop {
+            self.files += 1;
+            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+            let path = match self.files {
+                1 => return self.path.clone(),
+                n => self.path.with_file_name(format!("{stem}-{n}.frames")),
+            };
+            if !path.exists() {
+                return path;
+            }
+        }
+    }
+
     fn frame(&mut self, frame: &Frame, at: f64) -> Result<(), String> {
         self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, at)).map_err(|e| e.to_string())
     }
@@ -235,6 +274,12 @@ impl Tape {
     fn finish(mut self) -> Result<(), String> {
         self.finish_one()
     }
+}
+
+/// Whether lines from `first` on go on where those that are there end.
+fn follows(there: &Frame, frame: &Frame, first: usize, header: Option<&Header>) -> bool {
+    let line = header.map_or(0, |h| h.forward.frame_size()[0] * h.stored.bytes());
+    first > 0 && there.bytes.len() == first * line && (there.volume, there.slice) == (frame.volume, frame.slice)
 }
 
 #[cfg(test)]

@@ -57,17 +57,17 @@ impl Statistics {
     /// Since `before`, which these go on from. Latencies and passes are those since then already.
     pub fn since(&self, before: &Statistics) -> Statistics {
         let counts = |now: Counts, then: Counts| Counts {
-            shown: now.shown - then.shown,
-            dropped: now.dropped - then.dropped,
-            incomplete: now.incomplete - then.incomplete,
-            left_out: now.left_out - then.left_out,
+            shown: now.shown.saturating_sub(then.shown),
+            dropped: now.dropped.saturating_sub(then.dropped),
+            incomplete: now.incomplete.saturating_sub(then.incomplete),
+            left_out: now.left_out.saturating_sub(then.left_out),
         };
         Statistics {
             time: self.time.saturating_sub(before.time),
-            frames: self.frames - before.frames,
-            lost: self.lost - before.lost,
-            refused: self.refused - before.refused,
-            pictures: self.pictures - before.pictures,
+            frames: self.frames.saturating_sub(before.frames),
+            lost: self.lost.saturating_sub(before.lost),
+            refused: self.refused.saturating_sub(before.refused),
+            pictures: self.pictures.saturating_sub(before.pictures),
             volumes: counts(self.volumes, before.volumes),
             ..self.clone()
         }

@@ -2,10 +2,11 @@
 
 use super::feed::{Arrived, Feed};
 use super::statistics::Statistics;
-use super::turns::{Turns, Update};
+use super::turns::{Counts, Turns, Update};
 use super::views::Views;
 use crate::gpu::{self, Context, GpuError, Renderer};
 use crate::picture::Picture;
+use crate::plan::Rerun;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
 use crate::source::live::Event;
@@ -66,6 +67,12 @@ pub struct Stream {
     settings: Settings,
     options: Options,
     now: Option<Now>,
+    /// The geometry of now, also where nothing could be made for it.
+    header: Option<Header>,
+    /// A geometry that begins when what is on its way has been shown.
+    next: Option<Header>,
+    /// Of a geometry that nothing could be made after.
+    before: Option<Turns>,
     end: Option<Option<String>>,
     began: Instant,
     statistics: Statistics,
@@ -74,16 +81,17 @@ pub struct Stream {
 
 /// What follows from a geometry.
 struct Now {
-    header: Header,
     views: Views,
     renderer: Renderer,
     turns: Turns,
-    /// By volume image: when the frames arrived that no picture has shown yet.
-    arrived: Vec<Vec<Instant>>,
+    /// By volume image: the volume whose frames came last, and when those arrived that no picture has shown yet.
+    arrived: Vec<(u32, Vec<Instant>)>,
     /// The frames that the picture on its way shows for the first time, and its volume.
     drawing: Option<(u32, Vec<Instant>)>,
-    /// What is shown stands in another scene than it was drawn in.
+    /// The settings are others than the renderer's.
     changed: bool,
+    /// What is shown has to be drawn again.
+    redraw: bool,
     /// By slice, the way of what is shown.
     backward: Vec<bool>,
     /// The last volume that was shown.
@@ -101,6 +109,9 @@ impl Stream {
             settings,
             options,
             now: None,
+            header: None,
+            next: None,
+            before: None,
             end: None,
             began: Instant::now(),
             statistics: Statistics::default(),
@@ -114,10 +125,12 @@ impl Stream {
     /// A device that fails, and settings that cannot be drawn of a geometry that has begun.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
         let mut patience = patience;
+        // What is on its way is shown first, and nothing more is taken.
+        let over = self.end.is_some() || self.next.is_some();
         if let Some(now) = &mut self.now {
             if now.drawing.is_some() {
-                if !now.renderer.is_drawing()? {
-                    now.behind = if now.turns.is_rolling() { self.feed.waiting() } else { 0 };
+                if over || !now.renderer.is_drawing()? {
+                    now.behind = if now.turns.is_rolling() && !over { self.feed.waiting() } else { 0 };
                     return Ok(Step::Picture(now.finish(&mut self.statistics)?));
                 }
                 patience = patience.min(Duration::from_micros(200));
@@ -126,7 +139,7 @@ impl Stream {
                     std::thread::sleep(patience);
                     return Ok(Step::Went);
                 }
-            } else if now.behind > 0 {
+            } else if now.behind > 0 && !over {
                 now.behind -= 1;
                 if let Some(Arrived { event, at }) = self.feed.next(Duration::ZERO) {
                     return self.take(event, at);
@@ -136,13 +149,11 @@ impl Stream {
             } else if now.begin()? {
                 return Ok(Step::Went);
             }
-            if self.end.is_some() {
-                if now.drawing.is_some() {
-                    return Ok(Step::Picture(now.finish(&mut self.statistics)?));
-                }
-                return Ok(Step::End(self.end.clone().flatten()));
-            }
-        } else if let Some(end) = &self.end {
+        }
+        if let Some(header) = self.next.take() {
+            return self.make(header).map(|()| Step::Went);
+        }
+        if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
         }
         match self.feed.next(patience) {
@@ -153,9 +164,11 @@ impl Stream {
 
     fn take(&mut self, event: Event, at: Instant) -> Result<Step, StreamError> {
         match event {
-            Event::Begin(header) => self.begin(*header)?,
-            Event::Frame(frame) => return self.lines(&frame, 0, at),
-            Event::Lines { frame, first } => return self.lines(&frame, first, at),
+            Event::Begin(header) => {
+                self.next = Some(*header).filter(|h| self.now.is_none() || Some(h) != self.header.as_ref())
+            }
+            Event::Frame(frame) => return self.lines(&frame, None, at),
+            Event::Lines { frame, first } => return self.lines(&frame, Some(first), at),
             Event::Fault(fault) => return Ok(Step::Fault(fault)),
             Event::End(why) => {
                 self.now.iter_mut().for_each(|now| now.turns.end());
@@ -172,74 +185,81 @@ impl Stream {
     /// A device that cannot hold what the geometry needs.
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
-        match self.now.as_ref().map(|now| now.header.clone()) {
+        match self.header.clone() {
             Some(header) => self.make(header),
             None => Ok(()),
         }
     }
 
-    /// Another geometry, or the first.
-    fn begin(&mut self, header: Header) -> Result<(), StreamError> {
-        match self.now.as_ref().is_some_and(|now| now.header == header) {
-            true => Ok(()),
-            false => self.make(header),
-        }
-    }
-
     /// Makes everything for a geometry.
     fn make(&mut self, header: Header) -> Result<(), StreamError> {
+        self.header = Some(header.clone());
+        // Gone before the new one comes: both may not fit the device.
+        if let Some(Now { turns, .. }) = self.now.take() {
+            self.before = Some(turns);
+        }
         let views = Views::new(&header, &self.settings, self.options.update)?;
-        // Before the new one: both may not fit the device.
-        let before = self.now.take().map(|now| now.turns);
         let slices = views.first().slices() as usize;
         let mut turns = Turns::new(self.options.update, self.options.images, slices);
-        if let Some(before) = before {
-            turns.go_on_from(before);
-        }
         let options =
             gpu::Options { volume_images: turns.images(), queues: self.options.queues, ..gpu::Options::default() };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
+        if let Some(before) = self.before.take() {
+            turns.go_on_from(before);
+        }
         self.now = Some(Now {
-            arrived: vec![Vec::new(); turns.images() as usize],
+            arrived: vec![(0, Vec::new()); turns.images() as usize],
             backward: vec![false; slices],
-            header,
             views,
             renderer,
             turns,
             drawing: None,
             changed: false,
+            redraw: false,
             volume: None,
             behind: 0,
         });
         Ok(())
     }
 
-    fn lines(&mut self, frame: &Frame, first: usize, at: Instant) -> Result<Step, StreamError> {
-        self.statistics.frames += u64::from(first == 0);
+    /// A whole frame, or lines of one from `first` on.
+    fn lines(&mut self, frame: &Frame, first: Option<usize>, at: Instant) -> Result<Step, StreamError> {
+        self.statistics.frames += u64::from(first.unwrap_or(0) == 0);
         let feed = &self.feed;
         let Some(now) = &mut self.now else {
-            return Ok(Step::Fault("a frame came before anything was said about its geometry".into()));
+            return Ok(Step::Fault("a frame came of a geometry that was not told or cannot be drawn".into()));
         };
-        let slice = frame.slice as u32;
-        if frame.slice >= now.renderer.scene().slices() as usize {
-            self.statistics.refused += 1;
-            let error = GpuError::FrameSlice { slice, slices: now.renderer.scene().slices() };
-            return Ok(Step::Fault(error.to_string()));
-        }
-        let Some(image) = now.turns.place(frame.volume, || feed.is_behind(frame.volume)) else { return Ok(Step::Went) };
-        match now.renderer.lines(slice, first as u32, &frame.bytes, image) {
-            Ok(false) => {}
-            Ok(true) => {
-                now.arrived[image as usize].push(at);
+        let (slice, slices) = (frame.slice as u32, now.renderer.scene().slices());
+        let (got, expected) = (frame.bytes.len(), now.renderer.frame_bytes());
+        // Before its volume's number is believed.
+        let wrong = match first {
+            _ if frame.slice >= slices as usize => Some(GpuError::FrameSlice { slice, slices }),
+            None if got != expected => Some(GpuError::FrameSize { got, expected }),
+            _ => None,
+        };
+        let first = first.unwrap_or(0) as u32;
+        let went = match wrong {
+            Some(wrong) => Err(wrong),
+            None => match now.turns.place(frame.volume, || feed.is_behind(frame.volume)) {
+                Some(image) => {
+                    now.renderer.lines(slice, first, &frame.bytes, image).map(|whole| whole.then_some(image))
+                }
+                None => Ok(None),
+            },
+        };
+        match went {
+            Ok(Some(image)) => {
+                now.came(image, frame.volume, at);
                 now.turns.arrived(frame.slice, frame.backward);
+                Ok(Step::Went)
             }
-            Err(error @ (GpuError::FrameSize { .. } | GpuError::FrameLines { .. })) => {
+            Ok(None) => Ok(Step::Went),
+            Err(error @ (GpuError::FrameSize { .. } | GpuError::FrameLines { .. } | GpuError::FrameSlice { .. })) => {
                 self.statistics.refused += 1;
-                return Ok(Step::Fault(error.to_string()));
+                Ok(Step::Fault(error.to_string()))
             }
-            Err(error) => return Err(error.into()),
+            Err(error) => Err(error.into()),
         }
-        Ok(Step::Went)
     }
 
     /// Other settings: what is shown is drawn anew, and of what has to go through stage 1 again the frames that come from here on.
@@ -247,8 +267,8 @@ impl Stream {
     /// # Errors
     /// Settings that cannot be drawn: those before stay.
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
-        if let Some(now) = &mut self.now {
-            now.views = Views::new(&now.header, &settings, self.options.update)?;
+        if let (Some(now), Some(header)) = (&mut self.now, &self.header) {
+            now.views = Views::new(header, &settings, self.options.update)?;
             now.changed = true;
         }
         self.settings = settings;
@@ -259,10 +279,8 @@ impl Stream {
     pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
         self.statistics.time = self.began.elapsed();
         self.statistics.lost = self.feed.lost();
-        if let Some(now) = &mut self.now {
-            self.statistics.volumes = now.turns.counts();
-            self.statistics.passes = now.renderer.times_so_far();
-        }
+        self.statistics.passes = self.now.as_mut().map_or(Vec::new(), |now| now.renderer.times_so_far());
+        self.statistics.volumes = self.turns().map_or(Counts::default(), Turns::counts);
         Ok(self.statistics.clone())
     }
 
@@ -277,7 +295,11 @@ impl Stream {
 
     /// Volumes that were shown so far.
     pub fn volumes_shown(&self) -> u64 {
-        self.now.as_ref().map_or(0, |now| now.turns.counts().shown)
+        self.turns().map_or(0, |turns| turns.counts().shown)
+    }
+
+    fn turns(&self) -> Option<&Turns> {
+        self.now.as_ref().map(|now| &now.turns).or(self.before.as_ref())
     }
 
     /// The time that sound needs for a volume, s; none before the first frame and of what is not swept.
@@ -296,26 +318,53 @@ impl Stream {
 }
 
 impl Now {
+    /// A frame of this volume is in this image.
+    fn came(&mut self, image: u32, volume: u32, at: Instant) {
+        let (of, arrived) = &mut self.arrived[image as usize];
+        // Those of a volume that was never shown are of no use; rolling there is one that all of them go into.
+        if *of != volume && !self.turns.is_rolling() {
+            arrived.clear();
+        }
+        *of = volume;
+        arrived.push(at);
+    }
+
+    /// Takes the new settings. What they make of volumes that are there already is gone where frames have to come again, since slices of
+    /// both would be mixed; a rolling volume fills again by itself.
+    fn apply(&mut self) -> Result<(), GpuError> {
+        let scene = self.views.of(&self.backward);
+        let rerun = match self.renderer.is_other(&scene) {
+            true => self.renderer.change(scene.into_owned())?,
+            false => Rerun::Steps { steps: Vec::new(), slots: Vec::new() },
+        };
+        self.changed = false;
+        if !matches!(rerun, Rerun::Steps { .. }) && !self.turns.is_rolling() {
+            self.turns.forget();
+            self.arrived.iter_mut().for_each(|(_, arrived)| arrived.clear());
+            self.volume = None;
+        }
+        self.redraw = self.volume.is_some();
+        Ok(())
+    }
+
     /// Begins a picture if there is anything new to show.
     fn begin(&mut self) -> Result<bool, GpuError> {
-        let ready = self.turns.take();
-        if ready.is_none() && !(self.changed && self.volume.is_some()) {
-            return Ok(false);
+        if self.changed {
+            self.apply()?;
         }
-        if let Some(ready) = ready {
+        let mut arrived = Vec::new();
+        if let Some(ready) = self.turns.take() {
             self.renderer.show(ready.image)?;
-            self.backward = ready.backward;
-            self.volume = Some(ready.volume);
-            self.drawing = Some((ready.volume, std::mem::take(&mut self.arrived[ready.image as usize])));
-        } else {
-            self.drawing = self.volume.map(|volume| (volume, Vec::new()));
+            (self.backward, self.volume, self.redraw) = (ready.backward, Some(ready.volume), true);
+            arrived = std::mem::take(&mut self.arrived[ready.image as usize].1);
         }
-        self.changed = false;
+        let Some(volume) = self.volume.filter(|_| self.redraw) else { return Ok(false) };
         let scene = self.views.of(&self.backward);
         if self.renderer.is_other(&scene) {
             self.renderer.change(scene.into_owned())?;
         }
         self.renderer.begin_picture()?;
+        (self.drawing, self.redraw) = (Some((volume, arrived)), false);
         Ok(true)
     }
 

@@ -74,6 +74,13 @@ impl Turns {
         }
     }
 
+    /// What the images hold is gone: nothing of it will be shown.
+    pub fn forget(&mut self) {
+        self.end();
+        self.counts.dropped += u64::from(self.is_waiting());
+        (self.ready, self.shown) = (None, None);
+    }
+
     /// Whether a whole volume waits to be shown.
     pub fn is_waiting(&self) -> bool {
         self.update == Update::Whole && self.ready.is_some()
@@ -90,8 +97,7 @@ impl Turns {
 
     /// Counts go on from those before another geometry or device; a volume of then that was not shown will not be.
     pub fn go_on_from(&mut self, mut before: Turns) {
-        before.end();
-        before.counts.dropped += u64::from(before.is_waiting());
+        before.forget();
         (self.counts, self.over) = (before.counts, before.over);
     }
 

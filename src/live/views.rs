@@ -37,10 +37,12 @@ impl Views {
     /// Of a volume whose slices were swept so. Where slices that lie side by side would cross, the way of the most of them is taken.
     pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
         let back = backward.iter().filter(|b| **b).count();
-        let mixed = self.mixes.then(|| self.forward.geometry.mixed(&self.backward.geometry, backward)).flatten();
+        let most = 2 * back > backward.len();
+        let mix = |marked: &[bool]| self.forward.geometry.mixed(&self.backward.geometry, marked);
+        let mixed = self.mixes.then(|| mix(backward).or_else(|| mix(&vec![most; backward.len()]))).flatten();
         match mixed {
             Some(geometry) => Cow::Owned(Scene { geometry, ..self.forward.clone() }),
-            None if self.turns && 2 * back > backward.len() => Cow::Borrowed(&self.backward),
+            None if self.turns && most => Cow::Borrowed(&self.backward),
             None => Cow::Borrowed(&self.forward),
         }
     }

@@ -52,6 +52,9 @@ pub struct Paced {
     /// Times that the whole is played.
     rounds: u32,
     round: u32,
+    /// What the numbers of this round's volumes begin with, and the highest that was given.
+    base: u32,
+    highest: u32,
     begun: Option<(Instant, f64)>,
     header: Option<Header>,
     /// A frame that is due later.
@@ -62,7 +65,18 @@ pub struct Paced {
 impl Paced {
     /// `rounds`: how often to play it; volumes go on being numbered.
     pub fn new(source: Box<dyn Source>, pace: Pace, rounds: u32) -> Paced {
-        Paced { source, pace, rounds, round: 0, begun: None, header: None, waiting: None, frames: 0 }
+        Paced {
+            source,
+            pace,
+            rounds,
+            round: 0,
+            base: 0,
+            highest: 0,
+            begun: None,
+            header: None,
+            waiting: None,
+            frames: 0,
+        }
     }
 
     /// The next frame and when it is due, on from the first.
@@ -76,6 +90,7 @@ impl Paced {
                 }
                 // Stamps begin again.
                 self.begun = None;
+                self.base = self.highest.wrapping_add(1);
                 self.source.skip_to_volume(0).map_err(|e| e.to_string())?;
                 match self.source.next_frame().map_err(|e| e.to_string())? {
                     Some(frame) => frame,
@@ -83,7 +98,8 @@ impl Paced {
                 }
             }
         };
-        frame.volume = frame.volume.wrapping_add(self.round.wrapping_mul(self.source.volumes() as u32));
+        frame.volume = frame.volume.wrapping_add(self.base);
+        self.highest = frame.volume;
         let stamp = match self.pace {
             Pace::Fast => 0.0,
             Pace::Volumes(rate) => self.frames as f64 / (rate * self.source.frames_per_volume().max(1) as f64),
@@ -103,7 +119,7 @@ const LONGEST_WAIT: f64 = 864_000.0;
 impl Live for Paced {
     fn next(&mut self, patience: Duration) -> Event {
         if self.header.is_none() {
-            let header = header_of(&*self.source);
+            let header = self.source.header();
             self.header = Some(header.clone());
             return Event::Begin(Box::new(header));
         }
@@ -131,7 +147,7 @@ impl Live for Paced {
 }
 
 /// What the frames of a source have in common. A source that is swept one way only says the same for both.
-pub fn header_of(source: &dyn Source) -> Header {
+pub fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
     let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };

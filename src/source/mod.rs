@@ -119,6 +119,10 @@ pub trait Source: Send {
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
     /// None after the last.
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
+    /// What all frames have in common, either way.
+    fn header(&self) -> recorder::Header {
+        live::header_of(self)
+    }
     /// When the frame that was given last arrived, s on the recorder's clock, where that was recorded.
     fn arrival(&self) -> Option<f64> {
         None

@@ -54,6 +54,9 @@ impl Renderer {
                 self.stale.iter_mut().for_each(|stale| *stale = true);
                 self.forget_volumes();
                 if *rerun == Rerun::Everything {
+                    // Their bytes lie in lanes that go.
+                    self.torn += u64::from(self.arriving.take().is_some());
+                    self.slab = None;
                     self.slots.clear();
                     self.lanes = self.new_lanes()?;
                     self.next_lane = 0;

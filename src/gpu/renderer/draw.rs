@@ -45,13 +45,14 @@ impl Renderer {
 
     /// Waits for the picture that is on its way.
     pub(super) fn drawn(&mut self) -> Result<(), GpuError> {
-        if !std::mem::take(&mut self.drawing) {
+        if !self.drawing {
             return Ok(());
         }
         let (picture, timelines) = (&self.picture, &self.timelines);
         let done = self.measured.host("wait", || picture.wait(timelines));
-        if done.is_err() {
-            self.stale.iter_mut().for_each(|stale| *stale = true);
+        match done.is_ok() {
+            true => self.drawing = false,
+            false => self.stale.iter_mut().for_each(|stale| *stale = true),
         }
         done
     }

@@ -10,6 +10,13 @@ pub struct Arriving {
     there: usize,
 }
 
+impl Arriving {
+    /// Its slice, its volume image, and the bytes of it that are there.
+    pub(super) fn place(&self) -> (u32, u32, usize) {
+        (self.slice, self.image, self.there)
+    }
+}
+
 impl Lane {
     /// The first recorder of the two: what the staging buffer is read by.
     fn first(&mut self) -> &mut Recorder {
@@ -75,12 +82,14 @@ impl Renderer {
         let (whole, line) = (self.frame_bytes(), self.frame_bytes() / self.scene.frame_size()[1] as usize);
         let at = first as usize * line;
         let follows = self.arriving.as_ref().is_some_and(|a| (a.slice, a.image, a.there) == (slice, image, at));
-        if !bytes.len().is_multiple_of(line) || at + bytes.len() > whole || !(first == 0 || follows) {
+        // Of what is not seen nothing is kept, so nothing is there to follow.
+        let seen = self.scene.frames_seen().contains(&slice);
+        if !bytes.len().is_multiple_of(line) || at + bytes.len() > whole || !(first == 0 || follows || !seen) {
             let there = self.arriving.as_ref().map_or(0, |a| a.there / line) as u32;
             return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), there });
         }
         self.filtered = self.scene.seen;
-        if !self.scene.frames_seen().contains(&slice) {
+        if !seen {
             self.skipped += u64::from(first == 0);
             return Ok(at + bytes.len() == whole);
         }

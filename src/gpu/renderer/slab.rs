@@ -27,6 +27,8 @@ impl Renderer {
         let follows = |s: &Slab| s.image == image && s.first + s.count == slice;
         if self.slab.as_ref().is_some_and(|slab| !follows(slab)) {
             self.flush()?;
+            // What is left of it is a frame that was given up.
+            self.slab = None;
         }
         if self.slab.is_none() {
             self.free_lane()?;
@@ -46,15 +48,22 @@ impl Renderer {
         }
     }
 
-    /// Sends off the slices that wait. The lines of one that is not whole are given up.
+    /// Sends off the slices that wait. The lines of one that is not whole go on waiting, in the next lane.
     pub(super) fn flush(&mut self) -> Result<(), GpuError> {
-        let Some(Slab { image, first, count }) = self.slab.take() else { return Ok(()) };
-        self.torn += u64::from(self.arriving.take().is_some());
-        let (Some(slot), true) = (chain::copied(&self.scene), count > 0) else { return Ok(()) };
-        let lane = &mut self.lanes[self.next_lane];
-        self.next_lane = (self.next_lane + 1) % FRAMES_IN_FLIGHT as usize;
+        let Some(slot) = chain::copied(&self.scene) else { return Ok(()) };
+        let Some(Slab { image, first, count }) = self.slab.take_if(|slab| slab.count > 0) else { return Ok(()) };
+        let from = self.next_lane;
+        self.next_lane = (from + 1) % FRAMES_IN_FLIGHT as usize;
         let place = Place { slot, copy: image, parts: first..first + count };
-        lane.send(&mut self.order, &mut self.timelines, &self.slots, place, &mut self.measured)
+        let lane = &mut self.lanes[from];
+        lane.send(&mut self.order, &mut self.timelines, &self.slots, place, &mut self.measured)?;
+        let Some((slice, image, there)) = self.arriving.as_ref().map(frames::Arriving::place) else { return Ok(()) };
+        self.free_lane()?;
+        let at = count as usize * frame_bytes(&self.scene) as usize;
+        let lines = self.lanes[from].staging.bytes()[at..at + there].to_vec();
+        self.lanes[self.next_lane].staging.bytes_mut()[..there].copy_from_slice(&lines);
+        self.slab = Some(Slab { image, first: slice, count: 0 });
+        Ok(())
     }
 }
 

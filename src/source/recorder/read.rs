@@ -259,6 +259,10 @@ impl Source for Replay {
         Ok(None)
     }
 
+    fn header(&self) -> Header {
+        self.header.clone()
+    }
+
     fn arrival(&self) -> Option<f64> {
         Some(self.arrived)
     }
