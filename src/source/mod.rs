@@ -1,6 +1,6 @@
-//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded. Every reader is total:
-//! any bytes give frames or an [`InputError`], never a panic, and no more memory is taken than the file's own bytes account
-//! for, or a live source says.
+//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded; frames without a place
+//! of their own get one from the motor. Every reader is total: any bytes give frames or an [`InputError`], never a panic, and no more
+//! memory is taken than the file's own bytes account for, or a live source says.
 
 mod contents;
 pub mod convert;

@@ -152,6 +152,22 @@ fn what_was_not_seen_has_no_angle() {
 }
 
 #[test]
+fn a_track_that_grows_forgets_the_oldest_and_refuses_what_is_not_later() {
+    let at = |time: f64| Position { time, angle: cosine(time), direction: Direction::Forward, pass: 0 };
+    let mut track = Track::new(vec![], 0.1).expect("empty");
+    for i in 0..1000 {
+        assert!(track.push(at(f64::from(i) * 1e-3)));
+        track.forget_all_but(100);
+        assert!(track.positions().len() <= 200 && track.positions().len() > i.min(99) as usize);
+    }
+    for wrong in [0.999, 0.5, f64::NAN, f64::INFINITY] {
+        assert!(!track.push(at(wrong)), "{wrong}");
+    }
+    assert!(matches!(track.at(0.95), Place::Turning { .. } | Place::Pass { .. }));
+    assert_eq!(track.at(0.5), Place::Outside, "long forgotten");
+}
+
+#[test]
 fn faults_are_asked_for_by_name_and_time() {
     assert!("stall@0.5".parse::<Injected>().is_ok_and(|i| i.after == Some(Duration::from_millis(500))));
     assert!("mute".parse::<Injected>().is_ok_and(|i| i.after.is_none()));

@@ -16,6 +16,7 @@ const LONGEST_GAP: f64 = 0.1;
 /// A motor that sweeps until it is dropped, or fails. Dropping it stops the motor and waits for that: one request and its reply, or
 /// where the module no longer answers as long as stopping is tried.
 pub struct Turning {
+    port: String,
     watch: Watch,
     speed: f64,
     angle: f64,
@@ -58,9 +59,9 @@ impl Turning {
         let thread = std::thread::Builder::new().name("motor".into()).spawn(move || theirs.turn(drive, &sweep, homed));
         let thread = thread.map_err(|e| {
             let fault = Fault::OutOfRange(format!("a thread for the motor cannot be started: {e}"));
-            MotorError { port, doing: "sweep", fault, stopped: Stopped::NotMoved }
+            MotorError { port: port.clone(), doing: "sweep", fault, stopped: Stopped::NotMoved }
         })?;
-        Ok(Turning { watch, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
+        Ok(Turning { port, watch, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
     }
 
     pub fn watch(&self) -> &Watch {
@@ -88,9 +89,11 @@ impl Turning {
     /// How the motor ended, unless it was by this: a fault before, a signal, or that it could not be stopped.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         self.interrupter.interrupt();
-        if let Some(thread) = self.thread.take() {
-            // What a panic leaves behind was stopped when the drive was dropped.
-            let _ = thread.join();
+        if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
+            // The drive has stopped the motor when it was dropped, or has said that it could not.
+            let stopped = Stopped::Unconfirmed("see the messages before this one".into());
+            let fault = Fault::Interrupted("a panic on its own thread");
+            return Err(MotorError { port: self.port.clone(), doing: "sweep", fault, stopped });
         }
         match self.watch.ended() {
             Some(MotorError { fault: Fault::Interrupted(_), stopped: Stopped::Confirmed, .. }) | None => Ok(()),

@@ -94,8 +94,11 @@ fn written(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Where inputs that must be files lie.
+/// Where inputs that must be files lie: FUZZ_FOLDER, or a folder of this process in memory where the system has one.
 pub fn folder() -> PathBuf {
+    if let Some(folder) = std::env::var_os("FUZZ_FOLDER") {
+        return folder.into();
+    }
     let memory = Path::new("/dev/shm");
     let under = if memory.is_dir() { memory.to_path_buf() } else { std::env::temp_dir() };
     under.join(format!("echolume-fuzz-{}", std::process::id()))
