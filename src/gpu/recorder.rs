@@ -1,19 +1,20 @@
 //! One command buffer: operations with the barriers they need, labels, time stamps, and their parameters.
 
+mod bind;
+
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Pipeline, descriptor_type};
+use super::pipelines::Pipeline;
 use super::resources::{Buffer, Image, Purpose, WHOLE};
-use super::slots::{Resource, Slots};
+use super::slots::Slots;
 use super::timeline::Timelines;
 use super::timing::Stamps;
 use crate::barriers::{self, Access, Worker};
-use crate::passes::{Part, Pass, Slot, Turn, contract};
+use crate::passes::{Pass, Slot, Turn, contract};
 use crate::scene::Scene;
-use crate::spirv::Kind;
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
@@ -30,13 +31,6 @@ pub struct Work<'a> {
     pub scene: &'a Scene,
     pub pass: &'static Pass,
     pub turn: &'a Turn,
-}
-
-/// Where a binding's entry is while a dispatch is bound.
-enum Listed {
-    Image(usize),
-    Buffer(usize),
-    Texels(usize),
 }
 
 /// Parts of a slot: layers of an array, slices of a 3D image; of one of the images that take turns.
@@ -257,78 +251,6 @@ impl Recorder {
         self.params.bytes_mut()[offset as usize..end as usize].copy_from_slice(block);
         self.params_used = end;
         Ok(offset)
-    }
-
-    fn bind(&self, work: &Work, params_offset: u64, params_size: u64) {
-        let Work { slots, pipeline, scene, pass, turn } = *work;
-        let binds = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
-        let mut images = Vec::with_capacity(binds.len());
-        let mut buffers = Vec::with_capacity(binds.len());
-        let mut texels = Vec::with_capacity(binds.len());
-        // Which of the three lists a binding's entry went to, and where.
-        let mut places = Vec::with_capacity(binds.len());
-        for binding in &pipeline.module.bindings {
-            let bound = binds.iter().find(|b| b.name == binding.name);
-            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, turn.image)))) {
-                (Kind::Params, _) => {
-                    places.push((binding, Listed::Buffer(buffers.len())));
-                    buffers.push([vk::DescriptorBufferInfo {
-                        buffer: self.params.handle,
-                        offset: params_offset,
-                        range: params_size,
-                    }]);
-                }
-                (Kind::Texels(components), Some((_, Resource::Buffer(buffer)))) => {
-                    places.push((binding, Listed::Texels(texels.len())));
-                    texels.push([buffer.texels(components)]);
-                }
-                (_, Some((_, Resource::Buffer(buffer)))) => {
-                    places.push((binding, Listed::Buffer(buffers.len())));
-                    buffers.push([vk::DescriptorBufferInfo {
-                        buffer: buffer.handle,
-                        offset: 0,
-                        range: vk::WHOLE_SIZE,
-                    }]);
-                }
-                (_, Some((bind, Resource::Image(image)))) => {
-                    let view = match bind.part {
-                        Part::Layer => image.layers[turn.layer as usize],
-                        _ => image.view,
-                    };
-                    places.push((binding, Listed::Image(images.len())));
-                    images.push([vk::DescriptorImageInfo {
-                        sampler: vk::Sampler::null(),
-                        image_view: view,
-                        image_layout: vk::ImageLayout::GENERAL,
-                    }]);
-                }
-                // The contract of pass and shader was checked when the pipeline was made.
-                (_, None) => {}
-            }
-        }
-        let writes: Vec<_> = places
-            .iter()
-            .map(|(binding, listed)| {
-                let write = vk::WriteDescriptorSet::default()
-                    .dst_binding(binding.binding)
-                    .descriptor_type(descriptor_type(binding.kind));
-                match *listed {
-                    Listed::Image(at) => write.image_info(&images[at]),
-                    Listed::Buffer(at) => write.buffer_info(&buffers[at]),
-                    Listed::Texels(at) => write.texel_buffer_view(&texels[at]),
-                }
-            })
-            .collect();
-        // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait.
-        unsafe {
-            self.context.push_descriptor.cmd_push_descriptor_set(
-                self.commands,
-                vk::PipelineBindPoint::COMPUTE,
-                pipeline.layout,
-                0,
-                &writes,
-            );
-        }
     }
 
     /// Bytes of a staging buffer into parts of an image: layers of an array, slices of a 3D image.

@@ -1,12 +1,11 @@
 //! A live source on a thread of its own, and what has arrived and not been taken yet: bounded, whole frames or lines in order. Where it
 //! overflows a source that can wait is kept waiting, and one that cannot loses frames, which are counted.
 
-use crate::source::Frame;
+use super::tape::Tape;
 use crate::source::live::{Event, Live};
-use crate::source::recorder::{Header, Writer};
 use std::collections::VecDeque;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
@@ -100,14 +99,7 @@ impl Feed {
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
         let (shared, can_wait) = (Arc::new(Shared::default()), source.can_wait());
         let theirs = shared.clone();
-        let tape = record.map(|path| Tape {
-            path: path.into(),
-            files: 0,
-            writer: None,
-            header: None,
-            lines: None,
-            failing: false,
-        });
+        let tape = record.map(Tape::new);
         let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;
         Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
@@ -204,87 +196,10 @@ impl Drop for Ended<'_> {
     }
 }
 
-/// The file that everything is written to.
-struct Tape {
-    path: PathBuf,
-    files: u32,
-    writer: Option<Writer>,
-    header: Option<Header>,
-    /// A frame whose lines are arriving.
-    lines: Option<Frame>,
-    /// The last frame could not be written.
-    failing: bool,
-}
-
-impl Tape {
-    fn write(&mut self, event: &Event, at: Instant) -> Result<(), String> {
-        // Of a recording only the differences count: any clock that runs evenly does.
-        static BEGAN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-        let seconds = at.saturating_duration_since(*BEGAN.get_or_init(|| at)).as_secs_f64();
-        match event {
-            Event::Begin(header) if self.header.as_ref() != Some(header) => {
-                self.finish_one()?;
-                self.lines = None;
-                let path = self.free_name();
-                self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
-                self.header = Some((**header).clone());
-                Ok(())
-            }
-            Event::Frame(frame) => self.frame(frame, seconds),
-            Event::Lines { frame, first } => {
-                match &mut self.lines {
-                    Some(there) if follows(there, frame, *first, self.header.as_ref()) => {
-                        there.bytes.extend(&frame.bytes);
-                    }
-                    lines => *lines = Some(frame.clone()),
-                }
-                let whole = self.header.as_ref().and_then(Header::frame_bytes);
-                match self.lines.take_if(|l| Some(l.bytes.len() as u64) == whole) {
-                    Some(frame) => self.frame(&frame, seconds),
-                    None => Ok(()),
-                }
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// The name that was given, or with the next number that is free: an exam is never written over.
-    fn free_name(&mut self) -> PathBuf {
-        loop {
-            self.files += 1;
-            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-            let path = match self.files {
-                1 => return self.path.clone(),
-                n => self.path.with_file_name(format!("{stem}-{n}.frames")),
-            };
-            if !path.exists() {
-                return path;
-            }
-        }
-    }
-
-    fn frame(&mut self, frame: &Frame, at: f64) -> Result<(), String> {
-        self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, at)).map_err(|e| e.to_string())
-    }
-
-    fn finish_one(&mut self) -> Result<(), String> {
-        self.writer.take().map_or(Ok(()), Writer::finish).map_err(|e| e.to_string())
-    }
-
-    fn finish(mut self) -> Result<(), String> {
-        self.finish_one()
-    }
-}
-
-/// Whether lines from `first` on go on where those that are there end.
-fn follows(there: &Frame, frame: &Frame, first: usize, header: Option<&Header>) -> bool {
-    let line = header.map_or(0, |h| h.forward.frame_size()[0] * h.stored.bytes());
-    first > 0 && there.bytes.len() == first * line && (there.volume, there.slice) == (frame.volume, frame.slice)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::Frame;
 
     /// Frames of two volumes of three, as fast as they are asked for.
     struct Quick {

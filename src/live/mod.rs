@@ -4,8 +4,10 @@
 //! a geometry's first frame has been taken.
 
 pub mod feed;
+mod now;
 pub mod statistics;
 mod stream;
+mod tape;
 pub mod turns;
 pub mod views;
 

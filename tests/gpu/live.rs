@@ -39,7 +39,7 @@ impl Drop for Playing {
 }
 
 /// A source that says what it was told to, one thing after such a pause, and can wait or not.
-struct Told(VecDeque<Event>, Duration, bool);
+pub struct Told(pub VecDeque<Event>, pub Duration, pub bool);
 
 impl Live for Told {
     fn next(&mut self, _: Duration) -> Event {
@@ -58,7 +58,7 @@ fn moving(share: f64) -> Probe {
     Probe { advance: Advance::Same(share * probe.slices.pitch()), ..probe }
 }
 
-fn header(share: f64) -> Header {
+pub fn header(share: f64) -> Header {
     Header {
         forward: Geometry::Sweep(moving(share)),
         backward: Geometry::Sweep(moving(-share)),
@@ -67,7 +67,7 @@ fn header(share: f64) -> Header {
     }
 }
 
-fn settings(toml: &str) -> Settings {
+pub fn settings(toml: &str) -> Settings {
     let small = "picture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8'";
     toml::from_str(&match toml.split_once("slices.") {
         Some((before, after)) => format!("{before}\n{small}, {after} }}"),
@@ -77,7 +77,7 @@ fn settings(toml: &str) -> Settings {
 }
 
 /// A volume of a sweep, its frames in order of acquisition: every second one backwards, each sample from its place.
-fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
+pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
     let (slices, bytes) = (9, 24 * 64);
     let frame = |n: u32| {
         let backward = number % 2 == 1;
@@ -89,17 +89,17 @@ fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
 }
 
 /// Each slice carries the number of its sweep.
-fn stamped(number: u32) -> Vec<Frame> {
+pub fn stamped(number: u32) -> Vec<Frame> {
     volume(number, |_, _| 10 * number as u8 + 5)
 }
 
-fn speckled(number: u32) -> Vec<Frame> {
+pub fn speckled(number: u32) -> Vec<Frame> {
     let hash = |slice: usize, i: usize| (slice * 7919 + i * 104_729 + number as usize * 31) as u32;
     volume(number, |slice, i| (hash(slice, i).wrapping_mul(2_654_435_761) >> 24) as u8)
 }
 
 /// Drives a stream to its end; `each` looks at it after each picture.
-fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> Vec<String> {
+pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> Vec<String> {
     let (mut faults, begun) = (Vec::new(), Instant::now());
     loop {
         assert!(begun.elapsed() < Duration::from_secs(300), "the stream does not end");
@@ -113,22 +113,22 @@ fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> V
     }
 }
 
-fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
+pub fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
     // Where each frame is shown there is time for a picture between some of them.
     let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
     stream_of(device, Told(events.into(), pause, true), settings, options)
 }
 
-fn stream_of(device: &Device, source: Told, settings: Settings, options: live::Options) -> Stream {
+pub fn stream_of(device: &Device, source: Told, settings: Settings, options: live::Options) -> Stream {
     let feed = Feed::new(Box::new(source), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
 
-fn events(header: Header, frames: impl IntoIterator<Item = Frame>) -> Vec<Event> {
+pub fn events(header: Header, frames: impl IntoIterator<Item = Frame>) -> Vec<Event> {
     std::iter::once(Event::Begin(Box::new(header))).chain(frames.into_iter().map(Event::Frame)).collect()
 }
 
-fn volume_of(renderer: &mut Renderer) -> Texels {
+pub fn volume_of(renderer: &mut Renderer) -> Texels {
     renderer.read(Slot::Volume).expect("read").expect("there")
 }
 
@@ -282,181 +282,4 @@ fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
         let made: Vec<_> = done.iter().filter(|(name, _)| *name == "tile_ranges").map(|(_, n)| n[2]).collect();
         assert_eq!(made, [7], "{done:?}");
     }
-}
-
-/// Prevents a stream that stops, or shows anything wrong, for what a source does wrong.
-#[test]
-fn what_is_wrong_is_said_and_left_out() {
-    let device = Device::new();
-    let mut events = events(header(0.0), stamped(1));
-    events.insert(0, Event::Frame(stamped(0).remove(0)));
-    let of = |change: &dyn Fn(&mut Frame)| {
-        let mut frame = stamped(2).remove(0);
-        change(&mut frame);
-        Event::Frame(frame)
-    };
-    events.push(of(&|f| f.bytes.truncate(1000)));
-    events.push(of(&|f| f.bytes.extend([0; 64])));
-    events.push(of(&|f| f.bytes.truncate(64 * 20)));
-    // A number that is not to be believed: frames of volume 3 come after it.
-    events.push(of(&|f| (f.volume, f.bytes) = (1 << 31, vec![0; 7])));
-    events.push(of(&|f| f.slice = 9));
-    events.push(of(&|f| f.slice = usize::MAX));
-    events.push(Event::Lines { frame: stamped(2).remove(3), first: 7 });
-    events.push(Event::Fault("the peer went away".into()));
-    events.push(Event::Begin(Box::new(header(0.3))));
-    events.extend(stamped(3).into_iter().map(Event::Frame));
-    // Another geometry, with frames of another size.
-    let other = Geometry::Sweep(linear());
-    events.push(Event::Begin(Box::new(Header { forward: other.clone(), backward: other, ..header(0.0) })));
-    let frame =
-        |n| Frame { volume: 4, number: n, slice: n as usize, backward: false, time: None, bytes: vec![45; 48 * 20] };
-    events.extend((0..7).map(|n| Event::Frame(frame(n))));
-    let mut stream = stream(&device, events, settings("mode = 'mip'"), live::Options::default());
-    let mut shown = Vec::new();
-    let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
-    assert_eq!(shown.last(), Some(&4), "{shown:?}: {faults:?}");
-    let expected = [
-        "not told",
-        "1000 bytes",
-        "1600 bytes",
-        "1280 bytes",
-        "7 bytes",
-        "slice 9",
-        "slice",
-        "from line 7",
-        "the peer went away",
-    ];
-    assert_eq!(faults.len(), expected.len(), "{faults:?}");
-    for (fault, part) in faults.iter().zip(expected) {
-        assert!(fault.contains(part), "{part}: {fault}");
-    }
-}
-
-/// Prevents settings that reach pictures only with the next volume, or take the stream down.
-#[test]
-fn other_settings_are_drawn_of_the_volume_that_is_there() {
-    let device = Device::new();
-    let mut stream =
-        stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::Options::default());
-    let mut first = None;
-    while first.is_none() {
-        if let Step::Picture(shown) = stream.step(Duration::from_millis(20)).expect("step") {
-            first = Some(shown.picture);
-        }
-    }
-    assert!(stream.change(settings("mode = 'mip'\ncamera = { zoom = -1 }")).is_err());
-    stream.change(settings("mode = 'mip'\ncamera = { azimuth = 40 }")).expect("change");
-    let mut second = None;
-    run(&mut stream, |_, shown| second = Some((shown.volume, shown.picture)));
-    let (volume, second) = second.expect("drawn again");
-    assert!(volume == 0 && Some(&second) != first.as_ref());
-}
-
-/// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
-#[test]
-fn a_lost_device_costs_a_volume_and_not_the_stream() {
-    use echolume::gpu::faults::Seam;
-    let (device, other) = (Device::new(), Device::new());
-    let options = live::Options::default();
-    let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
-    let (mut shown, mut lost) = (Vec::new(), 0);
-    loop {
-        match stream.step(Duration::from_millis(20)) {
-            Ok(Step::Picture(picture)) => {
-                shown.push(picture.volume);
-                if shown.len() == 2 {
-                    device.faults.inject(Seam::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
-                }
-            }
-            Ok(Step::End(why)) => break assert_eq!(why, None),
-            Ok(_) => {}
-            Err(live::StreamError::Gpu(error)) if error.is_device_lost() => {
-                lost += 1;
-                stream.revive(&other).expect("made anew");
-            }
-            Err(error) => panic!("{error}"),
-        }
-    }
-    assert!(lost == 1 && shown.first() == Some(&0) && shown.last() == Some(&5), "{lost} lost, {shown:?}");
-    let counts = stream.statistics().expect("statistics").volumes;
-    assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
-    assert!(counts.incomplete >= 1, "{counts:?}");
-}
-
-/// Prevents volumes that are never whole where some slices are not seen and frames come line by line.
-#[test]
-fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
-    let device = Device::new();
-    let toml = "mode = 'mip'\nregion = { elevation = [-1, 1], depth = [30, 50] }";
-    let lines = |frame: Frame| {
-        let chunks: Vec<_> = frame.bytes.chunks(64 * 5).map(<[u8]>::to_vec).collect();
-        let part = move |(n, bytes)| Event::Lines { frame: Frame { bytes, ..frame.clone() }, first: 5 * n };
-        chunks.into_iter().enumerate().map(part).collect::<Vec<_>>()
-    };
-    let mut events = events(header(0.3), []);
-    events.extend((0..3).flat_map(stamped).flat_map(lines));
-    let mut stream = stream(&device, events, settings(toml), live::Options::default());
-    let mut shown = Vec::new();
-    let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
-    assert_eq!((faults, shown), (vec![], vec![0, 1, 2]));
-    assert!(stream.renderer().expect("begun").skipped() > 0, "all slices are seen");
-}
-
-/// Prevents slices that went through stage 1 as it was before from being shown beside those after, as one whole volume.
-#[test]
-fn settings_that_need_frames_again_show_whole_volumes_only() {
-    let device = Device::new();
-    for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
-        let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));
-        let source = Told(events(header(0.0), (0..8).flat_map(speckled)).into(), Duration::from_millis(2), false);
-        let mut stream = stream_of(&device, source, before, live::Options::default());
-        let (mut pictures, mut frames, mut checked) = (0, 0, 0);
-        while pictures < 20 {
-            match stream.step(Duration::from_millis(20)).expect("step") {
-                Step::Picture(shown) => {
-                    pictures += 1;
-                    let scene = stream.scene().expect("begun").clone();
-                    if scene.settings != after {
-                        continue;
-                    }
-                    checked += 1;
-                    let mut plain = Renderer::new(&device, scene, &Options::default()).expect("renderer");
-                    let whole = speckled(shown.volume);
-                    whole.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
-                    plain.show(0).expect("show");
-                    assert!(shown.picture == plain.picture().expect("picture"), "{toml}: volume {}", shown.volume);
-                }
-                Step::End(_) => break,
-                _ => frames += 1,
-            }
-            // In the middle of the first volume, and of one behind a picture.
-            if (pictures, frames) == (0, 5) && at == 0 || pictures == 1 && at == 1 && checked == 0 {
-                stream.change(after.clone()).expect("change");
-            }
-        }
-        assert!(checked > 0, "{toml}: {pictures} pictures, none after the change");
-    }
-}
-
-/// Prevents a frame that arrives line by line from being torn by a picture, where slices are copied many at once.
-#[test]
-fn lines_that_wait_in_a_slab_outlive_a_picture() {
-    let device = Device::new();
-    let scene =
-        scene(cartesian([16, 12, 6]), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }\nslices.format = 'r8'");
-    let frame = |k: usize| -> Vec<u8> { (0..16 * 12).map(|i| (i * 7 + k * 31) as u8).collect() };
-    let mut renderer = Renderer::new(&device, scene, &Options::default()).expect("renderer");
-    for k in 0..6u32 {
-        let bytes = frame(k as usize);
-        renderer.lines(k, 0, &bytes[..16 * 5], 0).expect("lines");
-        renderer.show(0).expect("show");
-        renderer.picture().expect("picture");
-        assert!(renderer.lines(k, 5, &bytes[16 * 5..], 0).expect("lines"));
-    }
-    renderer.show(0).expect("show");
-    let volume = volume_of(&mut renderer);
-    let expected: Vec<f64> = (0..6).flat_map(frame).map(|v| f64::from(v) / 255.0).collect();
-    let off = volume.values.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(off < 1e-6 && renderer.torn() == 0, "{off}");
 }

@@ -17,6 +17,7 @@ mod known_answers;
 mod leaping;
 mod led_astray;
 mod live;
+mod live_amiss;
 mod modes;
 mod motion;
 mod passes;
