@@ -150,6 +150,9 @@ impl Stream {
                 _ => String::new(),
             }
         );
+        if let (Some(file), lacks @ 1..) = (&self.record, stream.unrecorded()) {
+            return Err(failed(format!("--record {}: {lacks} frames could not be written", file.display())));
+        }
         match end {
             None => Ok(()),
             Some(why) => Err(failed(format!("{}: {why}", self.source.shown()))),

@@ -39,6 +39,7 @@ struct Shared {
     moved: Condvar,
     stop: AtomicBool,
     lost: AtomicU64,
+    unrecorded: AtomicU64,
 }
 
 #[derive(Default)]
@@ -128,6 +129,11 @@ impl Feed {
         self.shared.lock().events.len()
     }
 
+    /// Frames that were to be recorded and could not be, and what else went wrong with the recording.
+    pub fn unrecorded(&self) -> u64 {
+        self.shared.unrecorded.load(Ordering::Relaxed)
+    }
+
     /// Whether a volume that is about to be taken is stale: a whole one has come after it, and the source does not wait.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
@@ -151,13 +157,18 @@ impl Drop for Feed {
 }
 
 fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
-    let can_wait = source.can_wait();
+    let (can_wait, records) = (source.can_wait(), tape.is_some());
     let _ended = Ended(shared);
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
         let at = Instant::now();
+        let is_frame = matches!(event, Event::Frame(_) | Event::Lines { .. });
+        if records && is_frame && tape.is_none() {
+            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
+        }
         if let Some(Err(fault)) = tape.as_mut().map(|tape| tape.write(&event, at)) {
             // Without a file nothing can be written; a frame that cannot be leaves the next one its chance, and is told of once.
+            shared.unrecorded.fetch_add(1, Ordering::Relaxed);
             let ends = matches!(event, Event::Begin(_));
             let told = tape.as_mut().is_some_and(|tape| std::mem::replace(&mut tape.failing, true));
             tape = tape.filter(|_| !ends);
@@ -165,7 +176,7 @@ fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
                 let what = if ends { "the recording ends" } else { "the recording lacks a frame" };
                 shared.put(Arrived { event: Event::Fault(format!("{what}: {fault}")), at }, can_wait);
             }
-        } else if let Some(tape) = &mut tape {
+        } else if let Some(tape) = tape.as_mut().filter(|_| is_frame) {
             tape.failing = false;
         }
         let ends = matches!(event, Event::End(_));

@@ -280,6 +280,11 @@ impl Stream {
         self.now.as_ref().map(|now| &now.turns).or(self.before.as_ref())
     }
 
+    /// What could not be recorded, frames as a rule.
+    pub fn unrecorded(&self) -> u64 {
+        self.feed.unrecorded()
+    }
+
     /// The time that sound needs for a volume, s; none before the first frame and of what is not swept.
     pub fn acquisition_time(&self) -> Option<f64> {
         self.now.as_ref()?.views.first().probe().map(|p| p.acquisition_time())

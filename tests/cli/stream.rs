@@ -155,3 +155,22 @@ fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
     let said = done(&["info", &tape]);
     assert!(said.contains("index") && said.contains("as it was written"), "{said}");
 }
+
+/// Prevents an exam that seems to be recorded and is not: a disk that is full, or a file that is there.
+#[test]
+fn a_recording_that_cannot_be_made_is_a_failure() {
+    let folder = Folder::new("full");
+    let there = folder.write("there.frames", "an exam");
+    let (code, _, err) = run(&[&["stream", "--source", SWEEP, "--null", "--record", &there], &SMALL[..]].concat());
+    assert!(code == Some(2) && err.contains("is there already"), "{code:?} {err}");
+    assert_eq!(fs::read_to_string(&there).expect("read"), "an exam");
+    // A file may hold 200 kB, four of the sweep's frames.
+    let limited = format!(
+        "ulimit -f 200; trap '' XFSZ; exec {PROGRAM} stream --source {SWEEP} --null --record {} {}",
+        folder.path("full.frames"),
+        SMALL.join(" ")
+    );
+    let (code, said, err) = finish(Command::new("bash").args(["-c", &limited]));
+    assert!(code == Some(1) && err.contains("could not be written"), "{code:?} {said} {err}");
+    assert!(said.contains("31 frames, 1 volumes shown"), "what cannot be recorded is shown all the same: {said}");
+}
