@@ -16,7 +16,7 @@ const EVERY: Duration = Duration::from_secs(1);
 #[derive(clap::Args)]
 #[command(
     after_help = "Each second one line: frames, volumes and pictures a second, volumes dropped, latency from the arrival of a frame to \
-                        the pixels that show it, and the passes that took longest.\n\nExamples:\n  \
+                        the pixels that show it, and the mean time and runs of every pass.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \

@@ -129,7 +129,6 @@ impl Statistics {
         passes.sort_by(|a, b| b.total.total_cmp(&a.total));
         let shown: Vec<_> = passes
             .iter()
-            .take(4)
             .map(|p| format!("{} {:.2} ms x {}", p.name, p.total / 1e6 / p.runs.max(1) as f64, p.runs))
             .collect();
         if !shown.is_empty() {
