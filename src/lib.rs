@@ -9,6 +9,8 @@
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
 //!   order between them and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
 //!   without a GPU.
+//! - [`ui`] is the live volume on a screen, and the hands that turn it.
+//! - [`kiosk`] is what a cart needs around that: its configuration, its logs, and what it tells whoever is to help.
 //! - [`live`] is the loop between a source that does not wait and the device.
 //! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
 //!   one to fill the other.
@@ -18,6 +20,7 @@
 pub mod barriers;
 #[allow(unsafe_code)]
 pub mod gpu;
+pub mod kiosk;
 pub mod live;
 pub mod measuring;
 pub mod passes;
@@ -32,3 +35,4 @@ mod shader_compile;
 pub mod shader_source;
 pub mod source;
 pub mod spirv;
+pub mod ui;

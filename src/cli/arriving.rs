@@ -2,6 +2,8 @@
 
 use super::driven::{Driven, Driving};
 use super::{Failure, failed, input};
+use clap::Parser;
+use echolume::kiosk::config::Config;
 use echolume::probe::Geometry;
 use echolume::source::Source;
 use echolume::source::freehand;
@@ -19,7 +21,7 @@ const PHANTOM_VOLUMES: usize = 4;
 const PHANTOM_RATE: f64 = 1.0;
 const NETWORK: &str = "igtl://";
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Arriving {
     /// phantom; a recording (.mha, .mhd, .vol, .frames); - for standard input (raw frames behind a line of JSON, as
     /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
@@ -53,7 +55,37 @@ pub struct Arriving {
     driven: Driven,
 }
 
+/// The same without a command.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct Alone {
+    #[command(flatten)]
+    arriving: Arriving,
+}
+
 impl Arriving {
+    /// What a configuration says of the source. Messages are about its keys.
+    pub fn configured(config: &Config) -> Result<Arriving, Failure> {
+        let parsed = Alone::try_parse_from(config.source_arguments()).map_err(|error| {
+            let said = error.to_string();
+            // Usage and the pointer to help, behind an empty line, are about a command line.
+            let said = said.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").replace("\n ", "");
+            input(config.refuse(&said))
+        })?;
+        parsed.arriving.check().map_err(|failure| match failure {
+            Failure::Input(said) => input(config.refuse(&said)),
+            failure => failure,
+        })?;
+        Ok(parsed.arriving)
+    }
+
+    /// What can be told before anything is opened.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.pace(self.rate)?;
+        self.network()?;
+        self.driven.check()
+    }
+
     pub fn is_phantom(&self) -> bool {
         self.source == "phantom"
     }

@@ -4,7 +4,11 @@ use super::{Failure, failed, say};
 use echolume::gpu::{Choice, context, select};
 
 #[derive(clap::Args)]
-pub struct Devices {}
+pub struct Devices {
+    /// Say what each is able to, too: queues, and every limit of Vulkan
+    #[arg(long)]
+    limits: bool,
+}
 
 impl Devices {
     pub fn run(&self) -> Result<(), Failure> {
@@ -34,6 +38,13 @@ impl Devices {
                     say!("    not picked: software is the last choice; --device {i} asks for it")
                 }
                 _ => say!("    not picked: another one comes first; --device {i} asks for it"),
+            }
+            if self.limits {
+                for queue in &device.queues {
+                    say!("    {queue:?}");
+                }
+                say!("    largest allocation and buffer: {} MiB", device.max_bytes >> 20);
+                format!("{:#?}", device.limits).lines().for_each(|line| say!("    {line}"));
             }
         }
         picked.map(drop).map_err(failed)

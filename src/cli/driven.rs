@@ -11,7 +11,7 @@ use std::path::Path;
 /// The motor's sweep, of what the frames lie over.
 const WIDER: f64 = 1.05;
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Driven {
     /// Serial port of the motor that turns the array: frames are placed by where it is. Needs a probe file with a [motor] table
     #[arg(long, value_name = "PORT", requires = "sweeps")]
@@ -46,6 +46,14 @@ pub struct Driving<'a> {
 }
 
 impl Driven {
+    /// What can be told before anything is opened.
+    pub fn check(&self) -> Result<(), Failure> {
+        match (0.0..=10_000.0).contains(&self.delay) {
+            true => Ok(()),
+            false => Err(input(format!("--delay {}: must be 0 to 10000 ms", self.delay))),
+        }
+    }
+
     /// What is to be driven, if anything. `recording`: the file that is played, whose own probe file may say how. `fan`: what the
     /// frames lie over, degrees, where that does not come from the probe file.
     pub fn checked(
@@ -55,9 +63,7 @@ impl Driven {
         fan: Option<f64>,
     ) -> Result<Option<Driving<'_>>, Failure> {
         let (Some(port), Some(rate)) = (&self.motor, self.sweeps) else { return Ok(None) };
-        if !(0.0..=10_000.0).contains(&self.delay) {
-            return Err(input(format!("--delay {}: must be 0 to 10000 ms", self.delay)));
-        }
+        self.check()?;
         let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::beside)) else {
             return Err(input("--motor needs --probe FILE, whose [motor] table says how far to turn"));
         };

@@ -48,6 +48,11 @@ impl Look {
         if is_phantom {
             layers.preset("phantom").map_err(input)?;
         }
+        self.layers_over(layers, chosen)
+    }
+
+    /// The same over settings that are there already.
+    pub fn layers_over(&self, mut layers: Layers, chosen: &[String]) -> Result<Layers, Failure> {
         for preset in &self.preset {
             layers.preset(preset).map_err(input)?;
         }
@@ -67,6 +72,11 @@ impl Look {
             layers.set(assignment).map_err(input)?;
         }
         Ok(layers)
+    }
+
+    /// Whether the size of the picture was typed.
+    pub fn has_size(&self) -> bool {
+        self.size.is_some()
     }
 
     /// The flags as typed, and the assignments that they stand for.

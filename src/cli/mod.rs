@@ -16,9 +16,13 @@ mod report;
 mod report_error;
 mod report_tables;
 mod serial;
+mod shown;
 mod stream;
+mod support_bundle;
+mod view;
 
 use clap::{Parser, Subcommand};
+use echolume::kiosk::rotating::{self, Rotating};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -56,7 +60,7 @@ struct Arguments {
     /// Say more on standard error; twice for every detail
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
-    /// Write the log to this file instead
+    /// Write the log to this file instead: 10 MiB, then it becomes FILE.1 and so on to FILE.4, and the oldest goes
     #[arg(long, value_name = "FILE", global = true)]
     log_file: Option<PathBuf>,
 }
@@ -67,6 +71,8 @@ enum Command {
     Render(Box<render::Render>),
     /// Render frames as they arrive: the phantom, a recording, a pipe, a scanner on the network
     Stream(Box<stream::Stream>),
+    /// Show them on a screen, to be turned by hand
+    View(Box<view::View>),
     /// Run the 2D filters on an ordinary picture, and measure what they do
     Filter(Box<filter::Filter>),
     /// Say where the time goes, pass by pass, and compare two such runs
@@ -83,6 +89,8 @@ enum Command {
     Probe(probe::Probe),
     /// List the Vulkan devices, what each lacks, and which one would be used
     Devices(devices::Devices),
+    /// Pack versions, devices, configuration and logs for whoever is to help; no recordings, no pictures, no names
+    SupportBundle(support_bundle::SupportBundle),
 }
 
 /// Why a command ends early, in one line.
@@ -112,17 +120,21 @@ pub fn run() -> ExitCode {
             return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
         }
     };
-    let done = start_log(arguments.verbose, arguments.log_file.as_deref()).and_then(|()| match arguments.command {
-        Command::Render(render) => render.run(),
-        Command::Stream(stream) => stream.run(),
-        Command::Filter(filter) => filter.run(),
-        Command::Profile(profile) => profile.run(),
-        Command::Report(report) => report.run(),
-        Command::Phantom(phantom) => phantom.run(),
-        Command::Convert(convert) => convert.run(),
-        Command::Info(info) => info.run(),
-        Command::Probe(probe) => probe.run(),
-        Command::Devices(devices) => devices.run(),
+    let done = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log()).and_then(|()| {
+        match arguments.command {
+            Command::Render(render) => render.run(),
+            Command::Stream(stream) => stream.run(),
+            Command::View(view) => view.run(),
+            Command::Filter(filter) => filter.run(),
+            Command::Profile(profile) => profile.run(),
+            Command::Report(report) => report.run(),
+            Command::Phantom(phantom) => phantom.run(),
+            Command::Convert(convert) => convert.run(),
+            Command::Info(info) => info.run(),
+            Command::Probe(probe) => probe.run(),
+            Command::Devices(devices) => devices.run(),
+            Command::SupportBundle(bundle) => bundle.run(),
+        }
     });
     let done = done.and_then(|()| match UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).take() {
         Some(error) => Err(Failure::Failed(format!("standard output: cannot be written: {error}"))),
@@ -135,14 +147,6 @@ pub fn run() -> ExitCode {
     };
     let _ = writeln!(std::io::stderr(), "echolume: {}", plain(&message));
     ExitCode::from(code)
-}
-
-/// An empty file, or one whose first line begins with a time as ours do: a recording is never appended to.
-fn holds_a_log(path: &std::path::Path) -> bool {
-    let mut start = Vec::new();
-    let read =
-        std::fs::File::open(path).and_then(|f| std::io::Read::read_to_end(&mut std::io::Read::take(f, 11), &mut start));
-    read.is_ok() && (start.is_empty() || (start.get(4) == Some(&b'-') && start.get(10) == Some(&b'T')))
 }
 
 /// One line of bounded length: what was typed or read may hold anything, and must not write to the terminal.
@@ -159,25 +163,49 @@ fn plain(message: &str) -> String {
     line
 }
 
-fn start_log(verbose: u8, file: Option<&std::path::Path>) -> Result<(), Failure> {
+impl Command {
+    /// A log that the command's own configuration asks for: its file, bytes of one, and how many.
+    fn log(&self) -> Option<(PathBuf, u64, u32)> {
+        match self {
+            Command::View(view) => view.log(),
+            _ => None,
+        }
+    }
+}
+
+fn start_log(
+    verbose: u8,
+    file: Option<&std::path::Path>,
+    configured: Option<(PathBuf, u64, u32)>,
+) -> Result<(), Failure> {
     let level = match verbose {
         0 => tracing::Level::WARN,
         1 => tracing::Level::INFO,
         _ => tracing::Level::DEBUG,
     };
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
+    // A cart that cannot log shows pictures all the same.
+    let configured = configured.filter(|_| file.is_none()).and_then(|(path, bytes, files)| {
+        let opened = Rotating::open(&path, bytes, files);
+        opened.inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; it goes here"))).ok()
+    });
+    if let Some(file) = configured {
+        // What a service does is worth its lines.
+        let level = level.max(tracing::Level::INFO);
+        tracing_subscriber::fmt()
+            .with_max_level(level)
+            .with_target(false)
+            .with_ansi(false)
+            .with_writer(Mutex::new(file))
+            .init();
+        return Ok(());
+    }
     match file {
         None => log.without_time().with_writer(std::io::stderr).init(),
         Some(path) => {
-            if path.metadata().is_ok_and(|there| there.is_file()) && !holds_a_log(path) {
-                return Err(input(format!(
-                    "{}: holds something else than a log; give another --log-file",
-                    path.display()
-                )));
-            }
-            let opened = std::fs::OpenOptions::new().create(true).append(true).open(path);
-            let file = opened.map_err(|e| input(format!("{}: cannot be written: {e}", path.display())))?;
-            log.with_ansi(false).with_writer(std::sync::Mutex::new(file)).init();
+            let file = Rotating::open(path, rotating::USUAL_BYTES, rotating::USUAL_FILES);
+            let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
+            log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }
     }
     Ok(())

@@ -7,7 +7,7 @@ use echolume::probe::motor::{Fault, MotorError, MotorTable, Parity, Settings, St
 use std::path::PathBuf;
 use std::time::Duration;
 
-#[derive(Args)]
+#[derive(Clone, Args)]
 pub struct Serial {
     /// Bits a second to the motor
     #[arg(long, value_name = "N", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]

@@ -60,24 +60,21 @@ pub struct Stream {
 
 impl Stream {
     pub fn run(&self) -> Result<(), Failure> {
-        let update = match self.update.as_str() {
-            "whole" => Update::Whole,
-            "rolling" => Update::Rolling,
-            other => return Err(input(format!("--update {other}: must be whole or rolling"))),
-        };
+        let update = update(&self.update)?;
         let settings = self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         if let Some(file) = &self.record {
-            self.check_record(file)?;
+            check_record(file, self.source.path())?;
         }
         let source = self.source.open()?;
         let mut context = self.look.device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let options = Options { update, images: self.images, queues: self.queues.map(usize::from) };
+        let options =
+            Options { update, images: self.images, queues: self.queues.map(usize::from), ..Options::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.go(&mut stream, update, &mut context);
         drop(stream);
@@ -166,23 +163,32 @@ impl Stream {
             Update::Rolling => format!("picture-{number:06}.png"),
         };
         let file = folder.join(name);
-        shown.picture.save(&file).map_err(failed)
+        shown.picture.as_ref().map_or(Ok(()), |picture| picture.save(&file)).map_err(failed)
     }
+}
 
-    /// Refuses to write over anything that is no recording of frames, or that is being played.
-    fn check_record(&self, file: &Path) -> Result<(), Failure> {
-        let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
-        if file.extension().is_none_or(|e| e != "frames") {
-            return refuse("must end in .frames");
-        }
-        let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-        if same(self.source.path()) {
-            return refuse("would replace what is played");
-        }
-        match file.exists() {
-            true => refuse("is there already and is not written over; give another name"),
-            false => picture::check_target(file).map_err(failed),
-        }
+/// How volumes become visible, as it was typed.
+pub fn update(text: &str) -> Result<Update, Failure> {
+    match text {
+        "whole" => Ok(Update::Whole),
+        "rolling" => Ok(Update::Rolling),
+        other => Err(input(format!("--update {other}: must be whole or rolling"))),
+    }
+}
+
+/// Refuses to write over anything that is there, or that is being played.
+pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
+    let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
+    if file.extension().is_none_or(|e| e != "frames") {
+        return refuse("must end in .frames");
+    }
+    let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
+    if same(played) {
+        return refuse("would replace what is played");
+    }
+    match file.exists() {
+        true => refuse("is there already and is not written over; give another name"),
+        false => picture::check_target(file).map_err(failed),
     }
 }
 

@@ -1,14 +1,18 @@
 //! Instance, device, queue, allocator and messenger. One `Arc` of it is held by everything made from it, and its one `Drop`
 //! is the order of destruction.
 
+mod create;
+
 use super::GpuError;
 use super::error::Doing;
 use super::faults::{Faults, Seam};
 use super::select::{self, Candidate, Choice};
+use super::window::Target;
 use ash::vk;
+use create::{create_device, create_instance, create_messenger, load};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::{BTreeSet, HashMap};
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::{CStr, CString};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -24,8 +28,10 @@ pub struct ContextOptions {
 
 pub struct Context {
     /// Kept loaded as long as anything made from it lives.
-    _entry: ash::Entry,
-    instance: ash::Instance,
+    pub(super) entry: ash::Entry,
+    pub(super) instance: ash::Instance,
+    /// Of a context whose pictures are shown.
+    pub(super) shows: Option<Shows>,
     messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Box<Mutex<Vec<String>>>,
     pub candidate: Candidate,
@@ -46,12 +52,23 @@ pub struct Context {
     pub counts: Counts,
 }
 
+/// What shows pictures.
+pub struct Shows {
+    pub surfaces: ash::khr::surface::Instance,
+    pub swapchains: ash::khr::swapchain::Device,
+    /// Where it is a monitor.
+    pub displays: Option<ash::khr::display::Instance>,
+}
+
 /// What is costly and must not happen for every frame, counted since the start.
 #[derive(Debug, Default)]
 pub struct Counts {
     /// Of device memory.
     pub allocations: AtomicU64,
     pub pipelines: AtomicU64,
+    /// Those of them that were made beside the drawing.
+    pub beside: AtomicU64,
+    pub dispatches: AtomicU64,
     /// Waits for the whole device.
     pub waits_idle: AtomicU64,
 }
@@ -59,49 +76,29 @@ pub struct Counts {
 /// Loads Vulkan and lists the devices, for `echolume devices`.
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
-    let instance = create_instance(&entry, false, false)?;
+    let instance = create_instance(&entry, false, false, None)?;
     let candidates = select::candidates(&instance);
     // SAFETY: nothing made from the instance is left.
     unsafe { instance.destroy_instance(None) };
     candidates
 }
 
-fn load() -> Result<ash::Entry, GpuError> {
-    // SAFETY: loading libvulkan runs its initialisers; it is the system's own Vulkan loader.
-    unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
-}
-
-fn create_instance(entry: &ash::Entry, validation: bool, debug_utils: bool) -> Result<ash::Instance, GpuError> {
-    let application = vk::ApplicationInfo::default()
-        .application_name(c"echolume")
-        .engine_name(c"echolume")
-        .api_version(vk::API_VERSION_1_3);
-    let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
-    let mut extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
-    // The layer itself brings this one.
-    extensions.extend(validation.then_some(ash::ext::validation_features::NAME.as_ptr()));
-    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-    let mut create = vk::InstanceCreateInfo::default()
-        .application_info(&application)
-        .enabled_layer_names(&layers)
-        .enabled_extension_names(&extensions);
-    if validation {
-        create = create.push_next(&mut features);
-    }
-    // SAFETY: every pointer in `create` outlives the call.
-    let instance = unsafe { entry.create_instance(&create, None) };
-    match instance {
-        // The loader says so when no driver is installed at all.
-        Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(GpuError::NoDevice),
-        other => other.doing(|| "create instance".into()),
-    }
-}
-
 impl Context {
     /// # Errors
     /// No loader, no device, a device that lacks what is required, or no validation layer when validation was asked for.
     pub fn new(options: &ContextOptions) -> Result<Arc<Context>, GpuError> {
+        Context::make(options, None)
+    }
+
+    /// One whose pictures can be shown on `target`: the device is chosen among those that can.
+    ///
+    /// # Errors
+    /// As of [`Context::new`]; no device that can show anything there.
+    pub fn showing(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
+        Context::make(options, Some(target))
+    }
+
+    fn make(options: &ContextOptions, target: Option<&Target>) -> Result<Arc<Context>, GpuError> {
         let entry = load()?;
         // SAFETY: only reads the list of layers.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
@@ -112,9 +109,9 @@ impl Context {
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
         let debug_utils = options.validation
             || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
-        let instance = create_instance(&entry, options.validation, debug_utils)?;
+        let instance = create_instance(&entry, options.validation, debug_utils, target)?;
         // The loader stays loaded until the instance is gone, also when nothing comes of it.
-        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils);
+        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, target);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
             unsafe { instance.destroy_instance(None) };
@@ -127,10 +124,14 @@ impl Context {
         instance: &ash::Instance,
         options: &ContextOptions,
         debug_utils: bool,
+        target: Option<&Target>,
     ) -> Result<Arc<Context>, GpuError> {
-        let candidates = select::candidates(instance)?;
+        let mut candidates = select::candidates(instance)?;
+        if let Some(target) = target {
+            candidates.iter_mut().for_each(|candidate| target.note_lack(&entry, instance, candidate));
+        }
         let candidate = candidates[select::choose(&candidates, &options.device)?].clone();
-        let device = create_device(instance, &candidate)?;
+        let device = create_device(instance, &candidate, target.is_some())?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -171,8 +172,14 @@ impl Context {
             },
             queue_families: candidate.queues.iter().map(|q| q.family).collect::<BTreeSet<_>>().into_iter().collect(),
             limits: candidate.limits,
+            shows: target.map(|target| Shows {
+                surfaces: ash::khr::surface::Instance::new(&entry, instance),
+                swapchains: ash::khr::swapchain::Device::new(instance, &device),
+                displays: matches!(target, Target::Monitor(_))
+                    .then(|| ash::khr::display::Instance::new(&entry, instance)),
+            }),
             instance: instance.clone(),
-            _entry: entry,
+            entry,
             messenger,
             messages,
             candidate,
@@ -193,6 +200,12 @@ impl Context {
     /// What validation has said so far; silence is the pass mark.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// Bytes of device memory that something holds now.
+    pub fn allocated(&self) -> u64 {
+        let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
+        allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
     /// A time stamp of the device, and when the host read it; none where the device's clock cannot be read.
@@ -246,10 +259,12 @@ impl Context {
         self.queues.len()
     }
 
+    /// `done`: a fence that is signalled when it is done, or null.
     pub(super) fn submit(
         &self,
         queue: usize,
         submit: &vk::SubmitInfo2,
+        done: vk::Fence,
         doing: impl FnOnce() -> String,
     ) -> Result<(), GpuError> {
         self.faults
@@ -259,9 +274,14 @@ impl Context {
                 let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
                 // SAFETY: the lock keeps the queue to one thread; the command buffer in `submit` is recorded and what it names is
                 // alive until the timeline says it is done.
-                unsafe { self.device.queue_submit2(*queue, &[*submit], vk::Fence::null()) }
+                unsafe { self.device.queue_submit2(*queue, &[*submit], done) }
             })
             .doing(doing)
+    }
+
+    /// What is done to the queue that renders by others than [`Context::submit`], one at a time.
+    pub(super) fn on_queue<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> T {
+        work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
     }
 
     pub(super) fn wait_idle(&self) {
@@ -284,73 +304,6 @@ impl Context {
         unsafe { self.instance.get_physical_device_image_format_properties(device, format, kind, tiling, usage, none) }
             .doing(|| format!("use {format:?} as {usage:?}"))
     }
-}
-
-fn create_device(instance: &ash::Instance, candidate: &Candidate) -> Result<ash::Device, GpuError> {
-    let priorities = [1.0; crate::queues::MOST];
-    let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
-    let queues: Vec<_> = families
-        .into_iter()
-        .map(|family| {
-            let count = candidate.queues.iter().filter(|q| q.family == family).count();
-            vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities[..count])
-        })
-        .collect();
-    let mut extensions = vec![ash::khr::push_descriptor::NAME.as_ptr()];
-    extensions.extend(candidate.calibrated.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
-    let core = vk::PhysicalDeviceFeatures::default()
-        .pipeline_statistics_query(candidate.statistics)
-        .shader_storage_image_extended_formats(true)
-        .shader_storage_image_write_without_format(true);
-    let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
-        .scalar_block_layout(true)
-        .timeline_semaphore(true)
-        .host_query_reset(true);
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).maintenance4(true);
-    let create = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_extension_names(&extensions)
-        .enabled_features(&core)
-        .push_next(&mut v12)
-        .push_next(&mut v13);
-    // SAFETY: `choose` made sure that everything asked for is there; every pointer outlives the call.
-    unsafe { instance.create_device(candidate.handle, &create, None) }
-        .doing(|| format!("create device '{}'", candidate.name))
-}
-
-fn create_messenger(
-    entry: &ash::Entry,
-    instance: &ash::Instance,
-    messages: &Mutex<Vec<String>>,
-) -> Result<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT), GpuError> {
-    let debug = ash::ext::debug_utils::Instance::new(entry, instance);
-    let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
-        // Not PERFORMANCE: it asks for transfer layouts, and images stay in GENERAL by design.
-        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
-        .pfn_user_callback(Some(on_message))
-        .user_data(std::ptr::from_ref(messages).cast_mut().cast());
-    // SAFETY: `messages` is boxed in the context and dropped after the messenger.
-    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) };
-    messenger.map(|m| (debug, m)).doing(|| "create messenger".into())
-}
-
-unsafe extern "system" fn on_message(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    messages: *mut c_void,
-) -> vk::Bool32 {
-    if data.is_null() || messages.is_null() {
-        return vk::FALSE;
-    }
-    // SAFETY: Vulkan hands over valid data, and `messages` is the context's boxed mutex, which outlives the messenger.
-    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
-    // SAFETY: a message is null or a terminated string.
-    let text = unsafe { data.message_as_c_str() }.map_or(String::new(), |m| m.to_string_lossy().into_owned());
-    tracing::error!(target: "validation", "{text}");
-    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
-    vk::FALSE
 }
 
 impl Drop for Context {

@@ -41,6 +41,8 @@ pub enum GpuError {
     VolumeImage { image: u32, images: u32 },
     #[error("the last change of scene failed ({0}); the next one builds everything anew")]
     Broken(String),
+    #[error("no window: {0}")]
+    Window(String),
     #[error("the device did not finish within {seconds} s; last submitted: {doing}")]
     TimedOut { seconds: u64, doing: String },
 }

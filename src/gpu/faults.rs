@@ -10,6 +10,8 @@ pub enum Seam {
     Allocate,
     Submit,
     Wait,
+    /// An image of a window.
+    Acquire,
 }
 
 /// At most one planned failure, and one slow pass.

@@ -2,7 +2,7 @@
 //!
 //! [`context`] owns instance, device, queue and allocator; [`resources`] images and buffers; [`pipelines`] what a shader
 //! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`measured`] what those said; [`timeline`] what is done;
-//! [`renderer`] the four stages; [`single`] one pass alone, for tests.
+//! [`renderer`] the four stages; [`single`] one pass alone, for tests; [`window`] what shows their pictures.
 
 pub mod context;
 pub mod error;
@@ -21,9 +21,10 @@ pub mod single;
 pub mod slots;
 pub mod timeline;
 pub mod timing;
+pub mod window;
 
 pub use context::{Context, ContextOptions};
 pub use error::GpuError;
-pub use pipelines::Fetch;
+pub use pipelines::{Fetch, Wake};
 pub use renderer::{Options, Renderer};
 pub use select::{Candidate, Choice};

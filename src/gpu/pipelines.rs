@@ -1,5 +1,7 @@
 //! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
 
+mod beside;
+
 use super::context::Context;
 use super::error::Doing;
 use super::resources::has_texels;
@@ -10,8 +12,10 @@ use crate::scene::{Sampling, Scene};
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+pub use beside::{Beside, Wake};
 
 /// A compute pipeline and what it is bound by.
 pub struct Pipeline {
@@ -60,7 +64,7 @@ pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 /// Every pipeline made so far, by shader and constants: going back to an earlier setting compiles nothing.
 pub struct Pipelines {
     context: Arc<Context>,
-    made: HashMap<Key, Arc<Pipeline>>,
+    made: Mutex<HashMap<Key, Arc<Pipeline>>>,
     shaders: Arc<Shaders>,
     fetch: Fetch,
     sampler: vk::Sampler,
@@ -95,18 +99,26 @@ impl Pipelines {
         // SAFETY: the create structure is complete.
         let sampler = unsafe { context.device.create_sampler(&create, None) }.doing(|| "create sampler".into())?;
         context.name(sampler, "trilinear");
-        Ok(Pipelines { context: context.clone(), made: HashMap::new(), shaders, fetch, sampler })
+        Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, fetch, sampler })
+    }
+
+    fn key(pass: &Pass, scene: &Scene, turn: &Turn) -> Key {
+        let formats = (pass.reads)(scene, turn).iter().map(|b| b.slot.format(scene)).collect();
+        ((pass.shader)(scene, turn), (pass.constants)(scene, turn), formats)
+    }
+
+    fn there(&self, key: &Key) -> Option<Arc<Pipeline>> {
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
     }
 
     /// The pipeline of a pass in a scene; made at its first use.
     ///
     /// # Errors
     /// A shader that is not there, or that disagrees with the pass's declaration.
-    pub fn get(&mut self, pass: &Pass, scene: &Scene, turn: &Turn) -> Result<Arc<Pipeline>, GpuError> {
-        let formats = (pass.reads)(scene, turn).iter().map(|b| b.slot.format(scene)).collect();
-        let key = ((pass.shader)(scene, turn), (pass.constants)(scene, turn), formats);
-        if let Some(pipeline) = self.made.get(&key) {
-            return Ok(pipeline.clone());
+    pub fn get(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> Result<Arc<Pipeline>, GpuError> {
+        let key = Pipelines::key(pass, scene, turn);
+        if let Some(pipeline) = self.there(&key) {
+            return Ok(pipeline);
         }
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
@@ -121,14 +133,15 @@ impl Pipelines {
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         contract::check(pass, scene, turn, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
         let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, &key, &words, module)?);
-        self.made.insert(key, pipeline.clone());
+        // Another thread may have made it meanwhile: both serve.
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
         Ok(pipeline)
     }
 }
 
 impl Drop for Pipelines {
     fn drop(&mut self) {
-        self.made.clear();
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).clear();
         // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
         unsafe { self.context.device.destroy_sampler(self.sampler, None) };
     }

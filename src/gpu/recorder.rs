@@ -18,6 +18,7 @@ use crate::scene::Scene;
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// Room for the parameters of one command buffer.
 const PARAMS_BYTES: u64 = 64 << 10;
@@ -107,8 +108,23 @@ impl Recorder {
         self.params_used = 0;
         if let Some(stamps) = &mut self.stamps {
             stamps.begin(self.commands);
+            self.settle();
         }
         Ok(())
+    }
+
+    /// llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp when it next flushes, once anything was ever drawn on a window:
+    /// without a flush behind each one the dispatch after it would seem to take no time. A barrier is one.
+    fn settle(&self) {
+        if self.context.shows.is_none() || !self.context.candidate.is_software() {
+            return;
+        }
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+        // SAFETY: the command buffer is being recorded, outside any render pass.
+        unsafe { self.context.device.cmd_pipeline_barrier2(self.commands, &dependency) };
     }
 
     /// Adds the times of the last submission, once, when it is done.
@@ -159,7 +175,7 @@ impl Recorder {
             .wait_semaphore_infos(&waited)
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(&signal);
-        self.context.submit(self.queue, &submit, || format!("submit '{}'", self.label))?;
+        self.context.submit(self.queue, &submit, vk::Fence::null(), || format!("submit '{}'", self.label))?;
         timeline.submitted += 1;
         timeline.doing = self.label.to_string();
         self.done_at = timeline.submitted;
@@ -230,6 +246,8 @@ impl Recorder {
             Some(stamps) => stamps.dispatch(commands, pass.name, dispatch),
             None => dispatch(),
         }
+        self.settle();
+        self.context.counts.dispatches.fetch_add(1, Ordering::Relaxed);
         self.context.end_label(self.commands);
         if let Some(dispatched) = &mut order.dispatched {
             dispatched.push((pass.name, extent));
@@ -292,6 +310,7 @@ impl Recorder {
     pub fn stamp(&mut self, name: &'static str) {
         if let Some(stamps) = &mut self.stamps {
             stamps.end_of(self.commands, name);
+            self.settle();
         }
     }
 

@@ -5,13 +5,14 @@ mod change;
 mod draw;
 mod frames;
 mod inspect;
+mod present;
 mod slab;
 
 use super::GpuError;
 use super::context::Context;
 use super::measured::Measured;
 use super::order::Order;
-use super::pipelines::{Fetch, Pipeline, Pipelines, Shaders, embedded};
+use super::pipelines::{Beside, Fetch, Pipeline, Pipelines, Shaders, Wake, embedded};
 use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
@@ -37,11 +38,23 @@ pub struct Options {
     /// Queues that share the work, 1..=3; as many as the device has for different work unless given. Where it has fewer than given,
     /// several are one.
     pub queues: Option<usize>,
+    /// Bring every picture back; otherwise it stays on the device, where it is shown.
+    pub readback: bool,
+    /// Called when something was made beside the drawing.
+    pub wake: Option<Wake>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { volume_images: 1, shaders: embedded(), spans: false, fetch: None, queues: None }
+        Options {
+            volume_images: 1,
+            shaders: embedded(),
+            spans: false,
+            fetch: None,
+            queues: None,
+            readback: true,
+            wake: None,
+        }
     }
 }
 
@@ -56,10 +69,13 @@ pub struct Renderer {
     // Dropped in this order, after `drop` has waited for the device.
     lanes: Vec<Lane>,
     picture: Recorder,
-    readback: Buffer,
+    /// None: pictures stay on the device.
+    readback: Option<Buffer>,
     slots: Slots,
     steps: Vec<Arc<Pipeline>>,
-    pipelines: Pipelines,
+    /// Started when it is needed first.
+    beside: Option<Beside>,
+    pipelines: Arc<Pipelines>,
     timelines: Timelines,
     order: Order,
     context: Arc<Context>,
@@ -85,6 +101,10 @@ pub struct Renderer {
     slab: Option<slab::Slab>,
     /// A picture is on its way.
     drawing: bool,
+    /// The picture's image holds one.
+    drawn: bool,
+    /// The value of the first queue's timeline at which it has been shown.
+    presented: u64,
     /// The volume image that is shown.
     shown: u32,
     /// What all frames that were sent have been filtered over, at least.
@@ -93,6 +113,7 @@ pub struct Renderer {
     measured: Measured,
     spans: bool,
     fetch: Fetch,
+    wake: Option<Wake>,
 }
 
 impl Renderer {
@@ -105,15 +126,16 @@ impl Renderer {
         let scene = super::formats::suited(context, fetch, scene);
         let plan = Plan::new(&scene);
         super::formats::check(context, &plan, &scene)?;
-        let mut pipelines = Pipelines::new(context, options.shaders.clone(), fetch)?;
-        let steps = pipelines_of(&mut pipelines, &plan, &scene)?;
+        let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), fetch)?);
+        let steps = pipelines_of(&pipelines, &plan, &scene)?;
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, crate::queues::MOST);
         let mut renderer = Renderer {
             lanes: Vec::new(),
             picture: Recorder::new(context, 0, "picture", options.spans)?,
-            readback: readback(context, &scene)?,
+            readback: options.readback.then(|| readback(context, &scene)).transpose()?,
             slots: Slots::new(context, options.volume_images.max(1)),
             steps,
+            beside: None,
             pipelines,
             timelines: Timelines::new(context, queues)?,
             order: Order { queues: Queues::new(queues), ..Order::default() },
@@ -133,10 +155,13 @@ impl Renderer {
             torn: 0,
             slab: None,
             drawing: false,
+            drawn: false,
+            presented: 0,
             shown: 0,
             measured: Measured::new(context, options.spans),
             spans: options.spans,
             fetch,
+            wake: options.wake.clone(),
         };
         renderer.lanes = renderer.new_lanes()?;
         renderer.forget_volumes();
@@ -171,6 +196,7 @@ impl Renderer {
     /// Makes and fills the slots that are not there yet.
     fn fit(&mut self) -> Result<(), GpuError> {
         let new = self.slots.fit(&self.plan, &self.scene)?;
+        self.drawn &= !new.iter().any(|(slot, _)| *slot == Slot::Screen);
         if new.is_empty() {
             return Ok(());
         }
@@ -247,7 +273,7 @@ impl Renderer {
     }
 }
 
-fn pipelines_of(pipelines: &mut Pipelines, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+fn pipelines_of(pipelines: &Pipelines, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
     plan.steps.iter().map(|step| pipelines.get(step.pass, scene, &step.turn())).collect()
 }
 

@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use ash::vk;
+use std::borrow::Cow;
 use std::ffi::CStr;
 
 /// A device as the user names it.
@@ -32,7 +33,7 @@ pub struct Candidate {
     pub driver: String,
     pub version: u32,
     /// What is required and not there.
-    pub lacks: Vec<&'static str>,
+    pub lacks: Vec<Cow<'static, str>>,
     /// What is optional and not there.
     pub without: Vec<&'static str>,
     /// The queues that are used: the first renders, the second takes frames in, the third copies them, as far as there are such.
@@ -41,6 +42,8 @@ pub struct Candidate {
     pub calibrated: bool,
     /// Shader invocations can be counted.
     pub statistics: bool,
+    /// Pictures can be shown on a window, with panels drawn over them.
+    pub presents: bool,
     pub limits: vk::PhysicalDeviceLimits,
     /// Largest allocation and largest buffer, whichever is less.
     pub max_bytes: u64,
@@ -55,6 +58,7 @@ pub struct QueueOf {
     /// Of its time stamps; 0 for none.
     pub valid_bits: u32,
     pub computes: bool,
+    pub draws: bool,
     /// Whether it copies single slices of a 3D image, and not only all of it.
     pub copies_slices: bool,
 }
@@ -120,8 +124,9 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }.unwrap_or_default();
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
 
+    let mut presents = has(ash::khr::swapchain::NAME);
     let mut lacks = Vec::new();
-    let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name));
+    let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name.into()));
     need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
     need(has(ash::khr::push_descriptor::NAME), "VK_KHR_push_descriptor");
     if properties.api_version >= vk::API_VERSION_1_3 {
@@ -138,6 +143,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
         need(v13.synchronization2 == vk::TRUE, "synchronization2");
         need(v13.maintenance4 == vk::TRUE, "maintenance4");
+        presents &= v13.dynamic_rendering == vk::TRUE;
     }
     let queues = queues(&families);
     need(!queues.is_empty(), "a compute queue");
@@ -160,6 +166,9 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     if !statistics {
         without.push("pipelineStatisticsQuery: invocations are not counted");
     }
+    if !presents {
+        without.push("VK_KHR_swapchain and dynamicRendering: nothing is shown on a window");
+    }
     if !has(ash::ext::memory_budget::NAME) {
         without.push("VK_EXT_memory_budget");
     }
@@ -174,6 +183,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         queues,
         calibrated,
         statistics,
+        presents,
         limits: properties.limits,
         // A driver older than 1.3 leaves this 0; it is refused anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
@@ -189,6 +199,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
         index,
         valid_bits: families[family].timestamp_valid_bits,
         computes: families[family].queue_flags.contains(compute),
+        draws: families[family].queue_flags.contains(graphics),
         copies_slices: families[family].min_image_transfer_granularity.depth == 1
             && families[family].min_image_transfer_granularity.width == 1
             && families[family].min_image_transfer_granularity.height == 1,
@@ -253,11 +264,12 @@ mod tests {
             kind,
             driver: String::new(),
             version: vk::API_VERSION_1_3,
-            lacks,
+            lacks: lacks.into_iter().map(Cow::from).collect(),
             without: vec![],
             queues: vec![],
             calibrated: true,
             statistics: true,
+            presents: true,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }

@@ -151,7 +151,7 @@ impl Timed {
         let first = if pass.when == When::Frame { first } else { Turn { slice: 0, slices: scene.slices(), ..first } };
         let turns: Vec<Turn> = (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let mut pipelines = Pipelines::new(context, embedded(), fetch)?;
+        let pipelines = Pipelines::new(context, embedded(), fetch)?;
         let mut dispatches = Vec::new();
         for turn in turns {
             let binds = [(pass.reads)(scene, &turn), (pass.writes)(scene, &turn)].concat();

@@ -55,13 +55,11 @@ impl Timeline {
         reached.map(|reached| reached >= value).doing(|| format!("run {}", self.doing))
     }
 
-    /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. A lost
-    /// device has nothing in flight any more.
+    /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. One that is
+    /// lost answers that at once.
     pub fn drain(&self) {
-        match self.wait_all() {
-            Ok(()) => {}
-            Err(error) if error.is_device_lost() => {}
-            Err(_) => self.context.wait_idle(),
+        if self.wait_all().is_err() {
+            self.context.wait_idle();
         }
     }
 }

@@ -2,6 +2,7 @@
 //! overflows a source that can wait is kept waiting, and one that cannot loses frames, which are counted.
 
 use super::tape::Tape;
+use crate::gpu::Wake;
 use crate::source::live::{Event, Live};
 use std::collections::VecDeque;
 use std::io;
@@ -25,7 +26,7 @@ pub struct Arrived {
     pub at: Instant,
 }
 
-/// A source that is listened to.
+/// A source that is listened to, or none.
 pub struct Feed {
     shared: Arc<Shared>,
     can_wait: bool,
@@ -40,6 +41,7 @@ struct Shared {
     stop: AtomicBool,
     lost: AtomicU64,
     unrecorded: AtomicU64,
+    wake: Option<Wake>,
 }
 
 #[derive(Default)]
@@ -88,6 +90,9 @@ impl Shared {
         waiting.events.push_back(arrived);
         drop(waiting);
         self.moved.notify_all();
+        if let Some(wake) = &self.wake {
+            wake();
+        }
     }
 }
 
@@ -98,7 +103,20 @@ impl Feed {
     /// # Errors
     /// A thread that cannot be started.
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
-        let (shared, can_wait) = (Arc::new(Shared::default()), source.can_wait());
+        Feed::waking(source, record, None)
+    }
+
+    /// A source that never says anything.
+    pub fn none() -> Feed {
+        Feed { shared: Arc::default(), can_wait: true, thread: None }
+    }
+
+    /// The same as [`Feed::new`], with something to call after each event.
+    ///
+    /// # Errors
+    /// A thread that cannot be started.
+    pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
+        let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
         let theirs = shared.clone();
         let tape = record.map(Tape::new);
         let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;

@@ -1,31 +1,39 @@
 //! The loop between a feed and a renderer, one step at a time.
 
+use super::cine::{Cine, Room};
 use super::feed::{Arrived, Feed};
 use super::now::Now;
+use super::replay::Replay;
 use super::statistics::Statistics;
-use super::turns::{Counts, Turns, Update};
+use super::turns::{Turns, Update};
 use super::views::Views;
-use crate::gpu::{self, Context, GpuError, Renderer};
+use crate::gpu::{self, Context, GpuError, Renderer, Wake};
 use crate::picture::Picture;
-use crate::scene::{Scene, SceneError, Settings};
+use crate::scene::{SceneError, Settings};
 use crate::source::Frame;
 use crate::source::live::Event;
 use crate::source::recorder::Header;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Options {
     pub update: Update,
     /// Volume images that take turns where volumes are whole: 2, or 3 so that a volume need not wait for a picture.
     pub images: u32,
     /// Queues that share the work; as many as the device has unless given.
     pub queues: Option<usize>,
+    /// Bring every picture back; otherwise it stays on the device, where it is shown.
+    pub readback: bool,
+    /// How much of what came last is kept for looking back.
+    pub cine: Room,
+    /// Called when there is something to look at: a source said something, something was made beside the drawing.
+    pub wake: Option<Wake>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { update: Update::Whole, images: 3, queues: None }
+        Options { update: Update::Whole, images: 3, queues: None, readback: true, cine: Room::default(), wake: None }
     }
 }
 
@@ -47,9 +55,12 @@ pub enum Step {
 pub struct Shown {
     /// The volume that is shown; rolling: the newest that has a slice in it.
     pub volume: u32,
-    pub picture: Picture,
+    /// None where pictures stay on the device.
+    pub picture: Option<Picture>,
     /// From the arrival of the last frame that is new in it to now.
     pub latency: Duration,
+    /// From the beginning of its drawing to now.
+    pub took: Duration,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -62,21 +73,29 @@ pub enum StreamError {
 
 /// A source that is being rendered.
 pub struct Stream {
-    context: Arc<Context>,
-    feed: Feed,
+    pub(super) context: Arc<Context>,
+    pub(super) feed: Feed,
     settings: Settings,
     options: Options,
-    now: Option<Now>,
+    pub(super) now: Option<Now>,
+    pub(super) cine: Cine,
+    /// A volume of the cine loop that is being sent once more.
+    pub(super) replay: Option<Replay>,
+    /// What comes is not shown.
+    pub(super) frozen: bool,
     /// The geometry of now, also where nothing could be made for it.
-    header: Option<Header>,
+    pub(super) header: Option<Header>,
     /// A geometry that begins when what is on its way has been shown.
     next: Option<Header>,
+    /// What the volumes of this source are numbered from, and the newest number: volumes of several sources lie in one cine loop.
+    pub(super) first: u32,
+    pub(super) newest: Option<u32>,
     /// Of a geometry that nothing could be made after.
-    before: Option<Turns>,
-    end: Option<Option<String>>,
-    began: Instant,
-    statistics: Statistics,
-    taken: Statistics,
+    pub(super) before: Option<Turns>,
+    pub(super) end: Option<Option<String>>,
+    pub(super) began: Instant,
+    pub(super) statistics: Statistics,
+    pub(super) taken: Statistics,
 }
 
 impl Stream {
@@ -87,8 +106,13 @@ impl Stream {
             settings,
             options,
             now: None,
+            cine: Cine::new(Room::default(), 0),
+            replay: None,
+            frozen: false,
             header: None,
             next: None,
+            first: 0,
+            newest: None,
             before: None,
             end: None,
             began: Instant::now(),
@@ -102,9 +126,19 @@ impl Stream {
     /// # Errors
     /// A device that fails, and settings that cannot be drawn of a geometry that has begun.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        let mut patience = patience;
+        let went = self.go(patience);
+        // What cannot draw any more is made anew with the next geometry that is told.
+        if went.is_err()
+            && let Some(Now { turns, .. }) = self.now.take_if(|now| now.renderer.is_broken())
+        {
+            (self.before, self.replay) = (Some(turns), None);
+        }
+        went
+    }
+
+    fn go(&mut self, mut patience: Duration) -> Result<Step, StreamError> {
         // What is on its way is shown first, and nothing more is taken.
-        let over = self.end.is_some() || self.next.is_some();
+        let over = self.end.is_some() || (self.next.is_some() && !self.frozen);
         if let Some(now) = &mut self.now {
             if now.drawing.is_some() {
                 if over || !now.renderer.is_drawing()? {
@@ -124,11 +158,33 @@ impl Stream {
                 }
                 now.behind = 0;
                 return Ok(Step::Went);
-            } else if now.begin()? {
-                return Ok(Step::Went);
+            } else {
+                let begun = now.begin()?;
+                // What was sent of a volume went through stage 1 as it was before.
+                if std::mem::take(&mut now.anew)
+                    && let Some(replay) = self.replay.take()
+                {
+                    now.lost = Some(replay.kept.volume);
+                }
+                if begun {
+                    return Ok(Step::Went);
+                } else if let Some(fault) = now.fault.take() {
+                    // What could not be drawn is not to be made of another geometry or device either.
+                    if now.next.is_none() {
+                        self.settings = now.views.first().settings.clone();
+                    }
+                    return Ok(Step::Fault(fault));
+                } else if let Some(volume) = now.lost.take() {
+                    self.show_again(volume);
+                }
             }
         }
-        if let Some(header) = self.next.take() {
+        if self.replay.is_some() {
+            return self.send_again().map(|()| Step::Went);
+        }
+        // A geometry that begins would take what is frozen away.
+        let shows = self.frozen && self.now.is_some();
+        if let Some(header) = self.next.take_if(|_| !shows) {
             return self.make(header).map(|()| Step::Went);
         }
         if let Some(end) = &self.end {
@@ -145,8 +201,24 @@ impl Stream {
             Event::Begin(header) => {
                 self.next = Some(*header).filter(|h| self.now.is_none() || Some(h) != self.header.as_ref())
             }
-            Event::Frame(frame) => return self.lines(&frame, None, at),
-            Event::Lines { frame, first } => return self.lines(&frame, Some(first), at),
+            Event::Frame(_) | Event::Lines { .. } if self.frozen || self.next.is_some() => {}
+            Event::Frame(mut frame) => {
+                frame.volume = frame.volume.saturating_add(self.first);
+                let went = self.lines(&frame, None, at);
+                if matches!(went, Ok(Step::Went)) {
+                    self.cine.frame(frame);
+                }
+                return went;
+            }
+            Event::Lines { mut frame, first } => {
+                frame.volume = frame.volume.saturating_add(self.first);
+                let went = self.lines(&frame, Some(first), at);
+                if let (Ok(Step::Went), Some(now)) = (&went, &self.now) {
+                    let (whole, lines) = (now.renderer.frame_bytes(), now.renderer.scene().frame_size()[1] as usize);
+                    self.cine.lines(frame, first * (whole / lines), whole);
+                }
+                return went;
+            }
             Event::Fault(fault) => return Ok(Step::Fault(fault)),
             Event::End(why) => {
                 self.now.iter_mut().for_each(|now| now.turns.end());
@@ -169,8 +241,12 @@ impl Stream {
         }
     }
 
-    /// Makes everything for a geometry.
+    /// Makes everything for a geometry. Where it is the one of before, what was kept stays, and what was shown comes again.
     fn make(&mut self, header: Header) -> Result<(), StreamError> {
+        let is_same = self.header.as_ref() == Some(&header);
+        let (asked, now) = (self.replay.take().map(|replay| replay.kept.volume), self.now.as_ref());
+        let shown = asked.or_else(|| now.and_then(Now::seen));
+        let shown = shown.or_else(|| self.cine.kept().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
         // Gone before the new one comes: both may not fit the device.
         if let Some(Now { turns, .. }) = self.now.take() {
@@ -178,9 +254,18 @@ impl Stream {
         }
         let views = Views::new(&header, &self.settings, self.options.update)?;
         let slices = views.first().slices() as usize;
+        if !is_same || !self.cine.is_of(slices) {
+            self.cine = Cine::new(self.options.cine, slices);
+        }
+        self.cine.cut();
         let mut turns = Turns::new(self.options.update, self.options.images, slices);
-        let options =
-            gpu::Options { volume_images: turns.images(), queues: self.options.queues, ..gpu::Options::default() };
+        let options = gpu::Options {
+            volume_images: turns.images(),
+            queues: self.options.queues,
+            readback: self.options.readback,
+            wake: self.options.wake.clone(),
+            ..gpu::Options::default()
+        };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
         if let Some(before) = self.before.take() {
             turns.go_on_from(before);
@@ -192,7 +277,13 @@ impl Stream {
             renderer,
             turns,
             drawing: None,
-            changed: false,
+            begun: Instant::now(),
+            next: None,
+            waits: false,
+            fault: None,
+            prepares: self.options.wake.is_some(),
+            lost: shown,
+            anew: false,
             redraw: false,
             volume: None,
             behind: 0,
@@ -218,7 +309,7 @@ impl Stream {
         let first = first.unwrap_or(0) as u32;
         let went = match wrong {
             Some(wrong) => Err(wrong),
-            None => match now.turns.place(frame.volume, || feed.is_behind(frame.volume)) {
+            None => match now.turns.place(frame.volume, || feed.is_behind(frame.volume - self.first)) {
                 Some(image) => {
                     now.renderer.lines(slice, first, &frame.bytes, image).map(|whole| whole.then_some(image))
                 }
@@ -228,6 +319,7 @@ impl Stream {
         match went {
             Ok(Some(image)) => {
                 now.came(image, frame.volume, at);
+                self.newest = self.newest.max(Some(frame.volume));
                 now.turns.arrived(frame.slice, frame.backward);
                 Ok(Step::Went)
             }
@@ -246,56 +338,9 @@ impl Stream {
     /// Settings that cannot be drawn: those before stay.
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
         if let (Some(now), Some(header)) = (&mut self.now, &self.header) {
-            now.views = Views::new(header, &settings, self.options.update)?;
-            now.changed = true;
+            now.next = Some(Views::new(header, &settings, self.options.update)?);
         }
         self.settings = settings;
         Ok(())
-    }
-
-    /// Of the whole stream; latencies and passes since they were taken last.
-    pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
-        self.statistics.time = self.began.elapsed();
-        self.statistics.lost = self.feed.lost();
-        self.statistics.passes = self.now.as_mut().map_or(Vec::new(), |now| now.renderer.times_so_far());
-        self.statistics.volumes = self.turns().map_or(Counts::default(), Turns::counts);
-        Ok(self.statistics.clone())
-    }
-
-    /// What happened since this was asked last.
-    pub fn take_statistics(&mut self) -> Result<Statistics, StreamError> {
-        let now = self.statistics()?;
-        let since = now.since(&self.taken);
-        self.statistics.latency.reset();
-        self.taken = now;
-        Ok(since)
-    }
-
-    /// Volumes that were shown so far.
-    pub fn volumes_shown(&self) -> u64 {
-        self.turns().map_or(0, |turns| turns.counts().shown)
-    }
-
-    fn turns(&self) -> Option<&Turns> {
-        self.now.as_ref().map(|now| &now.turns).or(self.before.as_ref())
-    }
-
-    /// What could not be recorded, frames as a rule.
-    pub fn unrecorded(&self) -> u64 {
-        self.feed.unrecorded()
-    }
-
-    /// The time that sound needs for a volume, s; none before the first frame and of what is not swept.
-    pub fn acquisition_time(&self) -> Option<f64> {
-        self.now.as_ref()?.views.first().probe().map(|p| p.acquisition_time())
-    }
-
-    pub fn scene(&self) -> Option<&Scene> {
-        self.now.as_ref().map(|now| now.renderer.scene())
-    }
-
-    /// For looking at what is there.
-    pub fn renderer(&mut self) -> Option<&mut Renderer> {
-        self.now.as_mut().map(|now| &mut now.renderer)
     }
 }

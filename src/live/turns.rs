@@ -44,6 +44,10 @@ pub struct Turns {
     backward: Vec<Vec<bool>>,
     filling: Option<Filling>,
     ready: Option<Ready>,
+    /// What waits to be shown was counted before.
+    is_again: bool,
+    /// The image that a volume is being sent into once more.
+    again: Option<u32>,
     shown: Option<u32>,
     /// The newest volume that is over, whatever became of it.
     over: Option<u32>,
@@ -68,6 +72,8 @@ impl Turns {
             backward: vec![vec![false; slices]; images as usize],
             filling: None,
             ready: None,
+            is_again: false,
+            again: None,
             shown: None,
             over: None,
             counts: Counts::default(),
@@ -77,13 +83,23 @@ impl Turns {
     /// What the images hold is gone: nothing of it will be shown.
     pub fn forget(&mut self) {
         self.end();
-        self.counts.dropped += u64::from(self.is_waiting());
-        (self.ready, self.shown) = (None, None);
+        self.counts.dropped += u64::from(self.is_waiting() && !self.is_again);
+        (self.ready, self.shown, self.again) = (None, None, None);
     }
 
     /// Whether a whole volume waits to be shown.
     pub fn is_waiting(&self) -> bool {
         self.update == Update::Whole && self.ready.is_some()
+    }
+
+    /// The volume that waits to be shown; rolling: the newest that something waits of.
+    pub fn waiting(&self) -> Option<u32> {
+        self.ready.as_ref().map(|ready| ready.volume)
+    }
+
+    /// Whether there is anything new to show.
+    pub fn has_new(&self) -> bool {
+        self.ready.is_some()
     }
 
     pub fn is_rolling(&self) -> bool {
@@ -99,6 +115,38 @@ impl Turns {
     pub fn go_on_from(&mut self, mut before: Turns) {
         before.forget();
         (self.counts, self.over) = (before.counts, before.over);
+    }
+
+    /// Another source, which numbers its volumes anew.
+    pub fn begin_anew(&mut self) {
+        self.end();
+        self.over = None;
+    }
+
+    /// An image for a volume that is sent once more, out of turn: none that is shown or being filled. A volume that waits to be shown
+    /// gives way where there is no other. None where all are taken.
+    pub fn spare(&mut self) -> Option<u32> {
+        if self.is_rolling() {
+            return Some(0);
+        }
+        let filling = self.filling.as_ref().and_then(|f| f.image);
+        let ready = self.ready.as_ref().map(|r| r.image);
+        self.again = (0..self.images()).find(|image| ![self.shown, filling, ready].contains(&Some(*image)));
+        if self.again.is_none()
+            && let Some(gone) = self.ready.take()
+        {
+            self.counts.dropped += u64::from(!self.is_again);
+            self.again = Some(gone.image);
+        }
+        self.again
+    }
+
+    /// A volume that was sent once more is whole in the image that [`Turns::spare`] gave: it is shown next.
+    pub fn put(&mut self, image: u32, volume: u32, backward: Vec<bool>) {
+        self.backward[image as usize].clone_from(&backward);
+        let before = self.ready.replace(Ready { image, volume, backward });
+        self.counts.dropped += u64::from(!self.is_rolling() && before.is_some() && !self.is_again);
+        (self.again, self.is_again) = (None, true);
     }
 
     pub fn counts(&self) -> Counts {
@@ -124,7 +172,8 @@ impl Turns {
     /// A newer volume: the one before it is over, whole or not.
     fn begin(&mut self, volume: u32, stale: bool) {
         self.end();
-        let taken = |image: &u32| self.shown == Some(*image) || self.ready.as_ref().is_some_and(|r| r.image == *image);
+        let ready = self.ready.as_ref().map(|r| r.image);
+        let taken = |image: &u32| [self.shown, self.again, ready].contains(&Some(*image));
         let free = match self.update {
             Update::Whole => (0..self.images()).find(|image| !taken(image)),
             Update::Rolling => Some(0),
@@ -154,7 +203,8 @@ impl Turns {
         let (whole, volume) = (filling.missing == 0, filling.volume);
         if whole || self.update == Update::Rolling {
             let before = self.ready.replace(Ready { image, volume, backward: directions.clone() });
-            self.counts.dropped += u64::from(self.update == Update::Whole && before.is_some());
+            self.counts.dropped += u64::from(self.update == Update::Whole && before.is_some() && !self.is_again);
+            self.is_again = false;
         }
         if whole {
             self.filling = None;
@@ -169,7 +219,7 @@ impl Turns {
     pub fn take(&mut self) -> Option<Ready> {
         let ready = self.ready.take()?;
         self.shown = Some(ready.image);
-        self.counts.shown += u64::from(self.update == Update::Whole);
+        self.counts.shown += u64::from(self.update == Update::Whole && !self.is_again);
         Some(ready)
     }
 }
@@ -278,5 +328,42 @@ mod tests {
         (0..4).for_each(|slice| model.frame(3, slice));
         assert_eq!(model.draw().map(|r| r.volume), Some(3));
         assert_eq!(model.turns.counts(), Counts { shown: 3, dropped: 1, incomplete: 0, left_out: 4 });
+    }
+
+    #[test]
+    fn a_volume_sent_once_more_takes_an_image_that_nothing_else_uses_and_counts_once() {
+        let mut turns = Turns::new(Update::Whole, 3, 2);
+        let fill = |turns: &mut Turns, volume: u32| {
+            let image = turns.place(volume, || false);
+            (0..2).for_each(|slice| {
+                turns.arrived(slice, false);
+            });
+            image
+        };
+        fill(&mut turns, 0);
+        let shown = turns.take().expect("whole").image;
+        let again = turns.spare().expect("free");
+        assert_ne!(again, shown);
+        // While it is being sent another volume comes: into the third image.
+        let third = turns.place(1, || false).expect("free");
+        assert!(third != again && third != shown);
+        turns.put(again, 0, vec![true; 2]);
+        assert_eq!(turns.take(), Some(Ready { image: again, volume: 0, backward: vec![true; 2] }));
+        assert_eq!(turns.counts(), Counts { shown: 1, ..Counts::default() });
+        (0..2).for_each(|slice| {
+            turns.arrived(slice, false);
+        });
+        assert_eq!(turns.take().map(|r| r.volume), Some(1));
+        assert_eq!(turns.counts(), Counts { shown: 2, ..Counts::default() });
+    }
+
+    #[test]
+    fn another_source_may_count_from_nought_again() {
+        let mut turns = Turns::new(Update::Whole, 3, 1);
+        turns.place(7, || false);
+        turns.arrived(0, false);
+        assert_eq!(turns.place(0, || false), None);
+        turns.begin_anew();
+        assert!(turns.place(0, || false).is_some());
     }
 }

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Longest scene file, bytes.
+/// Longest file of settings, bytes.
 const LONGEST: u64 = 1 << 20;
 
 /// Settings that suit a kind of picture, as TOML.
@@ -33,6 +33,11 @@ pub enum LoadError {
 pub struct Layers(Table);
 
 impl Layers {
+    /// One layer of settings that are there already; none where they cannot be written as TOML.
+    pub fn of(settings: &Settings) -> Option<Layers> {
+        Table::try_from(settings).ok().map(Layers)
+    }
+
     pub fn preset(&mut self, name: &str) -> Result<(), LoadError> {
         let (_, text) =
             PRESETS.iter().find(|p| p.0 == name).ok_or_else(|| LoadError::UnknownPreset { name: name.to_string() })?;
@@ -40,8 +45,13 @@ impl Layers {
     }
 
     pub fn file(&mut self, path: &Path) -> Result<(), LoadError> {
-        let text = read(path)?;
+        let text = read(path, "scene")?;
         self.add(&path.display().to_string(), &text, path.parent())
+    }
+
+    /// A table that holds what a scene file does; `layer` is what messages call it, `folder` where the files lie that it names.
+    pub fn table(&mut self, layer: &str, table: Table, folder: &Path) -> Result<(), LoadError> {
+        self.merge_checked(layer, table, Some(folder))
     }
 
     /// One `key.path=value` of `--set`; the value is TOML, or a plain word.
@@ -121,8 +131,8 @@ impl Layers {
     }
 }
 
-/// A small text file, whole.
-fn read(path: &Path) -> Result<String, LoadError> {
+/// A small text file, whole. `what` it is: said of one that is too long.
+pub(crate) fn read(path: &Path, what: &str) -> Result<String, LoadError> {
     let fault = |fault: String| LoadError::File { path: path.display().to_string(), fault };
     let unreadable = |e: std::io::Error| fault(format!("cannot be read: {e}"));
     // A pipe would be waited for.
@@ -133,13 +143,13 @@ fn read(path: &Path) -> Result<String, LoadError> {
     let file = std::fs::File::open(path).map_err(unreadable)?;
     file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
     match text.len() as u64 > LONGEST {
-        true => Err(fault("is longer than 1 MiB, which no scene is".into())),
+        true => Err(fault(format!("is longer than 1 MiB, which no {what} is"))),
         false => Ok(text),
     }
 }
 
 /// The file that a layer names as its transfer function.
-fn transfer_file(table: &Table) -> Option<String> {
+pub(crate) fn transfer_file(table: &Table) -> Option<String> {
     let name = table.get("volume")?.get("transfer")?.as_str()?;
     name.ends_with(".toml").then(|| name.to_string())
 }
@@ -151,7 +161,7 @@ fn points(path: &Path) -> Result<Value, LoadError> {
     struct Listed {
         points: Vec<TransferPoint>,
     }
-    let text = read(path)?;
+    let text = read(path, "transfer function")?;
     let fault = |e: &dyn std::fmt::Display| LoadError::File { path: path.display().to_string(), fault: e.to_string() };
     let listed = toml::from_str::<Listed>(&text).map_err(|e| fault(&one_line(&e, &text)))?;
     Value::try_from(listed.points).map_err(|e| fault(&e))
@@ -169,18 +179,23 @@ fn merge(under: &mut Table, over: Table) {
 }
 
 fn one_line(error: &toml::de::Error, text: &str) -> String {
-    let before = error.span().and_then(|span| text.get(..span.start));
-    let place = before.map_or(String::new(), |b| format!("line {}: ", b.matches('\n').count() + 1));
-    // A key that is named may hold anything.
-    let message = error.message().lines().collect::<Vec<_>>().join(" ");
-    message.chars().fold(place, |mut line, c| {
-        if c.is_control() {
-            line.extend(c.escape_default())
-        } else {
-            line.push(c)
-        }
-        line
-    })
+    let span = error.span().filter(|_| !text.is_empty());
+    let place = span.map_or(String::new(), |span| format!("line {}: ", line_of(text, span.start)));
+    place + &plain(error.message())
+}
+
+/// The line in which a byte of a text lies, from 1.
+pub(crate) fn line_of(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
+}
+
+/// A message on one line: a key that it names may hold anything.
+pub(crate) fn plain(message: &str) -> String {
+    let mut line = String::new();
+    for c in message.lines().collect::<Vec<_>>().join(" ").chars() {
+        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
 }
 
 #[cfg(test)]

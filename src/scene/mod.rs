@@ -102,6 +102,17 @@ pub(crate) fn refuse<T>(field: &'static str, fault: impl Into<String>) -> Result
     Err(SceneError { field, fault: fault.into() })
 }
 
+impl Settings {
+    /// What can be told before there is anything to render.
+    ///
+    /// # Errors
+    /// Names the first setting that no geometry could be drawn with, and its limits.
+    pub fn check(&self) -> Result<(), SceneError> {
+        check::check(self)?;
+        check_planes::check(self)
+    }
+}
+
 impl Scene {
     /// Checks the settings against the geometry and resolves them.
     ///
@@ -116,8 +127,7 @@ impl Scene {
                 grid.check().map_err(|e| SceneError { field: e.field, fault: e.fault })?;
             }
         }
-        check::check(&settings)?;
-        check_planes::check(&settings)?;
+        settings.check()?;
         check::check_conditioning(&settings.conditioning, &geometry)?;
         let [low, high] = input.range;
         if !(low.is_finite() && high.is_finite() && low < high) {

@@ -191,10 +191,12 @@ fn touched(scene: &Scene, look: &Look) -> Option<Seen> {
     let size = scene.volume_size();
     let texel = |index: f64, axis: usize| index.floor().clamp(0.0, f64::from(size[axis] - 1)) as u32;
     let spans = [column, row, slice];
-    Some(Seen {
+    let seen = Seen {
         low: std::array::from_fn(|a| texel(spans[a].0 - SLACK, a)),
         high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0, a) + 1),
-    })
+    };
+    // The sector may leave nothing of what lies within its bounds.
+    Some(seen).filter(|seen| !seen.is_empty())
 }
 
 /// In-plane x and y and slice positions of a convex solid that has these corners.
@@ -268,4 +270,34 @@ fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
         }
     }
     corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Advance, Axis};
+    use crate::scene::{Input, Settings};
+    use crate::source::StoredType;
+
+    #[test]
+    fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
+        let probe = Probe {
+            array: Array::Curved { radius: 20.0 },
+            lines: Axis::centred(0.05, 24),
+            start_depth: 2.0,
+            sample_pitch: 0.8,
+            samples: 64,
+            motion: Motion::Fan { wobble_radius: 12.0 },
+            slices: Axis::centred(0.06, 9),
+            advance: Advance::None,
+            sound_speed: 1540.0,
+        };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        for side in [[30.0, 38.0], [-38.0, -30.0]] {
+            let settings = format!("mode = 'mip'\nregion = {{ lateral = {side:?}, depth = [2, 6] }}");
+            let settings: Settings = toml::from_str(&settings).expect("settings");
+            let scene = Scene::new(Geometry::Sweep(probe.clone()), input, settings).expect("scene");
+            assert_eq!((scene.seen, scene.share_seen(), scene.frames_seen()), (Seen::default(), 0.0, 0..0));
+        }
+    }
 }

@@ -2,8 +2,12 @@
 
 mod budget;
 mod common;
+mod direct;
 mod frames;
+mod service;
 mod stream;
+mod support_bundle;
+mod view;
 
 use common::*;
 use std::collections::BTreeSet;
@@ -19,9 +23,13 @@ fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help
         assert_eq!((code, out.as_str()), (Some(2), ""), "{arguments:?}: {err}");
         assert!(err.contains("--help") && !err.contains("panicked"), "{arguments:?}: {err}");
     }
-    for (command, named) in
-        [("render", "--explain"), ("phantom", "--seed"), ("info", "--probe"), ("devices", "--verbose")]
-    {
+    for (command, named) in [
+        ("render", "--explain"),
+        ("phantom", "--seed"),
+        ("info", "--probe"),
+        ("devices", "--verbose"),
+        ("support-bundle", "--config"),
+    ] {
         assert!(done(&["--help"]).contains(command) && done(&[command, "--help"]).contains(named), "{command}");
     }
 }

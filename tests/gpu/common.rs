@@ -20,9 +20,14 @@ pub struct Device {
 
 impl Device {
     pub fn new() -> Device {
+        Device::watched(true)
+    }
+
+    /// Without validation where not watched: its layers keep something of all that was ever made.
+    pub fn watched(validation: bool) -> Device {
         // ECHOLUME_DEVICE picks another device than the first that fits.
         let device = std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().unwrap());
-        let context = Context::new(&ContextOptions { device, validation: true }).expect("a Vulkan device");
+        let context = Context::new(&ContextOptions { device, validation }).expect("a Vulkan device");
         Device { context, provoked: false }
     }
 

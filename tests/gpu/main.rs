@@ -3,6 +3,7 @@
 
 mod common;
 mod conditioning;
+mod console;
 mod cube;
 mod detector;
 mod diffusion;
@@ -18,6 +19,7 @@ mod leaping;
 mod led_astray;
 mod live;
 mod live_amiss;
+mod live_kept;
 mod modes;
 mod motion;
 mod passes;

@@ -9,6 +9,27 @@ impl Renderer {
             != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.seen)
     }
 
+    /// Whether nothing can be drawn until a change succeeds.
+    pub fn is_broken(&self) -> bool {
+        self.broken.is_some()
+    }
+
+    /// Whether a change to this scene would find every pipeline made; those that are not are made from now on, beside the drawing, and
+    /// [`Options::wake`] is called.
+    ///
+    /// # Errors
+    /// A shader that does not compile, a slot that the device cannot hold.
+    pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
+        let scene = super::super::formats::suited(&self.context, self.fetch, scene.clone());
+        let plan = Plan::new(&scene);
+        super::super::formats::check(&self.context, &plan, &scene)?;
+        let beside = match &mut self.beside {
+            Some(beside) => beside,
+            None => self.beside.insert(Beside::new(&self.pipelines, self.wake.clone())?),
+        };
+        beside.prepare(&self.pipelines, &plan, &scene)
+    }
+
     /// Takes a new scene. What it changes is run with the next picture; when it says `Everything` or `Frames`, frames have to
     /// be sent again first.
     ///
@@ -22,12 +43,13 @@ impl Renderer {
         let before = Scene { seen: self.filtered, ..self.scene.clone() };
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         super::super::formats::check(&self.context, &plan, &scene)?;
-        let steps = pipelines_of(&mut self.pipelines, &plan, &scene)?;
+        let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
         // Frames that are on their way use nothing that a change of pictures alone touches: only the picture is waited for.
         let touched =
             |slots: &[Slot]| plan.steps_of(When::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)));
+        self.wait_presented()?;
         match &rerun {
-            Rerun::Steps { slots, .. } if !touched(slots) => self.drawn()?,
+            Rerun::Steps { slots, .. } if !touched(slots) => self.wait_drawn()?,
             _ => self.collect()?,
         }
         let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
@@ -68,8 +90,8 @@ impl Renderer {
         for slot in refilled {
             self.fill(slot)?;
         }
-        if self.readback.size != Slot::Screen.bytes(&self.scene) {
-            self.readback = readback(&self.context, &self.scene)?;
+        if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(&self.scene)) {
+            self.readback = Some(readback(&self.context, &self.scene)?);
         }
         Ok(())
     }

@@ -23,7 +23,7 @@ impl Renderer {
     pub fn begin_picture(&mut self) -> Result<(), GpuError> {
         self.check(self.shown)?;
         if self.drawing {
-            self.drawn()?;
+            self.wait_drawn()?;
         }
         match self.stale.iter().any(|stale| *stale) {
             true => self.draw(),
@@ -36,15 +36,37 @@ impl Renderer {
         Ok(self.drawing && !self.picture.is_done(&self.timelines)?)
     }
 
-    /// Waits for the picture that is on its way; the last one, where there is none.
+    /// Whether there is a picture of this size, done or on its way.
+    pub fn has_drawn(&self) -> bool {
+        self.drawn
+    }
+
+    /// Waits for the picture that is on its way; the last one, where there is none. Where pictures stay on the device this one is brought
+    /// back now.
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
-        self.drawn()?;
+        self.wait_drawn()?;
         let [width, height] = self.scene.picture_size();
-        Ok(Picture { width, height, rgba: self.readback.bytes().to_vec() })
+        let rgba = match &self.readback {
+            Some(buffer) => buffer.bytes().to_vec(),
+            None => self.bring_back(Slot::Screen)?.map_or(Vec::new(), |(buffer, ..)| buffer.bytes().to_vec()),
+        };
+        Ok(Picture { width, height, rgba })
+    }
+
+    /// The same without bringing it back, where pictures stay on the device.
+    pub fn end_drawing(&mut self) -> Result<Option<Picture>, GpuError> {
+        match self.readback.is_some() {
+            true => self.end_picture().map(Some),
+            false => {
+                self.wait_drawn()?;
+                // Whoever watches wants the times of what is shown, not of what was shown before.
+                self.picture.collect(&self.timelines, &mut self.measured).map(|()| None)
+            }
+        }
     }
 
     /// Waits for the picture that is on its way.
-    pub(super) fn drawn(&mut self) -> Result<(), GpuError> {
+    pub(super) fn wait_drawn(&mut self) -> Result<(), GpuError> {
         if !self.drawing {
             return Ok(());
         }
@@ -86,13 +108,13 @@ impl Renderer {
             // Taken as written from here on: if the submission fails, all of it is stale still.
             self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
         }
-        if let Some(screen) = self.slots.image(Slot::Screen, 0) {
-            self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, &self.readback);
+        if let (Some(screen), Some(readback)) = (self.slots.image(Slot::Screen, 0), &self.readback) {
+            self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, readback);
             self.picture.stamp("readback");
         }
         let (picture, order, timelines) = (&mut self.picture, &mut self.order, &mut self.timelines);
         self.measured.host("submit", || picture.submit(order, timelines))?;
-        self.drawing = true;
+        (self.drawing, self.drawn) = (true, true);
         // A frame that arrives from here on is seen the next time, and so is one whose volume was not shown.
         if self.plan.steps_of(When::Volume).all(|(i, _)| self.stale[i]) {
             self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);

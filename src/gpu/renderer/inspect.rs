@@ -5,6 +5,12 @@ use super::*;
 impl Renderer {
     /// A slot's content now; none for a slot that the plan does not have, or one made by the CPU as a table.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
+        let there = self.bring_back(slot)?;
+        Ok(there.map(|(buffer, size, format)| Texels::decode(size, format, buffer.bytes())))
+    }
+
+    /// A slot's bytes now, its texels along each axis, and their format.
+    pub(super) fn bring_back(&mut self, slot: Slot) -> Result<Option<(Buffer, [usize; 3], Format)>, GpuError> {
         self.check(self.shown)?;
         self.flush()?;
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
@@ -21,7 +27,7 @@ impl Renderer {
             self.uploads.push(buffer);
             return done.map(|()| None);
         }
-        Ok(Some(Texels::decode(size, format, buffer.bytes())))
+        Ok(Some((buffer, size, format)))
     }
 
     /// Times of every pass since the last call, and of what was copied. Empty where the device has no time stamps.

@@ -89,7 +89,8 @@ pub fn shown(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: 
     [colour[0], colour[1], colour[2], 1.0]
 }
 
-fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
+/// A colour after brightness, contrast, gamma and the colour map.
+pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
     let post = &scene.settings.post;
     let toned = colour.map(|c| {
         let c = (c - 0.5) * post.contrast + 0.5 + post.brightness;

@@ -4,6 +4,7 @@
 //! `tests/fuzz` runs them with mutated seeds, `tools/fuzz` under libFuzzer.
 
 mod files;
+mod kiosk;
 mod motor;
 mod network;
 mod scenes;
@@ -82,6 +83,15 @@ pub const TARGETS: &[Target] = &[
     },
     Target { name: "set", run: scenes::assignments, text: true, memory: 64 * MIB, rounds: 4_000, also: &[] },
     Target { name: "transfer", run: scenes::transfer_file, text: true, memory: 64 * MIB, rounds: 100_000, also: &[] },
+    Target {
+        name: "configuration",
+        run: kiosk::configuration,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 30_000,
+        also: &["tools/kiosk/echolume.toml"],
+    },
+    Target { name: "redacted", run: kiosk::redacted, text: true, memory: 64 * MIB, rounds: 60_000, also: &[] },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },
 ];
 

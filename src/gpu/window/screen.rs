@@ -1,0 +1,352 @@
+//! The picture and the panels, onto the next image of the window. One such drawing is on its way at a time: it is a copy and a few
+//! triangles, and takes no time beside a picture.
+
+use super::overlay::{Overlay, Panels};
+use super::stages::{Stage, barrier, region};
+use super::swapchain::{Pace, Swapchain};
+use super::target::Target;
+use crate::barriers::{Access, Worker};
+use crate::gpu::error::Doing;
+use crate::gpu::order::Order;
+use crate::gpu::resources::{Image, WHOLE};
+use crate::gpu::timeline::Timelines;
+use crate::gpu::{Context, GpuError};
+use crate::passes::Slot;
+use ash::vk;
+use std::sync::Arc;
+
+/// How long an image of the window is waited for, ns: what is covered or unplugged may give none.
+const PATIENCE: u64 = 100_000_000;
+/// What surrounds the picture: the panels' background.
+const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
+
+/// What became of showing something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    Shown,
+    /// There is nothing to show it on now: the window is minimised, covered, or its monitor is gone.
+    Nowhere,
+}
+
+/// The picture that a renderer holds, and what orders it before and after what that renderer does.
+pub(in crate::gpu) struct Drawn<'a> {
+    pub image: &'a Image,
+    pub order: &'a mut Order,
+    pub timelines: &'a mut Timelines,
+    /// Its upper left corner on the window, pixels.
+    pub at: [u32; 2],
+}
+
+/// A window or monitor that is drawn on.
+pub struct Screen {
+    // Dropped in this order, after `drop` has waited for the device.
+    overlay: Option<Overlay>,
+    chain: Swapchain,
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    /// Signalled when the image that was acquired may be written.
+    free: vk::Semaphore,
+    /// Signalled when the last drawing is done.
+    done: vk::Fence,
+    context: Arc<Context>,
+    /// The swapchain does not fit the surface any more.
+    stale: bool,
+    /// The surface itself is gone.
+    lost: bool,
+    /// An image was acquired and never shown: its semaphore is of no use any more.
+    spoilt: bool,
+    wanted: [u32; 2],
+    shown: u64,
+}
+
+impl Screen {
+    /// `size`: of the window, pixels; a monitor has its own.
+    ///
+    /// # Errors
+    /// A target that the device cannot show anything on.
+    pub fn new(context: &Arc<Context>, target: Target, size: [u32; 2], pace: Pace) -> Result<Screen, GpuError> {
+        let chain = Swapchain::new(context, target, pace)?;
+        let device = &context.device;
+        let mut screen = Screen {
+            overlay: None,
+            chain,
+            pool: vk::CommandPool::null(),
+            commands: vk::CommandBuffer::null(),
+            free: vk::Semaphore::null(),
+            done: vk::Fence::null(),
+            context: context.clone(),
+            stale: true,
+            lost: false,
+            spoilt: false,
+            wanted: size,
+            shown: 0,
+        };
+        let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(0).family);
+        // SAFETY: the create structures are complete; a failure drops `screen`, which frees what is made (null is allowed).
+        unsafe {
+            screen.pool = device.create_command_pool(&create, None).doing(|| "create commands".into())?;
+            let allocate = vk::CommandBufferAllocateInfo::default().command_pool(screen.pool).command_buffer_count(1);
+            screen.commands = device.allocate_command_buffers(&allocate).doing(|| "create commands".into())?[0];
+            let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
+            screen.done = device.create_fence(&signalled, None).doing(|| "create a fence".into())?;
+            screen.free = device.create_semaphore(&Default::default(), None).doing(|| "create a semaphore".into())?;
+        }
+        context.name(screen.commands, "window");
+        Ok(screen)
+    }
+
+    /// Pixels; of the last image that was shown.
+    pub fn size(&self) -> [u32; 2] {
+        self.chain.size
+    }
+
+    /// The window has this size from here on, pixels.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        self.stale |= size != self.wanted || size != self.chain.size;
+        self.wanted = size;
+    }
+
+    /// How often something was shown.
+    pub fn shown(&self) -> u64 {
+        self.shown
+    }
+
+    /// Shows panels alone: there is no picture yet.
+    ///
+    /// # Errors
+    /// A device that fails; a surface that is lost and cannot be had anew.
+    pub fn show(&mut self, panels: Option<Panels>) -> Result<Seen, GpuError> {
+        self.show_with(None, panels)
+    }
+
+    pub(in crate::gpu) fn show_with(
+        &mut self,
+        mut drawn: Option<Drawn>,
+        mut panels: Option<Panels>,
+    ) -> Result<Seen, GpuError> {
+        self.wait()?;
+        if let Some(panels) = &mut panels {
+            if self.overlay.is_none() {
+                self.overlay = Some(Overlay::new(&self.context, self.chain.format)?);
+            }
+            // Also where nothing will be shown: they are told once.
+            if let Some(overlay) = &mut self.overlay {
+                overlay.take_textures(std::mem::take(&mut panels.textures))?;
+            }
+        }
+        // Once more where the first image says that it does not fit.
+        for _ in 0..2 {
+            if !self.fit()? {
+                return Ok(Seen::Nowhere);
+            }
+            match self.chain.acquire(PATIENCE, self.free) {
+                Ok(image) => {
+                    self.spoilt = true;
+                    self.draw(image, drawn.as_mut(), panels.as_ref())?;
+                    self.spoilt = false;
+                    return self.present(image);
+                }
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Seen::Nowhere),
+                Err(result) => self.note(result)?,
+            }
+        }
+        Ok(Seen::Nowhere)
+    }
+
+    /// What a call about the surface said: what can be mended is mended before the next one.
+    fn note(&mut self, result: vk::Result) -> Result<(), GpuError> {
+        match result {
+            vk::Result::ERROR_OUT_OF_DATE_KHR => self.stale = true,
+            vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
+                (self.lost, self.stale) = (true, true);
+            }
+            result => return Err(GpuError::Vulkan { doing: "show a picture".into(), result }),
+        }
+        Ok(())
+    }
+
+    fn present(&mut self, image: u32) -> Result<Seen, GpuError> {
+        match self.chain.present(image) {
+            Ok(unfit) => self.stale |= unfit,
+            Err(result) => {
+                self.note(result)?;
+                return Ok(Seen::Nowhere);
+            }
+        }
+        self.shown += 1;
+        Ok(Seen::Shown)
+    }
+
+    /// Waits for the last drawing.
+    fn wait(&self) -> Result<(), GpuError> {
+        // SAFETY: the fence is alive; it is signalled or a submission that signals it is on its way.
+        unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
+            .doing(|| "draw on the window".into())
+    }
+
+    /// Images that fit the surface; false where there is nothing to show on.
+    fn fit(&mut self) -> Result<bool, GpuError> {
+        if self.lost {
+            self.chain.renew_surface()?;
+            // Another surface may take another format.
+            self.overlay = None;
+            self.lost = false;
+            return Ok(false);
+        }
+        if !(self.stale || self.spoilt) {
+            return Ok(true);
+        }
+        self.context.wait_idle();
+        if self.spoilt {
+            // SAFETY: the device is idle.
+            unsafe {
+                self.context.device.destroy_semaphore(self.free, None);
+                self.free = vk::Semaphore::null();
+                let made = self.context.device.create_semaphore(&Default::default(), None);
+                self.free = made.doing(|| "create a semaphore".into())?;
+            }
+            self.spoilt = false;
+        }
+        match self.chain.fit(self.wanted) {
+            Ok(fits) => {
+                self.stale = !fits;
+                Ok(fits)
+            }
+            Err(GpuError::Vulkan { result, .. }) if result == vk::Result::ERROR_SURFACE_LOST_KHR => {
+                self.lost = true;
+                Ok(false)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn draw(&mut self, image: u32, drawn: Option<&mut Drawn>, panels: Option<&Panels>) -> Result<(), GpuError> {
+        let (device, commands, size) = (self.context.device.clone(), self.commands, self.chain.size);
+        let (target, view, after) = {
+            let shown = &self.chain.images[image as usize];
+            (shown.handle, shown.view, shown.drawn)
+        };
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the last drawing is done, so the pool's only command buffer is free.
+        unsafe {
+            device
+                .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
+                .and_then(|()| device.begin_command_buffer(commands, &begin))
+        }
+        .doing(|| "record the window".into())?;
+        let mut at = Stage::Acquired;
+        let mut go = |to: Stage| {
+            barrier(&device, commands, target, at, to);
+            at = to;
+        };
+        go(Stage::Copied);
+        let mut queued = None;
+        let region = drawn.as_ref().map(|drawn| region(drawn.image, drawn.at, size));
+        if region.is_none_or(|(_, [w, h])| [w, h] != size) {
+            let colour = vk::ClearColorValue { float32: BACKGROUND };
+            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            // SAFETY: the image is in this layout since the barrier above.
+            unsafe { device.cmd_clear_color_image(commands, target, layout, &colour, &[WHOLE]) };
+            go(Stage::Copied);
+        }
+        if let (Some(drawn), Some((region, [w, h]))) = (drawn, region) {
+            let queues = &mut drawn.order.queues;
+            queues.begin(0);
+            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, Worker::Copy);
+            drawn.order.before(&self.context, 0, commands, &[read]);
+            if w > 0 && h > 0 {
+                // Of the same size: no value changes, only the order of the channels.
+                // SAFETY: both images are alive and in these layouts; the region lies in both.
+                unsafe {
+                    device.cmd_blit_image(
+                        commands,
+                        drawn.image.handle,
+                        vk::ImageLayout::GENERAL,
+                        target,
+                        vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+                        &[region],
+                        vk::Filter::NEAREST,
+                    );
+                }
+            }
+            queued = Some((&mut *drawn.order, &mut *drawn.timelines));
+        }
+        if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
+            go(Stage::Drawn);
+            let area = vk::Rect2D { extent: vk::Extent2D { width: size[0], height: size[1] }, ..Default::default() };
+            let colour = [vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .load_op(vk::AttachmentLoadOp::LOAD)
+                .store_op(vk::AttachmentStoreOp::STORE)];
+            let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&colour);
+            // SAFETY: the view is alive and its image in this layout; what is recorded between is egui's drawing alone.
+            unsafe { device.cmd_begin_rendering(commands, &rendering) };
+            let recorded = overlay.record(commands, size, panels);
+            // SAFETY: ends what was begun above.
+            unsafe { device.cmd_end_rendering(commands) };
+            recorded?;
+        }
+        go(Stage::Shown);
+        // SAFETY: the command buffer is being recorded.
+        unsafe { device.end_command_buffer(commands) }.doing(|| "record the window".into())?;
+        self.submit(after, queued)
+    }
+
+    fn submit(&self, drawn: vk::Semaphore, queued: Option<(&mut Order, &mut Timelines)>) -> Result<(), GpuError> {
+        let everything = vk::PipelineStageFlags2::ALL_COMMANDS;
+        let semaphore = |handle| vk::SemaphoreSubmitInfo::default().semaphore(handle);
+        let mut waits = vec![semaphore(self.free).stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)];
+        let mut signals = vec![semaphore(drawn).stage_mask(everything)];
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
+        let mut after = Vec::new();
+        if let Some((order, timelines)) = &queued {
+            after = order.queues.waits(0);
+            let wait = |w: &crate::queues::Wait| {
+                semaphore(timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
+            };
+            waits.extend(after.iter().map(wait));
+            // What the renderer does later comes after this too.
+            let timeline = timelines.of(0);
+            signals.push(semaphore(timeline.semaphore).value(timeline.submitted + 1).stage_mask(everything));
+        }
+        let submit = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&commands)
+            .signal_semaphore_infos(&signals);
+        // SAFETY: its last submission is done.
+        unsafe { self.context.device.reset_fences(&[self.done]) }.doing(|| "reset a fence".into())?;
+        let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
+        if let Err(error) = sent {
+            // Nothing is on its way that would signal it.
+            self.signal();
+            return Err(error);
+        }
+        if let Some((order, timelines)) = queued {
+            let timeline = timelines.of_mut(0);
+            timeline.submitted += 1;
+            timeline.doing = "window".into();
+            order.queues.submitted(0, &after, timeline.submitted);
+        }
+        Ok(())
+    }
+
+    /// An empty submission that signals the fence; where even that fails the device is lost, and nothing waits.
+    fn signal(&self) {
+        // SAFETY: the fence is not in use.
+        let _ = self.context.on_queue(|queue| unsafe { self.context.device.queue_submit2(queue, &[], self.done) });
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.context.wait_idle();
+        self.overlay = None;
+        // SAFETY: the device is idle; null handles are allowed.
+        unsafe {
+            self.context.device.destroy_command_pool(self.pool, None);
+            self.context.device.destroy_semaphore(self.free, None);
+            self.context.device.destroy_fence(self.done, None);
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! The images that a surface takes in turns.
+
+use super::target::Target;
+use crate::gpu::error::Doing;
+use crate::gpu::{Context, GpuError};
+use ash::vk;
+use std::sync::Arc;
+
+/// When a picture is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// With the next refresh of the monitor, each one: nothing is torn.
+    #[default]
+    Fifo,
+    /// The newest with the next refresh, where the driver has it: less latency, pictures that nobody sees.
+    Mailbox,
+}
+
+impl std::str::FromStr for Pace {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Pace, String> {
+        match text {
+            "fifo" => Ok(Pace::Fifo),
+            "mailbox" => Ok(Pace::Mailbox),
+            _ => Err("must be fifo or mailbox".into()),
+        }
+    }
+}
+
+/// A surface, whose images come and go with its size.
+pub struct Swapchain {
+    context: Arc<Context>,
+    /// Holds the window: the surface must go first.
+    target: Target,
+    surface: vk::SurfaceKHR,
+    handle: vk::SwapchainKHR,
+    pub images: Vec<Shown>,
+    pub format: vk::Format,
+    pub size: [u32; 2],
+    pace: Pace,
+}
+
+/// One of its images.
+pub struct Shown {
+    pub handle: vk::Image,
+    pub view: vk::ImageView,
+    /// Signalled when what is shown next has been drawn.
+    pub drawn: vk::Semaphore,
+}
+
+/// Formats that keep 8-bit values as they are: what a picture holds is what the monitor gets.
+const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
+
+impl Swapchain {
+    /// No images yet: [`Swapchain::fit`] makes them.
+    pub fn new(context: &Arc<Context>, target: Target, pace: Pace) -> Result<Swapchain, GpuError> {
+        let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
+        let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
+        let mut made =
+            Swapchain { context: context.clone(), target, surface, handle, images, format, size: [0; 2], pace };
+        made.format = made.choose_format()?;
+        Ok(made)
+    }
+
+    fn shows(&self) -> Result<&crate::gpu::context::Shows, GpuError> {
+        self.context.shows.as_ref().ok_or_else(|| GpuError::Window("the device was not opened for one".into()))
+    }
+
+    fn choose_format(&self) -> Result<vk::Format, GpuError> {
+        let (device, family) = (self.context.candidate.handle, self.context.queue(0).family);
+        // SAFETY: surface and device belong to this instance; the call only reads.
+        let shows = unsafe { self.shows()?.surfaces.get_physical_device_surface_support(device, family, self.surface) };
+        if shows != Ok(true) {
+            // Nothing else may be asked of such a surface.
+            return Err(GpuError::Window("it is gone, or the device cannot show on it".into()));
+        }
+        // SAFETY: surface and device belong to this instance; the call only reads.
+        let there = unsafe {
+            self.shows()?.surfaces.get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
+        }
+        .doing(|| "list the formats of the surface".into())?;
+        let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
+        let found = FORMATS.into_iter().find(|f| there.iter().any(|t| t.format == *f && is_plain(t)));
+        found.ok_or_else(|| GpuError::Window("the surface takes no 8-bit UNORM images".into()))
+    }
+
+    /// A new surface on the same target: the old one was lost.
+    pub fn renew_surface(&mut self) -> Result<(), GpuError> {
+        self.context.wait_idle();
+        self.destroy();
+        self.surface =
+            self.target.surface(&self.context.entry, &self.context.instance, self.context.candidate.handle)?;
+        self.format = self.choose_format()?;
+        Ok(())
+    }
+
+    /// Images of the surface's size, or of `wanted` where the surface has none of its own; false where there is nothing to show on, as
+    /// with a window that is minimised. Nothing may be in flight.
+    pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
+        let shows = self.shows()?;
+        let device = self.context.candidate.handle;
+        // SAFETY: surface and device belong to this instance; the calls only read.
+        let (can, paces) = unsafe {
+            let can = shows.surfaces.get_physical_device_surface_capabilities(device, self.surface);
+            let paces = shows.surfaces.get_physical_device_surface_present_modes(device, self.surface);
+            (can.doing(|| "ask the surface for its size".into())?, paces.unwrap_or_default())
+        };
+        let (least, most) = (can.min_image_extent, can.max_image_extent);
+        let size = match can.current_extent.width {
+            u32::MAX => vk::Extent2D {
+                width: wanted[0].clamp(least.width, most.width.max(least.width)),
+                height: wanted[1].clamp(least.height, most.height.max(least.height)),
+            },
+            _ => can.current_extent,
+        };
+        if size.width == 0 || size.height == 0 {
+            return Ok(false);
+        }
+        let usage = vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        if !can.supported_usage_flags.contains(usage) {
+            return Err(GpuError::Window("the surface's images cannot be copied into and drawn on".into()));
+        }
+        let pace = match self.pace {
+            Pace::Mailbox if paces.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
+            _ => vk::PresentModeKHR::FIFO,
+        };
+        let alphas = [
+            vk::CompositeAlphaFlagsKHR::OPAQUE,
+            vk::CompositeAlphaFlagsKHR::INHERIT,
+            vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED,
+        ];
+        let alpha = alphas.into_iter().find(|a| can.supported_composite_alpha.contains(*a)).unwrap_or(alphas[0]);
+        let most = if can.max_image_count == 0 { u32::MAX } else { can.max_image_count };
+        let create = vk::SwapchainCreateInfoKHR::default()
+            .surface(self.surface)
+            .min_image_count((can.min_image_count + 1).min(most))
+            .image_format(self.format)
+            .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
+            .image_extent(size)
+            .image_array_layers(1)
+            .image_usage(usage)
+            .pre_transform(can.current_transform)
+            .composite_alpha(alpha)
+            .present_mode(pace)
+            .clipped(true)
+            .old_swapchain(self.handle);
+        // SAFETY: the create structure is complete; nothing of the old one is in flight, and it is destroyed below.
+        let made = unsafe { shows.swapchains.create_swapchain(&create, None) }.doing(|| "create a swapchain".into());
+        self.drop_images();
+        self.handle = made?;
+        // SAFETY: the swapchain is alive.
+        let images = unsafe { self.shows()?.swapchains.get_swapchain_images(self.handle) }
+            .doing(|| "list the images of the swapchain".into())?;
+        for handle in images {
+            let shown = self.shown(handle)?;
+            self.images.push(shown);
+        }
+        self.size = [size.width, size.height];
+        Ok(true)
+    }
+
+    fn shown(&self, handle: vk::Image) -> Result<Shown, GpuError> {
+        let create = vk::ImageViewCreateInfo::default()
+            .image(handle)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(self.format)
+            .subresource_range(crate::gpu::resources::WHOLE);
+        let device = &self.context.device;
+        // SAFETY: the image belongs to the swapchain, which outlives the view; the structures are complete.
+        let view = unsafe { device.create_image_view(&create, None) }.doing(|| "view an image of the window".into())?;
+        // SAFETY: as above; a view without its semaphore is destroyed at once.
+        match unsafe { device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) } {
+            Ok(drawn) => {
+                self.context.name(handle, "window");
+                Ok(Shown { handle, view, drawn })
+            }
+            Err(result) => {
+                // SAFETY: nothing uses the view yet.
+                unsafe { device.destroy_image_view(view, None) };
+                Err(GpuError::Vulkan { doing: "create a semaphore".into(), result })
+            }
+        }
+    }
+
+    /// The next image to draw on, waiting for it at most so long; the semaphore is signalled when it may be written.
+    pub fn acquire(&self, nanoseconds: u64, free: vk::Semaphore) -> Result<u32, vk::Result> {
+        let Some(shows) = &self.context.shows else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        self.context.faults.pass(crate::gpu::faults::Seam::Acquire)?;
+        // SAFETY: the swapchain is alive, and nothing waits for the semaphore.
+        let acquired =
+            unsafe { shows.swapchains.acquire_next_image(self.handle, nanoseconds, free, vk::Fence::null()) };
+        // One that does not fit quite is shown all the same; `present` says so again.
+        acquired.map(|(image, _)| image)
+    }
+
+    /// Shows an image when it has been drawn; true where the swapchain fits no more.
+    pub fn present(&self, image: u32) -> Result<bool, vk::Result> {
+        let Some(shows) = &self.context.shows else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);
+        let present = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        // SAFETY: the image was acquired and a submission that signals `drawn` is on its way.
+        self.context.on_queue(|queue| unsafe { shows.swapchains.queue_present(queue, &present) })
+    }
+
+    fn drop_images(&mut self) {
+        // SAFETY: nothing is in flight.
+        unsafe {
+            for Shown { view, drawn, .. } in self.images.drain(..) {
+                self.context.device.destroy_image_view(view, None);
+                self.context.device.destroy_semaphore(drawn, None);
+            }
+            if let (Some(shows), false) = (&self.context.shows, self.handle == vk::SwapchainKHR::null()) {
+                shows.swapchains.destroy_swapchain(self.handle, None);
+            }
+        }
+        self.handle = vk::SwapchainKHR::null();
+    }
+
+    fn destroy(&mut self) {
+        self.drop_images();
+        if let Some(shows) = &self.context.shows {
+            // SAFETY: its swapchain is gone; null is allowed.
+            unsafe { shows.surfaces.destroy_surface(self.surface, None) };
+        }
+        self.surface = vk::SurfaceKHR::null();
+    }
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        self.context.wait_idle();
+        self.destroy();
+    }
+}

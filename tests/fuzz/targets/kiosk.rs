@@ -1,0 +1,35 @@
+//! The configuration of a cart, and what is taken out of the text of logs.
+
+use super::told;
+use echolume::kiosk::config::Config;
+use echolume::kiosk::redacted::Redactor;
+use std::path::Path;
+
+/// What is taken is written out and read back, makes arguments, and layers.
+pub fn configuration(bytes: &[u8]) -> String {
+    let path = Path::new("echolume.toml");
+    let config = match Config::parse(&String::from_utf8_lossy(bytes), path) {
+        Ok(config) => config,
+        Err(error) => return told(error),
+    };
+    let written = config.to_toml().expect("TOML");
+    let again = Config::parse(&written, path).expect("what was written out is right");
+    assert_eq!(again.to_toml().expect("TOML"), written);
+    let arguments = config.source_arguments();
+    assert!(arguments.iter().all(|argument| argument.starts_with("--")), "{arguments:?}");
+    config.layers().and_then(|layers| layers.finish()).expect("checked before");
+    told(config.refuse(&arguments.join(" ")))
+}
+
+/// What follows a name that nobody knows stays, and so do lines.
+pub fn redacted(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let mut redactor = Redactor::new();
+    redactor.add_recording(Path::new(text.lines().next().unwrap_or_default()));
+    let said = redactor.text(&text);
+    assert_eq!(said.matches('\n').count(), text.matches('\n').count());
+    let mut planted = Redactor::new().text(&text.replace('\n', "/data/ZQX.mha\n"));
+    planted.retain(|c| c.is_ascii_uppercase() || c == '\n');
+    assert!(text.contains("ZQX") || !planted.contains("ZQX"), "{planted}");
+    said.split_whitespace().filter(|word| word.contains('<')).take(8).collect()
+}

@@ -1,0 +1,126 @@
+//! Sources and devices that go away under a console, and the ways out of it.
+
+use super::*;
+use ash::vk;
+use echolume::gpu::faults::Seam;
+
+/// Prevents a console that ends with its probe, or needs to be told that it is back.
+#[test]
+fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
+    let device = Device::new();
+    let sources = Arc::new(Mutex::new(Vec::new()));
+    let mut options = options();
+    options.retry = Some(Duration::from_millis(20));
+    let mut desk = Desk::of(&device, options, sources.clone());
+    // Nothing is there at first.
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_millis(60) {
+        let next = desk.tick(Instant::now());
+        assert!(!next.exit && !next.renews);
+    }
+    let mut last = None;
+    for (number, why) in [(0, None), (1, Some("cut".to_string())), (2, None)] {
+        let (say, said) = channel();
+        desk.say = say;
+        sources.lock().expect("lock").push(said);
+        desk.begin();
+        let picture = desk.live(number % 2);
+        assert!(picture == headless(&device, &desk.drawn(), &body(number % 2)), "source {number}");
+        desk.say.send(Event::End(why)).expect("listens");
+        desk.rest();
+        assert!(desk.picture() == picture, "what was shown stays");
+        last = Some(picture);
+    }
+    // A hand turns what is shown, source or not.
+    desk.console.command(&Command::Turn([20.0, 5.0]), Instant::now());
+    desk.rest();
+    assert!(last.as_ref() != Some(&desk.picture()));
+    assert_eq!(desk.console.stream().cine().kept().len(), 3, "volumes of three sources");
+}
+
+/// Prevents a sleeve from ending a kiosk, and a kiosk that cannot be ended.
+#[test]
+fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
+    let device = Device::new();
+    let chord = "ctrl+alt+q".parse().expect("keys");
+    let (all, none) = (Modifiers { control: true, alt: true, shift: false }, Modifiers::default());
+    for is_kiosk in [true, false] {
+        let mut desk = Desk::new(&device, Options { is_kiosk, exit: is_kiosk.then_some(chord), ..options() });
+        let half = Modifiers { control: true, ..none };
+        for (held, key, exits) in [
+            (none, Key::Char('q'), !is_kiosk),
+            (none, Key::Escape, !is_kiosk),
+            (half, Key::Char('q'), false),
+            (Modifiers { shift: true, ..all }, Key::Char('q'), false),
+            (all, Key::Char('q'), is_kiosk),
+        ] {
+            desk.held(held, key);
+            assert_eq!(desk.tick(Instant::now()).exit, exits, "{held:?} {key:?}, kiosk: {is_kiosk}");
+            assert!(!desk.tick(Instant::now()).exit, "once is once");
+        }
+        desk.press(Key::Function(11));
+        assert_eq!(desk.tick(Instant::now()).toggles_full_screen, !is_kiosk);
+    }
+}
+
+/// Prevents a console that goes down with its device, or shows something else on the next one.
+#[test]
+fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
+    for (seam, is_frozen) in [(Seam::Submit, true), (Seam::Submit, false), (Seam::Wait, true)] {
+        let (device, other) = (Device::new(), Device::new());
+        let mut desk = Desk::new(&device, options());
+        desk.begin();
+        let seen: Vec<_> = (0..3).map(|number| desk.live(number)).collect();
+        let shown = if is_frozen { 1 } else { 2 };
+        if is_frozen {
+            desk.press(Key::Left);
+            desk.rest();
+        }
+        assert!(desk.picture() == seen[shown]);
+        device.faults.inject(seam, 0, vk::Result::ERROR_DEVICE_LOST);
+        desk.console.command(&Command::Turn([1.0, 0.0]), Instant::now());
+        let lost = desk.rest_or_lost().expect_err("lost");
+        assert!(matches!(&lost, ConsoleError::DeviceLost(error) if error.is_device_lost()), "{lost}");
+        desk.console.command(&Command::Reset, Instant::now());
+        desk.console.revive(&other, None).expect("made anew");
+        desk.rest();
+        assert!(desk.picture() == seen[shown], "{seam:?}, frozen: {is_frozen}");
+        assert_eq!(desk.console.stream().is_frozen(), is_frozen);
+        if is_frozen {
+            desk.press(Key::Space);
+        }
+        assert!(desk.live(3) == headless(&other, &desk.drawn(), &body(3)), "{seam:?}, frozen: {is_frozen}");
+    }
+}
+
+/// Prevents a console that is black for ever because memory ran out at the wrong moment.
+#[test]
+fn memory_that_runs_out_anywhere_is_got_over() {
+    let device = Device::new();
+    let mut reached = 0;
+    for n in (0..60).step_by(8) {
+        let sources = Arc::new(Mutex::new(Vec::new()));
+        let mut desk =
+            Desk::of(&device, Options { retry: Some(Duration::from_millis(5)), ..options() }, sources.clone());
+        device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        // What is opened again says all of it again, and none of them ends by itself.
+        let mut speak = Vec::new();
+        for _ in 0..4 {
+            let (say, said) = channel();
+            say.send(Event::Begin(Box::new(header(0.3)))).expect("listens");
+            body(0).into_iter().for_each(|frame| say.send(Event::Frame(frame)).expect("listens"));
+            sources.lock().expect("lock").push(said);
+            speak.push(say);
+        }
+        let begun = Instant::now();
+        while desk.console.stream().volumes_shown() == 0 {
+            assert!(begun.elapsed() < BOUND, "nothing is shown after allocation {n} failed");
+            desk.tick(Instant::now() + LATER);
+        }
+        desk.rest();
+        reached += usize::from(sources.lock().expect("lock").len() < 3);
+        device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "allocation {n}");
+    }
+    assert!(reached > 2, "{reached}");
+}

@@ -1,0 +1,158 @@
+//! From what hands do to the picture that shows it: the same, byte for byte, as one that is drawn of the same settings by itself.
+
+use super::*;
+use echolume::source::recorder::Replay;
+
+const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
+
+/// Prevents a drag that ends elsewhere than where the hand does, and a start that is not found again.
+#[test]
+fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
+    let device = Device::new();
+    let mut desk = Desk::new(&device, options());
+    desk.begin();
+    let first = desk.live(0);
+    assert!(first == headless(&device, &desk.drawn(), &body(0)), "at the start");
+    let middle = [40.0, 36.0];
+    for (tool, from, to) in [
+        ('t', middle, [60.0, 20.0]),
+        ('l', middle, [20.0, 50.0]),
+        // A face from its side, inwards.
+        ('g', [70.0, 36.0], [36.0, 36.0]),
+        ('x', middle, [40.0, 2.0]),
+    ] {
+        desk.press(Key::Char(tool));
+        desk.rest();
+        let before = desk.picture();
+        desk.drag(from, to);
+        desk.rest();
+        let after = desk.picture();
+        assert!(after != before, "a drag with {tool} does nothing");
+        assert!(after == headless(&device, &desk.drawn(), &body(0)), "after a drag with {tool}");
+    }
+    desk.console.input(&Input::Scroll(3.0));
+    desk.rest();
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "closer");
+    // What a drag does is no setting of the picture.
+    desk.press(Key::Backspace);
+    desk.press(Key::Char('t'));
+    desk.rest();
+    assert!(desk.picture() == first);
+}
+
+/// Prevents a key that shows something else than its mode, or leaves a part of the mode before.
+#[test]
+fn every_key_of_a_mode_or_layout_shows_what_its_settings_say() {
+    let (device, plain) = (Device::new(), Device::new());
+    let mut desk = Desk::new(&device, options());
+    desk.begin();
+    let mut seen = vec![desk.live(1)];
+    let keys = "2345678901".chars().map(|c| (Modifiers::default(), Key::Char(c)));
+    let layouts = [(Modifiers::default(), Key::Tab), (SHIFT, Key::Tab)];
+    for (held, key) in keys.chain(layouts) {
+        desk.held(held, key);
+        desk.rest();
+        let picture = desk.picture();
+        assert!(picture == headless(&plain, &desk.drawn(), &body(1)), "{key:?}");
+        assert!(seen.last() != Some(&picture), "{key:?} changes nothing");
+        seen.push(picture);
+    }
+}
+
+/// Prevents volumes that are left out or shown twice by the keys that go through them, and a loop that stands still.
+#[test]
+fn the_keys_of_time_freeze_look_back_and_play() {
+    let device = Device::new();
+    let mut desk = Desk::new(&device, options());
+    desk.begin();
+    let seen: Vec<_> = (0..3).map(|number| desk.live(number)).collect();
+    desk.press(Key::Space);
+    desk.frames(body(3));
+    desk.rest();
+    assert!(desk.console.stream().is_frozen() && desk.picture() == seen[2], "frozen");
+    for (key, place) in [
+        (Key::Left, 1),
+        (Key::Left, 0),
+        (Key::Left, 0),
+        (Key::Right, 1),
+        (Key::End, 2),
+        (Key::Right, 2),
+        (Key::Home, 0),
+    ] {
+        desk.press(key);
+        desk.rest();
+        assert!(desk.console.stream().cine_place() == Some(place) && desk.picture() == seen[place], "{key:?}: {place}");
+    }
+    desk.press(Key::Enter);
+    let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
+    while places.len() < 7 {
+        assert!(begun.elapsed() < BOUND, "{places:?}");
+        let next = desk.tick(now);
+        let stream = desk.console.stream();
+        if stream.is_idle() {
+            places.extend(stream.cine_place().filter(|place| places.last() != Some(place)));
+            // The time at which it asks to be asked again comes at once.
+            now = next.at.expect("a loop goes on").max(now);
+        }
+    }
+    assert!(places.windows(2).all(|w| w[1] == (w[0] + 1) % 3), "{places:?}");
+    desk.press(Key::Enter);
+    desk.press(Key::Space);
+    assert!(!desk.console.stream().is_frozen());
+    assert!(desk.live(4) == headless(&device, &desk.drawn(), &body(4)));
+}
+
+/// Prevents a picture that is saved other than it is seen, and a loop that lacks a frame.
+#[test]
+fn what_is_saved_is_what_is_seen_and_kept() {
+    let (device, folder) = (Device::new(), Folder::new("saved"));
+    let mut desk = Desk::new(&device, Options { folder: folder.0.clone(), ..options() });
+    // Nothing to save yet is no fault of anything.
+    desk.press(Key::Char('p'));
+    desk.press(Key::Char('r'));
+    desk.begin();
+    let seen: Vec<_> = (0..3).map(|number| desk.live(number)).collect();
+    desk.press(Key::Left);
+    desk.rest();
+    desk.press(Key::Char('p'));
+    desk.press(Key::Char('r'));
+    assert!(folder.wait("png", |file| Picture::load(file).ok()) == seen[1]);
+    let mut replay = folder.wait("frames", |file| Replay::open(file).ok().filter(|r| !r.rebuilt() && r.frames() == 27));
+    assert!(*replay.header() == header(0.3));
+    use echolume::source::Source;
+    for expected in (0..3).flat_map(body).collect::<Vec<_>>().chunks(9) {
+        let mut expected = expected.to_vec();
+        expected.sort_by_key(|frame| frame.slice);
+        for frame in expected {
+            let got = replay.next_frame().expect("read").expect("there");
+            assert!((got.volume, got.slice, got.backward) == (frame.volume, frame.slice, frame.backward));
+            assert!(got.bytes == frame.bytes);
+        }
+    }
+    desk.rest();
+}
+
+/// Prevents panels that keep the picture from being what the settings say, where they lie beside it.
+#[test]
+fn panels_take_room_and_nothing_else() {
+    let device = Device::new();
+    let mut desk = Desk::new(&device, Options { panels: true, scale: 0.5, ..options() });
+    desk.begin();
+    desk.live(0);
+    for size in [[400, 240], [60, 50], [1, 1], [0, 0], [417, 233]] {
+        desk.console.resize(size);
+        desk.rest();
+        let picture = desk.picture();
+        assert_eq!([picture.width, picture.height], desk.drawn().picture.size);
+        assert!(picture == headless(&device, &desk.drawn(), &body(0)), "{size:?}");
+    }
+    let beside = desk.drawn().picture.size;
+    desk.press(Key::Function(3));
+    desk.rest();
+    assert!(desk.drawn().picture.size == [417, 233] && beside[0] < 417 && beside[1] < 233);
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));
+    desk.console.command(&Command::Help, Instant::now());
+    desk.press(Key::Function(2));
+    desk.rest();
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));
+}

@@ -1,0 +1,214 @@
+//! The console without a screen: what hands do on one side, pictures on the other, and whatever goes wrong in between.
+
+mod amiss;
+mod hands;
+mod monkey;
+mod rest;
+
+use crate::common::*;
+use crate::live::header;
+use crate::live_kept::{BOUND, Fed, ROOM};
+use echolume::gpu::{self, Context, Renderer};
+use echolume::live::Update;
+use echolume::live::views::Views;
+use echolume::picture::Picture;
+use echolume::scene::Settings;
+use echolume::source::Frame;
+use echolume::source::live::{Event, Live};
+use echolume::ui::command::{Command, Tool};
+use echolume::ui::console::{Console, ConsoleError, Next, Options};
+use echolume::ui::input::{Button, Input, Key, Modifiers};
+use echolume::ui::ladder;
+use echolume::ui::supply::Open;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+pub const SIZE: [u32; 2] = [80, 72];
+/// Longer than a view is taken to move after a hand did.
+const LATER: Duration = Duration::from_millis(300);
+
+pub fn plain() -> Settings {
+    toml::from_str("mode = 'sr'\nslices = { pixels = 40, format = 'r8' }").expect("settings")
+}
+
+/// Without a screen, a budget or a second source.
+pub fn options() -> Options {
+    Options {
+        settings: plain(),
+        update: Update::Whole,
+        images: 3,
+        queues: None,
+        cine: ROOM,
+        budget: None,
+        rungs: ladder::built_in(),
+        retry: None,
+        record: None,
+        folder: std::env::temp_dir(),
+        overlay: true,
+        panels: false,
+        scale: 1.0,
+        exit: None,
+        is_kiosk: false,
+        wake: Arc::new(|| ()),
+        amiss: None,
+    }
+}
+
+/// A folder of this test alone, gone with it.
+pub struct Folder(pub PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Folder {
+        Folder(std::env::temp_dir().join(format!("echolume-{name}-{}", std::process::id())))
+    }
+
+    /// The first file with this ending, once it can be read.
+    pub fn wait<T>(&self, ending: &str, mut read: impl FnMut(&std::path::Path) -> Option<T>) -> T {
+        let begun = Instant::now();
+        loop {
+            assert!(begun.elapsed() < BOUND, "no {ending}");
+            let files = std::fs::read_dir(&self.0).into_iter().flatten().flatten().map(|file| file.path());
+            if let Some(it) = files.filter(|f| f.extension().is_some_and(|e| e == ending)).find_map(|f| read(&f)) {
+                return it;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A body with a round front that is another one in every volume.
+pub fn body(number: u32) -> Vec<Frame> {
+    let tilt = number as usize;
+    crate::live::volume(number, |slice, i| {
+        let (sample, line) = (i % 64, i / 64);
+        let front = 14 + (line.abs_diff(12 + tilt % 3)).pow(2) / 8 + slice.abs_diff(4) * 2 + tilt % 5;
+        if sample < front { (i * 7 % 13) as u8 } else { 120 + ((i * 31 + slice * 17) % 90) as u8 }
+    })
+}
+
+/// A console, and what speaks to it.
+pub struct Desk {
+    pub console: Console,
+    pub say: Sender<Event>,
+}
+
+impl Desk {
+    pub fn new(device: &Arc<Context>, options: Options) -> Desk {
+        let (say, said) = channel();
+        let desk = Desk::of(device, options, Arc::new(Mutex::new(vec![said])));
+        Desk { say, ..desk }
+    }
+
+    /// Its sources are taken from the end of these; where there is none it cannot be opened.
+    pub fn of(device: &Arc<Context>, options: Options, sources: Arc<Mutex<Vec<Receiver<Event>>>>) -> Desk {
+        let open: Open = Arc::new(move || match sources.lock().expect("lock").pop() {
+            Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
+            None => Err("no probe".into()),
+        });
+        Desk { console: Console::new(device, open, options, SIZE), say: channel().0 }
+    }
+
+    pub fn begin(&self) {
+        self.say.send(Event::Begin(Box::new(header(0.3)))).expect("listens");
+    }
+
+    pub fn frames(&self, frames: Vec<Frame>) {
+        frames.into_iter().for_each(|frame| self.say.send(Event::Frame(frame)).expect("listens"));
+    }
+
+    pub fn tick(&mut self, now: Instant) -> Next {
+        self.console.tick(now).expect("the device is there")
+    }
+
+    /// The settings as they are drawn at rest.
+    pub fn drawn(&self) -> Settings {
+        let mut settings = self.console.controls().settings().clone();
+        settings.slices.everything |= matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
+        settings
+    }
+
+    /// Ticks until all that was said and done is drawn, at a time at which no hand moves any more.
+    pub fn rest(&mut self) -> Next {
+        self.rest_or_lost().expect("the device is there")
+    }
+
+    pub fn rest_or_lost(&mut self) -> Result<Next, ConsoleError> {
+        let begun = Instant::now();
+        // What the source was sent takes a moment to arrive, and says nothing of itself.
+        let mut still = 0;
+        loop {
+            assert!(begun.elapsed() < BOUND, "it does not come to rest");
+            let next = self.console.tick(Instant::now() + LATER)?;
+            let drawn = self.drawn();
+            let stream = self.console.stream();
+            let is_drawn = stream.scene().is_none_or(|scene| scene.settings == drawn);
+            still = if stream.is_idle() && is_drawn { still + 1 } else { 0 };
+            if still > 20 {
+                return Ok(next);
+            }
+            if still > 0 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+
+    /// The volume with this number, sent and drawn.
+    pub fn live(&mut self, number: u32) -> Picture {
+        let before = self.console.stream().volumes_shown();
+        self.frames(body(number));
+        let begun = Instant::now();
+        while self.console.stream().volumes_shown() == before {
+            assert!(begun.elapsed() < BOUND, "volume {number} is not shown");
+            self.tick(Instant::now() + LATER);
+        }
+        self.rest();
+        self.picture()
+    }
+
+    pub fn picture(&mut self) -> Picture {
+        let renderer = self.console.stream().renderer().expect("begun");
+        assert!(renderer.has_drawn());
+        renderer.end_picture().expect("picture")
+    }
+
+    pub fn press(&mut self, key: Key) {
+        self.console.input(&Input::Key { key, pressed: true });
+        self.console.input(&Input::Key { key, pressed: false });
+    }
+
+    pub fn held(&mut self, held: Modifiers, key: Key) {
+        self.console.input(&Input::Modifiers(held));
+        self.press(key);
+        self.console.input(&Input::Modifiers(Modifiers::default()));
+    }
+
+    /// A drag with the left button, the picture following it.
+    pub fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
+        self.console.input(&Input::Moved(from));
+        self.console.input(&Input::Button { button: Button::Left, pressed: true });
+        for n in 1..=8 {
+            let at = [0, 1].map(|a| from[a] + (to[a] - from[a]) * f64::from(n) / 8.0);
+            self.console.input(&Input::Moved(at));
+            self.tick(Instant::now());
+        }
+        self.console.input(&Input::Button { button: Button::Left, pressed: false });
+    }
+}
+
+/// A volume as a renderer of its own draws it.
+pub fn headless(device: &Arc<Context>, settings: &Settings, frames: &[Frame]) -> Picture {
+    let views = Views::new(&header(0.3), settings, Update::Whole).expect("views");
+    let scene = views.of(&vec![frames[0].backward; frames.len()]).into_owned();
+    let mut renderer = Renderer::new(device, scene, &gpu::Options::default()).expect("renderer");
+    frames.iter().for_each(|f| renderer.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
+    renderer.show(0).expect("show");
+    renderer.picture().expect("picture")
+}

@@ -1,0 +1,132 @@
+//! Settings whose pipelines are made beside the drawing, and those that the device cannot draw.
+
+use super::*;
+use ash::vk;
+use echolume::gpu::Wake;
+use echolume::gpu::faults::Seam;
+use echolume::plan::Plan;
+use echolume::probe::{Axis, Geometry, Probe};
+use echolume::scene::{Scene, VolumeFormat};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+fn waking() -> (Arc<AtomicU64>, live::Options) {
+    let woken = Arc::new(AtomicU64::new(0));
+    let counted = woken.clone();
+    let wake: Wake = Arc::new(move || {
+        counted.fetch_add(1, Ordering::Relaxed);
+    });
+    (woken, live::Options { wake: Some(wake), ..kept(Update::Whole) })
+}
+
+/// Prevents a view that stands still while shaders compile, whichever way the volumes are swept that come meanwhile.
+#[test]
+fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
+    // What is expected is drawn elsewhere, so that every pipeline here is the stream's.
+    let (device, plain) = (Device::new(), Device::new());
+    let (woken, options) = waking();
+    let mut now = "mode = 'mip'";
+    let mut bench = Bench::new(&device, now, options);
+    bench.begin(header(0.3));
+    (0..2).for_each(|number| drop(bench.live(number)));
+    let (waited, mut number) = (waited_for(&device), 2);
+    for next in ["mode = 'sr'\nslices.median = true", "mode = 'orthogonal'", "mode = 'vr'\nlayout = 'four'"] {
+        // A whole volume waits to be shown when the settings come, so that one picture is certain to be of those before.
+        let frames = bench.stream.frames();
+        bench.frames(speckled(number));
+        while bench.stream.frames() < frames + 9 {
+            bench.stream.step(Duration::from_millis(1)).expect("step");
+        }
+        let awake = woken.load(Ordering::Relaxed);
+        bench.stream.change(settings(next)).expect("change");
+        let (first, picture) = bench.picture();
+        assert!(first == number && picture == of(&plain, now, number), "{now} while {next} is made");
+        number += 1;
+        let begun = Instant::now();
+        while woken.load(Ordering::Relaxed) == awake || bench.stream.scene().expect("begun").settings != settings(next)
+        {
+            assert!(begun.elapsed() < BOUND, "{next} never comes");
+            bench.stream.step(Duration::from_millis(1)).expect("step");
+        }
+        // Both ways of the sweep.
+        for _ in 0..2 {
+            assert!(bench.live(number) == of(&plain, next, number), "{next}: volume {number}");
+            number += 1;
+        }
+        assert_eq!(waited_for(&device), waited, "{next}: pipelines were made while everything waited");
+        now = next;
+    }
+}
+
+/// Prevents a stream that ends, or goes black, for settings that are beyond the device; and that they come back with another device.
+#[test]
+fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
+    let (device, other) = (Device::new(), Device::new());
+    let (_, options) = waking();
+    let toml = "mode = 'mip'";
+    let mut bench = Bench::new(&device, toml, options);
+    // Fine slices of many frames are more than any image of the device.
+    let geometry = Geometry::Sweep(Probe { slices: Axis::centred(0.006, 90), ..wobbler() });
+    let many = Header { forward: geometry.clone(), backward: geometry.clone(), ..header(0.0) };
+    let frame = |n: u32, volume: u32| {
+        let bytes = (0..24 * 64).map(|i| (i * 7 + n * 13 + volume * 90) as u8).collect();
+        Frame { volume, number: n, slice: n as usize, backward: false, time: None, bytes }
+    };
+    let volume = |number| (0..90).map(|n| frame(n, number)).collect::<Vec<_>>();
+    let expected = [0, 1].map(|number| fresh(&other, toml, &many, Update::Whole, &volume(number)));
+    bench.begin(many);
+    bench.frames(volume(0));
+    assert!(bench.picture() == (0, expected[0].clone()));
+
+    let mut large = settings("mode = 'sr'");
+    large.slices.pixels = 4096;
+    large.slices.format = VolumeFormat::R32f;
+    // Nothing of it may be made, or the machine would have to hold it.
+    let scene = Scene::new(geometry, BYTES, large.clone()).expect("another device might hold it");
+    let most = Plan::new(&scene).slots.iter().map(|slot| slot.bytes(&scene)).max().expect("slots");
+    assert!(most > device.candidate.max_bytes, "{most} of {}", device.candidate.max_bytes);
+    bench.stream.change(large).expect("told by the device alone");
+    assert!(bench.settle().is_empty());
+    assert!(bench.faults.len() == 1 && bench.faults[0].contains("4096"), "{:?}", bench.faults);
+    bench.frames(volume(1));
+    assert!(bench.picture() == (1, expected[1].clone()));
+    bench.stream.freeze(true);
+    bench.stream.show_kept(0);
+    assert!(bench.picture() == (0, expected[0].clone()));
+    bench.stream.revive(&other).expect("made anew of what could be drawn");
+    assert!(bench.picture() == (0, expected[0].clone()));
+}
+
+/// Prevents a stream that never draws again because memory ran out once, wherever that was: what was drawn before is drawn anew.
+#[test]
+fn memory_that_runs_out_while_settings_change_costs_the_settings_and_not_the_stream() {
+    let (device, plain) = (Device::new(), Device::new());
+    let (before, after) = ("mode = 'mip'", "mode = 'sr'\nslices.median = true");
+    let (old, new) = (of(&plain, before, 1), of(&plain, after, 1));
+    let mut refused = 0;
+    let mut bench = Bench::new(&device, before, kept(Update::Whole));
+    bench.begin(header(0.3));
+    (0..2).for_each(|number| drop(bench.live(number)));
+    bench.stream.freeze(true);
+    for n in 0.. {
+        device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        bench.stream.change(settings(after)).expect("change");
+        let picture = bench.settle().pop();
+        // One that was not reached is none any more.
+        device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        match bench.faults.pop() {
+            None => {
+                assert!(picture.expect("drawn").picture == Some(new));
+                break;
+            }
+            Some(fault) => assert!(fault.contains("out of device memory"), "{fault}"),
+        }
+        refused += 1;
+        let shown = match picture {
+            Some(shown) => shown.picture.expect("brought back"),
+            None => bench.stream.renderer().expect("begun").picture().expect("picture"),
+        };
+        assert!(shown == old && bench.faults.is_empty(), "allocation {n}");
+    }
+    assert!(refused > 3, "{refused}");
+}

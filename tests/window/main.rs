@@ -1,0 +1,8 @@
+//! The program in a window of a server without a monitor (Xvfb): driven by keys and hands as a person would, and looked at. Every view
+//! runs with validation, and any message fails its test. No server is a failure, never a skip.
+
+mod common;
+mod kiosk;
+mod panels;
+mod pictures;
+mod shapes;
