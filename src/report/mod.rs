@@ -7,4 +7,5 @@ pub mod profile;
 pub mod regions;
 pub mod tables;
 pub mod times;
+pub mod verify;
 pub mod whole;

@@ -1,0 +1,176 @@
+//! What `echolume verify` found: every check with its errors, times and faults, and what it ran on. Reports and comparisons with an
+//! earlier run follow from it; nothing here runs a device.
+
+use super::profile::Device;
+use crate::picture::Picture;
+use serde::{Deserialize, Serialize};
+
+/// Version of the JSON; another layout gets another name.
+pub const FORMAT: &str = "echolume-verify-1";
+
+/// How much is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// What CI has time for: every pass, mode and path once.
+    Quick,
+    /// Every input of every pass in every scene, and a stress of minutes.
+    Full,
+}
+
+/// One run of `echolume verify` on one device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// [`FORMAT`].
+    pub format: String,
+    /// Name, version and build of the program.
+    pub program: String,
+    /// When, by RFC 3339.
+    pub date: String,
+    pub device: Device,
+    pub level: Level,
+    /// Whether the validation layer with synchronization validation watched.
+    pub validation: bool,
+    /// s, all checks.
+    pub seconds: f64,
+    /// In running order.
+    pub outcomes: Vec<Outcome>,
+}
+
+impl Run {
+    pub fn failures(&self) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().filter(|o| o.verdict == Verdict::Failed)
+    }
+
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.outcomes.iter().filter(|o| o.verdict == verdict).count()
+    }
+}
+
+/// What came of one check.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// What kind of check: `passes`, `modes`, `known answers` ...
+    pub group: String,
+    /// Unique in its group, and the same in every run of this version.
+    pub name: String,
+    pub verdict: Verdict,
+    /// s, host's clock, reference included.
+    pub seconds: f64,
+    /// Errors and times that it measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<Figure>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
+    /// What a reader should know of it: why it was left out, what fell back to what.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// Pictures that show it, right or wrong.
+    #[serde(skip)]
+    pub pictures: Vec<Shown>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    Passed,
+    Failed,
+    /// Not run, because this device or system has not what it needs: the note says what.
+    LeftOut,
+}
+
+/// A number that a check measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figure {
+    /// Unique in its check.
+    pub what: String,
+    /// The largest error; the median of times.
+    pub value: f64,
+    /// The largest value that passes; none where any does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub allowed: Option<f64>,
+    pub unit: Unit,
+    /// Times one by one, in the order measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub samples: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// In the units of what was compared: mm of distances, 1 of values that go from 0 to 1.
+    Value,
+    /// Steps of a picture of 8 bits.
+    Levels,
+    Millimetres,
+    /// Nanoseconds.
+    Ns,
+    /// Of one.
+    Share,
+    Count,
+}
+
+/// Something that is not as it should be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fault {
+    /// One line: what is wrong.
+    pub what: String,
+    /// The pass at fault, where one is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pass: Option<String>,
+    /// What it was given, in words.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub input: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst: Option<Worst>,
+    /// Files that show it, once they are written: actual, expected, difference.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub files: Vec<String>,
+}
+
+/// The texel that is furthest off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Worst {
+    /// The output, by the shader's name.
+    pub output: String,
+    /// Column, row, slice.
+    pub at: [usize; 3],
+    pub channel: usize,
+    pub expected: f64,
+    pub got: f64,
+    /// Texels beyond their tolerance.
+    pub beyond: usize,
+    pub texels: usize,
+}
+
+/// Two pictures that should be one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// What they show, in a few words.
+    pub what: String,
+    pub actual: Picture,
+    pub expected: Picture,
+    /// Differences, as many times as they are as [`Shown::gain`] says, on black.
+    pub difference: Picture,
+    pub gain: u32,
+    /// Index in the outcome's faults that they belong to.
+    pub fault: Option<usize>,
+}
+
+impl Fault {
+    pub fn new(what: impl Into<String>) -> Fault {
+        Fault { what: what.into(), pass: None, input: String::new(), worst: None, files: Vec::new() }
+    }
+}
+
+impl Figure {
+    /// An error and what is allowed of it.
+    pub fn error(what: impl Into<String>, value: f64, allowed: f64, unit: Unit) -> Figure {
+        Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new() }
+    }
+}
