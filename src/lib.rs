@@ -36,3 +36,4 @@ pub mod shader_source;
 pub mod source;
 pub mod spirv;
 pub mod ui;
+pub mod verify;

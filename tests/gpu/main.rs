@@ -28,7 +28,6 @@ mod planes;
 mod rays;
 mod recordings;
 mod reruns;
-mod scenes;
 mod sector;
 mod seen;
 mod shading;

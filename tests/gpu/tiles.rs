@@ -1,7 +1,7 @@
 //! Pictures of several planes: lines, tiles, what runs for them and runs again, and what is refused.
 
 use crate::common::*;
-use crate::planes::{TURNED, picture};
+use crate::planes::picture;
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
 use echolume::scene::{PlaneName, Scene, SceneError, Settings};

@@ -4,16 +4,19 @@ use echolume::picture::Picture;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use x11rb::connection::Connection;
-use x11rb::protocol::xproto::{AtomEnum, ConfigureWindowAux, ConnectionExt, ImageFormat, InputFocus, Window};
+use x11rb::protocol::xproto::{
+    AtomEnum, ConfigureWindowAux, ConnectionExt, ImageFormat, InputFocus, MapState, Window, WindowClass,
+};
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
 pub const SWEEP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
 /// A software device on a busy machine needs seconds for a picture.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(90);
 
 /// X keysyms of the keys that are pressed here; letters and digits are their own.
 pub const TAB: u32 = 0xff09;
@@ -64,14 +67,35 @@ impl Desk {
             openbox.env("DISPLAY", &display).stdout(Stdio::null()).stderr(Stdio::null());
             openbox.spawn().expect("openbox is installed (Debian: apt-get install openbox)")
         });
+        let desk = Desk { server, manager, display, connection, root };
         if managed {
-            until("the window manager", || {
-                let name = connection.intern_atom(false, b"_NET_SUPPORTING_WM_CHECK").ok()?.reply().ok()?.atom;
-                let owner = connection.get_property(false, root, name, AtomEnum::ANY, 0, 1).ok()?.reply().ok()?;
-                (owner.length > 0).then_some(())
-            });
+            until("the window manager", || desk.is_managed().then_some(()));
         }
-        Desk { server, manager, display, connection, root }
+        desk
+    }
+
+    /// Whether the window manager shows a window that asks for it. openbox says that it is there before it is, and what asks in
+    /// between is never shown.
+    fn is_managed(&self) -> bool {
+        let (connection, setup) = (&self.connection, self.connection.setup());
+        let window = connection.generate_id().expect("a name for a window");
+        let class = WindowClass::INPUT_OUTPUT;
+        let (depth, visual) = (setup.roots[0].root_depth, setup.roots[0].root_visual);
+        let made =
+            connection.create_window(depth, window, self.root, 0, 0, 9, 9, 0, class, visual, &Default::default());
+        made.expect("a window");
+        connection.map_window(window).expect("map");
+        let begun = Instant::now();
+        let mut framed = false;
+        while !framed && begun.elapsed() < Duration::from_secs(1) {
+            std::thread::sleep(Duration::from_millis(20));
+            let tree = connection.query_tree(window).expect("ask").reply().expect("the window is there");
+            let attributes = connection.get_window_attributes(window).expect("ask").reply().expect("it is there");
+            framed = tree.parent != self.root && attributes.map_state == MapState::VIEWABLE;
+        }
+        connection.destroy_window(window).expect("destroy");
+        connection.flush().expect("flush");
+        framed
     }
 
     /// `echolume view` with these arguments, its window there.
@@ -99,7 +123,7 @@ impl Desk {
             let name = self.connection.get_property(false, child, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 32);
             let is_it = name.ok()?.reply().is_ok_and(|name| name.value == b"Echolume");
             let seen = self.connection.get_window_attributes(child).ok()?.reply();
-            let seen = seen.is_ok_and(|a| a.map_state == x11rb::protocol::xproto::MapState::VIEWABLE);
+            let seen = seen.is_ok_and(|a| a.map_state == MapState::VIEWABLE);
             if is_it && seen { Some(child) } else { self.window(child) }
         })
     }
@@ -288,7 +312,10 @@ pub struct Folder(pub PathBuf);
 
 impl Folder {
     pub fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-window-{}-{name}", std::process::id()));
+        // Two tests may want one of the same name.
+        static MADE: AtomicU32 = AtomicU32::new(0);
+        let n = MADE.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("echolume-window-{}-{n}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).expect("make a folder for the test");
         Folder(path)
     }

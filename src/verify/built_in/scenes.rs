@@ -1,10 +1,11 @@
 //! Scenes that among them need every pass, in every variant of the geometry.
 
-use crate::common::*;
-use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Input, Scene};
-use echolume::source::StoredType;
+use super::{Asked, BYTES, cartesian, linear, still, uneven, wobbler};
+use crate::probe::{Advance, Geometry, Probe};
+use crate::scene::Input;
+use crate::source::StoredType;
 
+/// Every filter, look and adjustment at once.
 pub const ALL_FILTERS: &str = "
     slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
     distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }
@@ -21,16 +22,16 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
     probe
 }
 
-pub fn scenes() -> Vec<(String, Scene)> {
+pub(super) fn scenes() -> Vec<Asked> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
         if toml.starts_with("mode") {
-            scenes.push((name.to_string(), scene(geometry.clone(), input, toml)));
+            scenes.push(Asked::new(name, geometry, input, toml.into()));
             return;
         }
         for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }"] {
-            let scene = scene(geometry.clone(), input, &format!("mode = {mode}\n{toml}"));
-            scenes.push((format!("{name}, {mode}"), scene));
+            let toml = format!("mode = {mode}\n{toml}");
+            scenes.push(Asked::new(&format!("{name}, {mode}"), geometry, input, toml));
         }
     };
     let sweep = Geometry::Sweep(wobbler());
@@ -255,9 +256,8 @@ pub fn scenes() -> Vec<(String, Scene)> {
                 "mode = {mode}\nslices = {{ pixels = 30 }}\npicture = {{ size = [15, 11] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}]
                  camera = {{ azimuth = 35, elevation = 8, roll = 11, field_of_view = 40 }}\nray = {{ sampling = 'exact', step = 0.9, early_end = 0.0, {ray} }}"
             );
-            scenes.push((format!("{ray}, {mode}"), scene(sweep.clone(), BYTES, &toml)));
+            scenes.push(Asked::new(&format!("{ray}, {mode}"), &sweep, BYTES, toml));
         }
     }
-    scenes.extend(crate::planes::scenes());
     scenes
 }

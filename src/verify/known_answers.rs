@@ -1,0 +1,275 @@
+//! Scenes whose answer is a formula: no reference of ours is asked.
+
+use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
+use super::{Bench, Check, Found, drawn};
+use crate::gpu::GpuError;
+use crate::passes::{MISS, Slot, Texels, is_hit};
+use crate::probe::{Axis, Geometry, Grid, Probe};
+use crate::report::verify::{Fault, Figure, Level, Unit, Worst};
+use crate::scene::Scene;
+use glam::DVec3;
+
+/// Of this version: the same at every level.
+pub fn checks(_: Level) -> Vec<Check> {
+    let of = |name: &str, work: fn(&mut Bench) -> Result<Found, GpuError>| Check::new("known answers", name, work);
+    vec![
+        of("light through a constant medium", constant_medium),
+        of("ten thousand thin samples", thin_samples),
+        of("a sphere in a sweep", sphere),
+        of("a plate in front of parallel rays", plate),
+        of("a ramp of space through scan conversion", ramp),
+        of("every level of a picture", levels),
+        of("the largest sample of a ray", largest),
+    ]
+}
+
+fn made(geometry: Geometry, toml: &str) -> Result<Scene, GpuError> {
+    scene(geometry, BYTES, toml).map_err(GpuError::Broken)
+}
+
+fn block(spacing: f64, size: [usize; 3]) -> Geometry {
+    Geometry::Cartesian(Grid { size, spacing: [spacing; 3], origin: [0.0; 3] })
+}
+
+fn fault(input: String, what: &str, output: &str, at: [usize; 3], [expected, got]: [f64; 2]) -> Fault {
+    let worst = Worst { output: output.into(), at, channel: 0, expected, got, beyond: 1, texels: 1 };
+    Fault { pass: None, input, worst: Some(worst), ..Fault::new(what) }
+}
+
+/// Opacity over a path of constant medium is 1 - (1 - a)^(voxels), whatever the step (Beer and Lambert).
+fn constant_medium(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, mut largest) = (Found::default(), 0.0f64);
+    for step in [0.07, 0.33, 0.5, 3.0, 40.0] {
+        for opacity in [1e-4, 0.02, 0.3, 1.0] {
+            let toml = format!(
+                "mode = 'vr'\npicture = {{ size = [8, 8] }}\nray = {{ step = {step}, early_end = 0.0 }}\n\
+                 [volume]\ntransfer = [{{ at = 0.0, colour = [1.0, 0.5, 0.0], opacity = {opacity} }}]"
+            );
+            // Half a voxel beyond the outer centres is part of the volume: 20 voxels of 0.5 mm are 10 mm.
+            let scene = made(block(0.5, [20, 20, 20]), &toml)?;
+            let picture = drawn::slot(&bench.context, &scene, &frames(&scene, |_| 0.6), Slot::Picture)?;
+            let expected = 1.0 - (1.0f64 - opacity).powi(20);
+            // The picture is R16F: 11 bits.
+            for (channel, share) in [(3, 1.0), (1, 0.5)] {
+                let got = picture.get([4, 4, 0])[channel];
+                let error = (got - share * expected).abs() / (expected / 1500.0 + 1e-7);
+                largest = largest.max(error);
+                if error.is_nan() || error > 1.0 {
+                    let input = format!("opacity {opacity} a voxel, steps of {step} mm");
+                    found.faults.push(fault(
+                        input,
+                        "not as opaque as its path",
+                        "picture",
+                        [4, 4, 0],
+                        [share * expected, got],
+                    ));
+                }
+            }
+        }
+    }
+    found.figures.push(Figure::error("share of the tolerance", largest, 1.0, Unit::Share));
+    Ok(found)
+}
+
+fn thin_samples(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, mut largest) = (Found::default(), 0.0f64);
+    for (opacity, step, tolerance) in
+        [(1e-4f64, 0.002, 1e-3), (1e-7, 0.002, 2e-3), (1.0, 1e-3, 0.0), (0.999, 30.0, 1e-3)]
+    {
+        let toml = format!(
+            "mode = 'vr'\npicture = {{ size = [2, 2] }}\nray = {{ step = {step}, early_end = 0.0 }}\n\
+             [volume]\ntransfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = {opacity} }}]"
+        );
+        let scene = made(block(0.5, [4, 40, 4]), &toml)?;
+        let got = drawn::slot(&bench.context, &scene, &frames(&scene, |_| 1.0), Slot::Picture)?.get([1, 1, 0])[3];
+        let expected = -(40.0 * (-opacity).ln_1p()).exp_m1();
+        // 4e-6 is below R16F's normal numbers, which are 6e-8 apart there.
+        let error = (got - expected).abs() / (tolerance * expected + 6e-8);
+        largest = largest.max(error);
+        if error.is_nan() || error > 1.0 {
+            let input = format!("opacity {opacity} a voxel, steps of {step} mm");
+            found.faults.push(fault(input, "digits are lost on the way", "picture", [1, 1, 0], [expected, got]));
+        }
+    }
+    found.figures.push(Figure::error("share of the tolerance", largest, 1.0, Unit::Share));
+    Ok(found)
+}
+
+/// Distances of an output against what they are by formula; `None` where a ray cannot be judged.
+fn distances(found: &mut Found, got: &Texels, formula: impl Fn(usize, usize) -> Option<f64>, allowed: f64) {
+    let (mut rays, mut holes, mut beyond, mut worst) = (0, 0, 0, (0.0f64, [0; 3], [0.0; 2]));
+    for (x, y) in (0..got.size[1]).flat_map(|y| (0..got.size[0]).map(move |x| (x, y))) {
+        let Some(expected) = formula(x, y) else { continue };
+        let distance = got.one(x, y, 0);
+        rays += 1;
+        holes += usize::from(!is_hit(distance));
+        let error = (distance - expected).abs();
+        beyond += usize::from(error.is_nan() || error > allowed);
+        if is_hit(distance) && error > worst.0 {
+            worst = (error, [x, y, 0], [expected, distance]);
+        }
+    }
+    found.expect(rays > 100, || format!("only {rays} rays can be judged"));
+    found.expect(holes == 0, || format!("{holes} of {rays} rays miss a surface that is there"));
+    if worst.0 > allowed {
+        let mut fault = fault(String::new(), "the surface is somewhere else", "distance_map", worst.1, worst.2);
+        fault.worst.iter_mut().for_each(|w| (w.beyond, w.texels) = (beyond, rays));
+        found.faults.push(fault);
+    }
+    found.figures.push(Figure::error("largest error", worst.0, allowed, Unit::Millimetres));
+}
+
+/// A probe with lines, frames and samples close to one another.
+fn fine() -> Probe {
+    Probe {
+        lines: Axis::centred(1.1 / 127.0, 128),
+        slices: Axis::centred(0.8 / 60.0, 61),
+        sample_pitch: 0.2,
+        samples: 256,
+        ..wobbler()
+    }
+}
+
+/// Through scan conversion, sweep map and detector.
+fn sphere(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, centre, radius) = (Found::default(), DVec3::new(1.5, 50.0, -2.0), 9.0);
+    let toml = "mode = 'sr'\npicture = { size = [64, 64] }\nray = { step = 0.2 }\nsurface = { threshold = 0.2 }
+                camera = { zoom = 3.0, target = [1.5, 30.0, -2.0], elevation = 10, field_of_view = 20 }";
+    let scene = scene(Geometry::Sweep(fine()), FLOATS, toml).map_err(GpuError::Broken)?;
+    let frames = body_frames(&scene, |p| ((radius - p.distance(centre)) / 0.6 + 0.5).clamp(0.0, 1.0));
+    let got = drawn::slot(&bench.context, &scene, &frames, Slot::Distance)?;
+    let formula = |x: usize, y: usize| {
+        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let along = (centre - origin).dot(direction);
+        let offset = (origin + direction * along).distance(centre);
+        // Further out the chord is shorter than the detector's ring.
+        (offset < 0.8 * radius).then(|| along - (radius * radius - offset * offset).sqrt())
+    };
+    // Half a step: the lattice of frames, 0.013 rad at 45 mm, is 0.6 mm wide across a curved edge.
+    distances(&mut found, &got, formula, 0.1);
+    Ok(found)
+}
+
+/// An edge half a millimetre wide lies where it is half as bright, at the depth of its middle.
+fn plate(bench: &mut Bench) -> Result<Found, GpuError> {
+    let mut found = Found::default();
+    let toml =
+        "mode = 'sr'\npicture = { size = [24, 24] }\nray = { step = 0.1 }\nsurface = { threshold = 0.2, rough = 1 }
+                camera = { field_of_view = 0 }";
+    let scene = made(block(0.25, [60, 120, 60]), toml)?;
+    // Along the depth, which the rays follow: 0.25 mm a voxel.
+    let edge = 16.3;
+    let frames = body_frames(&scene, |p| ((p.y - edge) / 0.75 + 0.5).clamp(0.0, 1.0));
+    let got = drawn::slot(&bench.context, &scene, &frames, Slot::Distance)?;
+    let formula = |x: usize, y: usize| {
+        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let at = (edge - origin.y) / direction.y;
+        let p = origin + direction * at;
+        let inside = |axis: usize| p[axis] > scene.low[axis] + 1.0 && p[axis] < scene.high[axis] - 1.0;
+        (direction.y > 0.5 && inside(0) && inside(2)).then_some(at)
+    };
+    distances(&mut found, &got, formula, 0.08);
+    Ok(found)
+}
+
+/// A value that grows along an axis of space is, in the plane of a sweep that was converted, what it is in space: nothing is
+/// mirrored, swapped or half a texel aside.
+fn ramp(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, mut largest) = (Found::default(), 0.0f64);
+    for (axis, name) in ["lateral", "depth", "elevation"].into_iter().enumerate() {
+        for (plane, turn) in [("a", 0.0), ("b", 0.0), ("a", 20.0)] {
+            let toml = format!(
+                "mode = 'plane'\npicture = {{ size = [48, 40] }}\nslices = {{ pixels = 160, format = 'r32f' }}\npost = {{ floats = true }}\n\
+                 planes = {{ plane = '{plane}', azimuth = {turn}, position = [0.7, 40.3, -0.4], zoom = 3.0, lines = false }}\nray = {{ sampling = 'exact' }}"
+            );
+            let scene = scene(Geometry::Sweep(fine()), FLOATS, &toml).map_err(GpuError::Broken)?;
+            let span = [60.0, 80.0, 60.0];
+            let level = |p: DVec3| if axis == 1 { p.y / span[1] } else { 0.5 + p[axis] / span[axis] };
+            let got = drawn::slot(&bench.context, &scene, &body_frames(&scene, level), Slot::Picture)?;
+            let sheet = scene.sheet();
+            let [tile] = &sheet.tiles[..] else { continue };
+            let from_middle =
+                |at: usize, axis: usize| (at as f64 + 0.5 - f64::from(tile.size[axis]) / 2.0) * sheet.pixel;
+            for (x, y) in (0..got.size[1]).flat_map(|y| (0..got.size[0]).map(move |x| (x, y))) {
+                let p = tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1);
+                let Some(sweep) = scene.probe() else { continue };
+                // Away from the border, where black is mixed in.
+                let (at, within) = (sweep.to_indices(p), |v: f64, n: usize| v > 1.0 && v < n as f64 - 2.0);
+                let seen = within(at.sample, sweep.samples)
+                    && within(at.line, sweep.lines.len())
+                    && within(at.slice, sweep.slices.len());
+                if !seen {
+                    continue;
+                }
+                let (expected, seen) = (level(p), got.get([x, y, 0])[0]);
+                let error = (seen - expected).abs() * span[axis];
+                if error.is_nan() || error > largest {
+                    largest = error;
+                }
+                if (error.is_nan() || error > 0.05) && found.faults.len() < 4 {
+                    let input = format!("a ramp along {name}, plane {plane} turned by {turn} deg");
+                    found.faults.push(fault(
+                        input,
+                        "what is there is somewhere else",
+                        "picture",
+                        [x, y, 0],
+                        [expected, seen],
+                    ));
+                }
+            }
+        }
+    }
+    // Between samples, lines and frames straight lines stand for arcs: 0.013 rad at 60 mm are 1.3 um aside, and the texture's own
+    // lattice adds as much; R16F of the picture holds 0.02 mm of 80.
+    found.figures.push(Figure::error("largest error", largest, 0.05, Unit::Millimetres));
+    Ok(found)
+}
+
+/// Every level that a volume of 8 bits has is that level in the picture.
+fn levels(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, mut wrong) = (Found::default(), 0);
+    for floats in [false, true] {
+        let toml = format!(
+            "mode = 'plane'\npicture = {{ size = [16, 16] }}\nplanes = {{ plane = 'a', lines = false, position = [4, 4, 0.5] }}\n\
+             post = {{ floats = {floats} }}\nray = {{ sampling = 'exact' }}"
+        );
+        let scene = made(block(0.5, [16, 16, 3]), &toml)?;
+        let frames = frames(&scene, |[x, y, _]| (16 * y + x) as f64 / 255.0);
+        let picture = drawn::picture(&bench.context, &scene, &frames)?;
+        for (i, texel) in picture.rgba.chunks_exact(4).enumerate() {
+            let apart = texel[..3].iter().map(|v| v.abs_diff(i as u8)).max().unwrap_or(0);
+            if apart > 0 && {
+                wrong += 1;
+                wrong <= 4
+            } {
+                let at = [i % 16, i / 16, 0];
+                let input = if floats { "a picture of floats, then of 8 bits" } else { "a picture straight of 8 bits" };
+                found.faults.push(fault(input.into(), "another level", "screen", at, [i as f64, f64::from(texel[0])]));
+            }
+        }
+    }
+    found.figures.push(Figure::error("levels that are others", f64::from(wrong), 0.0, Unit::Count));
+    Ok(found)
+}
+
+/// MIP of dark tissue with one bright voxel a column is that voxel's value, wherever along the ray it lies.
+fn largest(bench: &mut Bench) -> Result<Found, GpuError> {
+    let (mut found, mut off) = (Found::default(), 0.0f64);
+    for depth in [0, 1, 7, 22, 23] {
+        let toml = "mode = 'mip'\npicture = { size = [12, 12] }\nray = { step = 0.5, sampling = 'exact' }\ncamera = { field_of_view = 0 }\npost = { floats = true }";
+        let scene = made(block(0.5, [12, 24, 12]), toml)?;
+        let frames = frames(&scene, |[_, y, _]| if y == depth { 0.8 } else { 0.2 });
+        let got = drawn::slot(&bench.context, &scene, &frames, Slot::Picture)?.get([6, 6, 0])[0];
+        // Steps as long as voxels meet each between its middle and half a voxel beside it.
+        let (low, high) = (0.5 - 0.002, 0.8 + 0.002);
+        off = off.max(if (low..=high).contains(&got) { 0.0 } else { 1.0 });
+        if !(low..=high).contains(&got) {
+            let input = format!("a bright layer {depth} voxels deep");
+            found.faults.push(fault(input, "the brightest sample is not seen", "picture", [6, 6, 0], [0.8, got]));
+        }
+    }
+    found.figures.push(Figure::error("layers that are not seen", off, 0.0, Unit::Count));
+    let miss = MISS;
+    found.expect(miss > 3e38, || "a miss is the largest float".into());
+    Ok(found)
+}

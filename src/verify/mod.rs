@@ -1,0 +1,209 @@
+//! Whether a device and its driver still do what they should: every pass, every mode and every way to fail, on inputs that are part of
+//! the program. Needs no source tree. What came of it is a [`Run`]; [`crate::report::verify`] makes reports of that.
+//!
+//! A check says what it measured and what is wrong; [`Bench`] is what it works on. The groups are the files of this folder; the
+//! self-test plants faults and looks which check notices each.
+
+pub mod built_in;
+mod compared;
+pub mod drawn;
+pub mod inputs;
+mod known_answers;
+pub mod passes;
+mod shown;
+
+use crate::gpu::single::Single;
+use crate::gpu::{Context, ContextOptions, GpuError};
+use crate::measuring::machine;
+use crate::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Verdict};
+use crate::scene::Scene;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Instant;
+
+pub use compared::{Comparison, compare};
+
+/// What checks work on: a device, and the scenes that are part of the program.
+pub struct Bench {
+    pub context: Arc<Context>,
+    pub level: Level,
+    options: ContextOptions,
+    single: Option<Single>,
+    scenes: Rc<Vec<(String, Scene)>>,
+    /// Done to every context that is made: planted faults.
+    prepare: Option<fn(&Context)>,
+    /// Messages of validation that were told.
+    told: usize,
+}
+
+impl Bench {
+    /// # Errors
+    /// No device, or none with the validation layer where that is asked for.
+    pub fn new(options: &ContextOptions, level: Level) -> Result<Bench, GpuError> {
+        Bench::prepared(options, level, None)
+    }
+
+    /// The same with something done to every context before anything is made from it.
+    ///
+    /// # Errors
+    /// As of [`Bench::new`].
+    pub fn prepared(options: &ContextOptions, level: Level, prepare: Option<fn(&Context)>) -> Result<Bench, GpuError> {
+        let context = Context::new(options)?;
+        prepare.iter().for_each(|prepare| prepare(&context));
+        let made = |asked: &built_in::Asked| Ok((asked.name.clone(), asked.make()?));
+        let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
+        let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
+        Ok(Bench { context, level, options: options.clone(), single: None, scenes, prepare, told: 0 })
+    }
+
+    /// Scenes by name, which among them need every pass.
+    pub fn scenes(&self) -> Rc<Vec<(String, Scene)>> {
+        self.scenes.clone()
+    }
+
+    /// What runs one pass alone.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn single(&mut self) -> Result<&mut Single, GpuError> {
+        if self.single.is_none() {
+            self.single = Some(Single::new(&self.context)?);
+        }
+        // Just made, where there was none.
+        self.single.as_mut().ok_or(GpuError::Broken("no pass can be run alone".into()))
+    }
+
+    /// Another context on the same device: the old one was lost, or is to be lost.
+    ///
+    /// # Errors
+    /// As of [`Bench::new`].
+    pub fn another(&self) -> Result<Arc<Context>, GpuError> {
+        let context = Context::new(&self.options)?;
+        self.prepare.iter().for_each(|prepare| prepare(&context));
+        Ok(context)
+    }
+
+    fn renew(&mut self) -> Result<(), GpuError> {
+        (self.single, self.told) = (None, 0);
+        self.context = self.another()?;
+        Ok(())
+    }
+
+    /// What validation said since it was last asked.
+    fn complaints(&mut self) -> Vec<String> {
+        let messages = self.context.messages();
+        let new = messages[self.told.min(messages.len())..].to_vec();
+        self.told = messages.len();
+        new
+    }
+}
+
+/// What a check found.
+#[derive(Default)]
+pub struct Found {
+    pub figures: Vec<Figure>,
+    pub faults: Vec<Fault>,
+    pub notes: Vec<String>,
+    pub pictures: Vec<Shown>,
+    /// Not run, because this device or system lacks something: what.
+    pub left_out: Option<String>,
+}
+
+impl Found {
+    /// What was not run, and why.
+    pub fn left_out(why: impl Into<String>) -> Found {
+        Found { left_out: Some(why.into()), ..Found::default() }
+    }
+
+    /// A fault unless something holds.
+    pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.faults.push(Fault::new(what()));
+        }
+    }
+
+    /// Keeps an error, and makes it a fault where it is more than allowed. NaN is more than anything.
+    pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
+        let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
+        self.expect(within, what);
+        self.figures.push(figure);
+    }
+}
+
+type Work = Box<dyn Fn(&mut Bench) -> Result<Found, GpuError>>;
+
+/// One thing that is looked at.
+pub struct Check {
+    pub group: &'static str,
+    /// Unique in its group.
+    pub name: String,
+    work: Work,
+}
+
+impl Check {
+    pub fn new(
+        group: &'static str,
+        name: impl Into<String>,
+        work: impl Fn(&mut Bench) -> Result<Found, GpuError> + 'static,
+    ) -> Check {
+        Check { group, name: name.into(), work: Box::new(work) }
+    }
+
+    /// Runs it. A device that fails is a fault of its own, and the next check gets another context.
+    pub fn run(&self, bench: &mut Bench) -> Outcome {
+        let begun = Instant::now();
+        let mut found = (self.work)(bench).unwrap_or_else(|error| {
+            let mut found = Found::default();
+            found.faults.push(Fault::new(error.to_string()));
+            if error.is_device_lost() {
+                bench.renew().unwrap_or_else(|e| found.faults.push(Fault::new(format!("and no other device: {e}"))));
+            }
+            found
+        });
+        let complaints = bench.complaints();
+        found.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
+        let verdict = match (found.faults.is_empty(), &found.left_out) {
+            (false, _) => Verdict::Failed,
+            (true, Some(_)) => Verdict::LeftOut,
+            (true, None) => Verdict::Passed,
+        };
+        found.notes.extend(found.left_out);
+        Outcome {
+            group: self.group.into(),
+            name: self.name.clone(),
+            verdict,
+            seconds: begun.elapsed().as_secs_f64(),
+            figures: found.figures,
+            faults: found.faults,
+            notes: found.notes,
+            pictures: found.pictures,
+        }
+    }
+}
+
+/// Every check of a level, in running order.
+pub fn checks(level: Level) -> Vec<Check> {
+    [passes::checks(level), known_answers::checks(level)].into_iter().flatten().collect()
+}
+
+/// Runs checks one after the other; `tell` hears of each as it is done, and says whether to go on.
+pub fn run(bench: &mut Bench, checks: &[Check], mut tell: impl FnMut(&Outcome) -> bool) -> Run {
+    let (date, begun) = (machine::date(), Instant::now());
+    let mut outcomes = Vec::new();
+    for check in checks {
+        outcomes.push(check.run(bench));
+        if !outcomes.last().is_some_and(&mut tell) {
+            break;
+        }
+    }
+    Run {
+        format: FORMAT.into(),
+        program: machine::program(),
+        date,
+        device: machine::device(&bench.context),
+        level: bench.level,
+        validation: bench.options.validation,
+        seconds: begun.elapsed().as_secs_f64(),
+        outcomes,
+    }
+}
