@@ -19,6 +19,7 @@ mod serial;
 mod shown;
 mod stream;
 mod support_bundle;
+mod verify;
 mod view;
 
 use clap::{Parser, Subcommand};
@@ -77,6 +78,8 @@ enum Command {
     Filter(Box<filter::Filter>),
     /// Say where the time goes, pass by pass, and compare two such runs
     Profile(Box<profile::Profile>),
+    /// Say whether this device and its driver still draw what they should
+    Verify(verify::Verify),
     /// Report error against run time, dial by dial, or the thesis' tables of times
     Report(report::Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
@@ -127,6 +130,7 @@ pub fn run() -> ExitCode {
             Command::View(view) => view.run(),
             Command::Filter(filter) => filter.run(),
             Command::Profile(profile) => profile.run(),
+            Command::Verify(verify) => verify.run(),
             Command::Report(report) => report.run(),
             Command::Phantom(phantom) => phantom.run(),
             Command::Convert(convert) => convert.run(),

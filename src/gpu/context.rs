@@ -197,6 +197,11 @@ impl Context {
         Ok(context)
     }
 
+    /// Whether the validation layer watches.
+    pub fn is_watched(&self) -> bool {
+        self.messenger.is_some()
+    }
+
     /// What validation has said so far; silence is the pass mark.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()

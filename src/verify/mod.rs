@@ -4,13 +4,16 @@
 //! A check says what it measured and what is wrong; [`Bench`] is what it works on. The groups are the files of this folder; the
 //! self-test plants faults and looks which check notices each.
 
+pub mod against;
 pub mod built_in;
 mod compared;
 pub mod drawn;
 pub mod inputs;
 mod known_answers;
+pub mod modes;
 pub mod passes;
 mod shown;
+mod speed;
 
 use crate::gpu::single::Single;
 use crate::gpu::{Context, ContextOptions, GpuError};
@@ -81,6 +84,15 @@ impl Bench {
         let context = Context::new(&self.options)?;
         self.prepare.iter().for_each(|prepare| prepare(&context));
         Ok(context)
+    }
+
+    pub fn options(&self) -> &ContextOptions {
+        &self.options
+    }
+
+    /// Whether the validation layer watches.
+    pub fn watched(&self) -> bool {
+        self.options.validation
     }
 
     fn renew(&mut self) -> Result<(), GpuError> {
@@ -183,7 +195,7 @@ impl Check {
 
 /// Every check of a level, in running order.
 pub fn checks(level: Level) -> Vec<Check> {
-    [passes::checks(level), known_answers::checks(level)].into_iter().flatten().collect()
+    [passes::checks(level), known_answers::checks(level), modes::checks(level), speed::checks(level)].into_iter().flatten().collect()
 }
 
 /// Runs checks one after the other; `tell` hears of each as it is done, and says whether to go on.

@@ -1,0 +1,87 @@
+//! How long each pass takes alone, by the device's own clock. Nothing here fails by itself: a baseline says what it took before.
+
+use super::built_in::{ALL_FILTERS, BYTES, scene, wobbler};
+use super::{Bench, Check, Found};
+use crate::gpu::{Context, ContextOptions, GpuError, single};
+use crate::passes::{PASSES, Pass};
+use crate::probe::{Axis, Geometry, Probe};
+use crate::report::verify::{Figure, Level};
+use crate::scene::{Sampling, Scene};
+
+/// Scenes of pictures as large as a small display's tile, that among them need every pass: the first that needs a pass is what it is
+/// timed in.
+const SCENES: [&str; 12] = [
+    "mode = 'sr'",
+    "mode = 'vr'",
+    "mode = 'mip'",
+    "mode = 'orthogonal'",
+    "mode = 'orthogonal'\npost = { floats = true }",
+    "mode = 'cube'",
+    "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { blur = true, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\nray = { sampling = 'quads' }",
+    "mode = 'vr'\nconditioning = { samples = 120, low_pass = 1.0, dynamic_range = 50 }\nslices = { estimator = 'median' }",
+    "mode = 'sr'\nslices = { enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, growth = true }, perona_malik = { repeat = 2 } }\n\
+     distance = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }\npost = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }",
+    "mode = 'sr'\nslices = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }\npost = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }",
+    ALL_FILTERS,
+];
+
+fn probe() -> Probe {
+    let (lines, slices) = (Axis::centred(1.1 / 95.0, 96), Axis::centred(0.8 / 32.0, 33));
+    Probe { lines, slices, sample_pitch: 0.25, samples: 240, ..wobbler() }
+}
+
+fn scenes() -> Result<Vec<Scene>, String> {
+    let one = |toml: &&str| {
+        let mut scene = scene(Geometry::Sweep(probe()), BYTES, toml)?;
+        scene.settings.picture.size = [192, 192];
+        let settings = scene.settings.clone();
+        Scene::new(scene.geometry, scene.input, settings).map_err(|e| e.to_string())
+    };
+    SCENES.iter().map(one).collect()
+}
+
+/// The scene that a pass is timed in.
+fn scene_of<'a>(scenes: &'a [Scene], pass: &Pass) -> Option<&'a Scene> {
+    // A Cartesian volume alone needs some passes: those are not timed.
+    scenes.iter().find(|scene| {
+        let quads = pass.name != "quads" || scene.settings.ray.sampling == Sampling::Quads;
+        quads && pass.is_needed(scene)
+    })
+}
+
+pub fn checks(_: Level) -> Vec<Check> {
+    let check = |pass: &'static Pass| Check::new("speed", pass.name, move |bench| time(bench, pass));
+    PASSES.iter().map(check).collect()
+}
+
+fn time(bench: &mut Bench, pass: &'static Pass) -> Result<Found, GpuError> {
+    let repeats = if bench.level == Level::Full { 25 } else { 7 };
+    let scenes = scenes().map_err(GpuError::Broken)?;
+    let Some(scene) = scene_of(&scenes, pass) else {
+        return Ok(Found::left_out("no scene that is timed needs it"));
+    };
+    // Validation looks at every command and at every submission: times are taken without it.
+    let own = bench.watched().then(|| Context::new(&ContextOptions { validation: false, ..bench.options().clone() }));
+    let context = own.transpose()?.unwrap_or_else(|| bench.context.clone());
+    let samples = single::time(&context, scene, pass, repeats)?;
+    let mut found = Found::default();
+    if samples.is_empty() {
+        return Ok(Found::left_out("the device has no time stamps"));
+    }
+    let figure = Figure::times("time on the device", samples);
+    found.figures.push(figure.map_err(|e| GpuError::Broken(format!("times of '{}': {e}", pass.name)))?);
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pass_but_those_of_cartesian_volumes_has_a_scene_that_it_is_timed_in() {
+        let scenes = scenes().unwrap();
+        let without = PASSES.iter().filter(|pass| scene_of(&scenes, pass).is_none()).map(|p| p.name);
+        assert_eq!(without.collect::<Vec<_>>(), ["load_slice"]);
+    }
+}
