@@ -1,0 +1,8 @@
+//! What is made of a verification's findings: JSON that comes back, comparisons of simulated runs, reports that other programs read.
+//! Needs no GPU.
+
+mod json;
+#[allow(dead_code)]
+#[path = "../profile/simulated.rs"]
+mod profile;
+mod simulated;
