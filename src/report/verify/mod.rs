@@ -1,8 +1,10 @@
 //! What `echolume verify` found: every check with its errors, times and faults, and what it ran on. Reports and comparisons with an
 //! earlier run follow from it; nothing here runs a device.
 
+pub mod baseline;
 pub mod json;
 pub mod numbers;
+pub mod words;
 
 use super::profile::Device;
 use super::profile::statistics::{Sample, SampleError};
