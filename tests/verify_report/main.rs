@@ -3,6 +3,7 @@
 
 mod baseline;
 mod json;
+mod junit;
 #[allow(dead_code)]
 #[path = "../profile/simulated.rs"]
 mod profile;

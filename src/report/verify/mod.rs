@@ -3,6 +3,7 @@
 
 pub mod baseline;
 pub mod json;
+pub mod junit;
 pub mod numbers;
 pub mod words;
 
