@@ -2,6 +2,7 @@
 //! Needs no GPU.
 
 mod baseline;
+mod html;
 mod json;
 mod junit;
 #[allow(dead_code)]

@@ -2,6 +2,7 @@
 //! earlier run follow from it; nothing here runs a device.
 
 pub mod baseline;
+pub mod html;
 pub mod json;
 pub mod junit;
 pub mod numbers;
