@@ -2,7 +2,7 @@
 
 use super::profile;
 use super::profile::Random;
-use super::simulated::{any_run, check, fail, outcome, run};
+use super::simulated::{any_run, check, fail, outcome, run, slower};
 use echolume::report::verify::baseline::{Class, Compared, Options, compare};
 use echolume::report::verify::{Figure, Level, Run, Unit, Verdict, words};
 use proptest::prelude::*;
@@ -22,10 +22,6 @@ fn changed(change: impl Fn(&mut Run)) -> Compared {
     let mut new = old.clone();
     change(&mut new);
     compared(&old, &new)
-}
-
-fn slower(run: &mut Run, name: &str, factor: f64) {
-    check(run, "speed", name).figures[0].samples.iter_mut().for_each(|ns| *ns *= factor);
 }
 
 #[test]
@@ -111,6 +107,26 @@ fn checks_and_figures_that_only_one_run_has_are_told() {
         (Class::Changed, "passes / median: largest error: allowed 2 -> 3 levels"),
     ];
     assert_eq!(told(&differing), expected.map(|(class, line)| (class, line.to_string())));
+}
+
+#[test]
+fn a_terminal_is_told_of_every_check_that_is_worse_and_of_some_of_the_rest() {
+    let many = |value: f64| {
+        let mut many = run(1);
+        for i in 0..100 {
+            let mut check = outcome("every input", &format!("input {i}"), Verdict::Passed);
+            check.figures.push(Figure::error("largest error", value, 2.0, Unit::Levels));
+            many.outcomes.push(check);
+        }
+        many
+    };
+    let text = words::comparison(&compared(&many(0.5), &many(1.0)));
+    assert!(
+        text.contains("input 39: ") && !text.contains("input 40: ") && text.contains("\n  and 60 more\n"),
+        "{text}"
+    );
+    let text = words::comparison(&compared(&many(0.5), &many(3.0)));
+    assert!(text.contains("input 99: ") && !text.contains(" more\n"), "{text}");
 }
 
 /// 5 % of 400 are 20.

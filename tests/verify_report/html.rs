@@ -1,6 +1,6 @@
 //! The page, read back as a browser would.
 
-use super::simulated::{any_run, check, fail, outcome, run, shown};
+use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
 use echolume::report::verify::baseline::{Options, compare};
 use echolume::report::verify::html::html;
 use echolume::report::verify::{Fault, Figure, Run, Unit, Verdict, numbers};
@@ -55,7 +55,7 @@ fn bad_update() -> (Run, Run) {
     check(&mut new, "modes", "vr").pictures = vec![shown("a head, seen from the left", 256, Some(0))];
     check(&mut new, "passes", "median").figures[0].value = 1.4;
     check(&mut new, "passes", "shade").notes.push("without r16f it takes r32f".into());
-    check(&mut new, "speed", "shade").figures[0].samples.iter_mut().for_each(|ns| *ns *= 1.14);
+    slower(&mut new, "shade", 1.14);
     let mut lost = Fault::new("the device was lost: VK_ERROR_DEVICE_LOST");
     lost.pass = Some("shadow".into());
     let shadow = check(&mut new, "passes", "shadow");
@@ -96,7 +96,7 @@ fn what_went_wrong_comes_first_with_its_pictures_side_by_side() {
         "worst pixel at (12, 34, 0) of picture, channel 2",
         "expected 0.5",
         "got NaN",
-        "largest error 17 of 2 levels too large",
+        "largest error 17 of 2 levels beyond",
     ] {
         assert!(words.contains(part), "{part}: {words}");
     }
@@ -129,7 +129,7 @@ fn a_run_in_which_all_is_well_says_so_and_one_of_nothing_does_not() {
     nothing.outcomes.retain(|o| o.verdict == Verdict::LeftOut);
     assert_eq!(text(all(&checked(&page(&nothing, None)), "h1")[0]), "Nothing was checked");
     let mut slow = run(1);
-    check(&mut slow, "speed", "tone").figures[0].samples.iter_mut().for_each(|ns| *ns *= 2.0);
+    slower(&mut slow, "tone", 2.0);
     assert_eq!(text(all(&checked(&page(&slow, Some(&run(1)))), "h1")[0]), "Worse than before");
 }
 

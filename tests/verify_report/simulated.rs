@@ -74,6 +74,13 @@ pub fn check<'a>(run: &'a mut Run, group: &str, name: &str) -> &'a mut Outcome {
     run.outcomes.iter_mut().find(|o| o.group == group && o.name == name).expect("check")
 }
 
+/// A check that takes `factor` times as long.
+pub fn slower(run: &mut Run, name: &str, factor: f64) {
+    let figure = &mut check(run, "speed", name).figures[0];
+    let samples = figure.samples.iter().map(|ns| factor * ns).collect();
+    *figure = Figure::times("device time", samples).expect("times");
+}
+
 /// Makes a check of a pass fail, with the worst that a driver does.
 pub fn fail(run: &mut Run, group: &str, name: &str) {
     let check = check(run, group, name);

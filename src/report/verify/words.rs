@@ -5,6 +5,9 @@ use super::numbers::{expected_and_got, number, of_allowed, percent, plain, secon
 use super::{Fault, Outcome, Run, Verdict, Worst};
 use std::fmt::Write as _;
 
+/// Changes of a kind that a terminal is given, but for those that fail the run.
+const MOST_CHANGES: usize = 40;
+
 /// One line on a group, without its end: what came of its checks, how long they took, and which came nearest to its tolerance.
 pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
@@ -93,19 +96,24 @@ pub fn summary(run: &Run) -> String {
     )
 }
 
-/// What changed since an earlier run, the worst first; lines, the last with its end.
+/// What changed since an earlier run, the worst first; lines, the last with its end. What fails the run is told in full; of the
+/// rest, how much more there is.
 pub fn comparison(compared: &Compared) -> String {
     let mut text = format!("compared with {}\n", compared.baseline);
     for line in compared.differences.iter().chain(&compared.notes) {
         let _ = writeln!(text, "{line}");
     }
     for class in Class::ALL {
-        let mut changes = compared.changes.iter().filter(|c| c.class == class).peekable();
-        if changes.peek().is_some() {
+        let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
+        let told = if class == Class::Worse { changes.len() } else { changes.len().min(MOST_CHANGES) };
+        if told > 0 {
             let _ = writeln!(text, "{}:", class.word());
         }
-        for change in changes {
+        for change in &changes[..told] {
             let _ = writeln!(text, "  {change}");
+        }
+        if told < changes.len() {
+            let _ = writeln!(text, "  and {} more", changes.len() - told);
         }
     }
     let _ = writeln!(text, "{}", compared.conclusion());

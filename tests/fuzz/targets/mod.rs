@@ -98,7 +98,7 @@ pub const TARGETS: &[Target] = &[
         run: reports::verification,
         text: true,
         memory: 64 * MIB,
-        rounds: 20_000,
+        rounds: 120_000,
         also: &[],
     },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },

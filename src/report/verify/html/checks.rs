@@ -55,7 +55,7 @@ fn bar(used: f64) -> Markup {
             span style={ "width:" (width) "%" } {}
         }
         " "
-        span class="share" { @if beyond { "too large" } @else { (percent(used)) } }
+        span class="share" { @if beyond { "beyond" } @else { (percent(used)) } }
     }
 }
 
@@ -79,7 +79,7 @@ pub fn group(at: usize, name: &str, outcomes: &[&Outcome], album: &mut Album) ->
                     }
                 }
                 table class="checks" {
-                    thead { tr { th { "Check" } th { "Verdict" } th { "Errors, of what is allowed" } th class="time" { "Time" } } }
+                    thead { tr { th { "Check" } th { "Verdict" } th { "Measured" } th class="time" { "Took" } } }
                     tbody { @for outcome in outcomes { (row(outcome)) } }
                 }
                 @if !shown.is_empty() {

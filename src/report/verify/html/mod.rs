@@ -156,7 +156,9 @@ fn baseline(compared: &Compared) -> Markup {
 
 /// Why checks were left out, and what else was noted, each reason once with the checks that it is of.
 fn notes(run: &Run) -> Markup {
-    let mut parts: [(&str, Vec<(String, Vec<String>)>); 2] = [("Left out", Vec::new()), ("Notes", Vec::new())];
+    /// A reason and its checks.
+    type Reasons = Vec<(String, Vec<String>)>;
+    let mut parts: [(&str, Reasons); 2] = [("Left out", Vec::new()), ("Notes", Vec::new())];
     let mut places = std::collections::HashMap::new();
     for outcome in &run.outcomes {
         let left_out = outcome.verdict == Verdict::LeftOut;

@@ -19,7 +19,7 @@ pub fn section(run: &Run) -> Markup {
         @if !groups.is_empty() {
             section id="times" {
                 h2 { "Times" }
-                p class="dim" { "Medians; the dark part of a bar is the interval that covers the true median with 95 %." }
+                p class="dim" { "Medians; the mark at the end of a bar is the interval that covers the true median with a probability of 95 %." }
                 @for (group, times) in groups {
                     @let longest = times.iter().map(|(_, f)| high(f)).fold(0.0, f64::max);
                     h3 { (plain(group)) }
