@@ -16,19 +16,32 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Writes a PNG beside the target first and renames it: a full disk leaves the old picture as it was.
+    /// The picture as a PNG, opaque; grey where it is.
     ///
     /// # Errors
-    /// One line naming the file and the fault.
-    pub fn save(&self, file: &Path) -> Result<(), String> {
-        let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
+    /// One line: it has no pixels, or not as many as its size says.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
+        let pixels = self.width as usize * self.height as usize;
+        if pixels == 0 || self.rgba.len() != 4 * pixels {
+            let bytes = self.rgba.len();
+            return Err(format!("{bytes} bytes are no picture of {} x {} pixels", self.width, self.height));
+        }
         let mut bytes = Vec::new();
         let (compression, filter) = (CompressionType::Default, FilterType::Adaptive);
         let encoder = PngEncoder::new_with_quality(&mut bytes, compression, filter);
         let is_grey = self.rgba.chunks_exact(4).all(|p| p[0] == p[1] && p[1] == p[2]);
         let (channels, colour) = if is_grey { (1, ExtendedColorType::L8) } else { (3, ExtendedColorType::Rgb8) };
         let texels: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| &p[..channels]).copied().collect();
-        encoder.write_image(&texels, self.width, self.height, colour).map_err(|e| cannot(&e))?;
+        encoder.write_image(&texels, self.width, self.height, colour).map_err(|e| e.to_string())?;
+        Ok(bytes)
+    }
+
+    /// Writes a PNG beside the target first and renames it: a full disk leaves the old picture as it was.
+    ///
+    /// # Errors
+    /// One line naming the file and the fault.
+    pub fn save(&self, file: &Path) -> Result<(), String> {
+        let bytes = self.png().map_err(|e| format!("{}: cannot be written: {e}", file.display()))?;
         replace(file, &bytes)
     }
 

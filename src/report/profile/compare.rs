@@ -149,14 +149,14 @@ pub fn compare(old: &Profile, new: &Profile, options: &Options) -> Result<Compar
 
 /// The times of one line in one run.
 #[derive(Clone, Copy)]
-pub(super) struct Series<'a> {
+pub(in crate::report) struct Series<'a> {
     pub stage: &'a str,
     pub runs: u32,
     pub times: &'a [f64],
 }
 
 /// A line, in the runs that have it.
-pub(super) struct Pair<'a> {
+pub(in crate::report) struct Pair<'a> {
     pub kind: Kind,
     pub name: &'a str,
     pub old: Option<Series<'a>>,

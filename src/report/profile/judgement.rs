@@ -12,7 +12,7 @@ const FEWEST_BLOCKS: usize = 6;
 const COMMON: usize = 3;
 
 /// The fewest blocks a run with which the test can call any of `lines` different at all.
-pub(super) fn blocks(lines: usize, alpha: f64) -> usize {
+pub(in crate::report) fn blocks(lines: usize, alpha: f64) -> usize {
     (FEWEST_BLOCKS..100).find(|b| least_p(*b) * lines as f64 <= alpha).unwrap_or(100)
 }
 
@@ -75,7 +75,12 @@ fn typical_range(passes: &[&Tested]) -> f64 {
 }
 
 /// Every pair's verdict. `tick` is the device clock's, ns.
-pub(super) fn lines(pairs: Vec<Pair>, blocks: usize, tick: f64, options: &Options) -> Result<Vec<Line>, SampleError> {
+pub(in crate::report) fn lines(
+    pairs: Vec<Pair>,
+    blocks: usize,
+    tick: f64,
+    options: &Options,
+) -> Result<Vec<Line>, SampleError> {
     let mut tested = Vec::new();
     for pair in &pairs {
         // The host's clock counts single nanoseconds.
@@ -142,7 +147,7 @@ fn line(pair: Pair, ratio: Option<Ratio>, fault: Option<String>, options: &Optio
 }
 
 /// A sentence where all passes moved by much the same: then a clock did, rather than a pass.
-pub(super) fn common_shift(lines: &[Line]) -> Option<String> {
+pub(in crate::report) fn common_shift(lines: &[Line]) -> Option<String> {
     let passes: Vec<Ratio> = lines.iter().filter(|l| l.kind == Kind::Pass).filter_map(|l| l.ratio).collect();
     let logs: Vec<f64> = passes.iter().map(|r| r.estimate.ln()).collect();
     let sample = Sample::new(&logs).ok().filter(|s| s.count() >= COMMON)?;

@@ -4,7 +4,7 @@
 pub mod compare;
 pub mod differences;
 pub mod formats;
-mod judgement;
+pub(in crate::report) mod judgement;
 pub mod ranks;
 pub mod statistics;
 pub mod table;

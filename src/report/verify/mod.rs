@@ -1,12 +1,32 @@
 //! What `echolume verify` found: every check with its errors, times and faults, and what it ran on. Reports and comparisons with an
 //! earlier run follow from it; nothing here runs a device.
 
+pub mod baseline;
+pub mod html;
+pub mod json;
+pub mod junit;
+pub mod numbers;
+pub mod words;
+
 use super::profile::Device;
+use super::profile::statistics::{Sample, SampleError};
 use crate::picture::Picture;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// Version of the JSON; another layout gets another name.
 pub const FORMAT: &str = "echolume-verify-1";
+
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    #[error("format is '{found}', this program reads '{FORMAT}'; verify again with it")]
+    Format { found: String },
+    #[error("not a verification: {0}")]
+    Json(String),
+    /// Contents that contradict themselves.
+    #[error("{field}: {fault}")]
+    Contents { field: String, fault: String },
+}
 
 /// How much is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -45,6 +65,20 @@ impl Run {
 
     pub fn count(&self, verdict: Verdict) -> usize {
         self.outcomes.iter().filter(|o| o.verdict == verdict).count()
+    }
+
+    /// Outcomes of each group, groups in the order in which they first ran.
+    pub fn groups(&self) -> Vec<(&str, Vec<&Outcome>)> {
+        let mut places = HashMap::new();
+        let mut groups: Vec<(&str, Vec<&Outcome>)> = Vec::new();
+        for outcome in &self.outcomes {
+            let place = *places.entry(outcome.group.as_str()).or_insert_with(|| {
+                groups.push((&outcome.group, Vec::new()));
+                groups.len() - 1
+            });
+            groups[place].1.push(outcome);
+        }
+        groups
     }
 }
 
@@ -87,7 +121,8 @@ pub enum Verdict {
 pub struct Figure {
     /// Unique in its check.
     pub what: String,
-    /// The largest error; the median of times.
+    /// The largest error; the median of times. Not a number where the output was none.
+    #[serde(with = "json::any_number")]
     pub value: f64,
     /// The largest value that passes; none where any does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -141,7 +176,9 @@ pub struct Worst {
     /// Column, row, slice.
     pub at: [usize; 3],
     pub channel: usize,
+    #[serde(with = "json::any_number")]
     pub expected: f64,
+    #[serde(with = "json::any_number")]
     pub got: f64,
     /// Texels beyond their tolerance.
     pub beyond: usize,
@@ -172,5 +209,57 @@ impl Figure {
     /// An error and what is allowed of it.
     pub fn error(what: impl Into<String>, value: f64, allowed: f64, unit: Unit) -> Figure {
         Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new() }
+    }
+
+    /// Times of one and the same work in the order measured, ns.
+    ///
+    /// # Errors
+    /// There are none, or one of them is not finite.
+    pub fn times(what: impl Into<String>, samples: Vec<f64>) -> Result<Figure, SampleError> {
+        let value = Sample::new(&samples)?.median();
+        Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples })
+    }
+
+    /// How much of what is allowed it takes: beyond 1 fails, and what is not a number takes infinitely much. None where any
+    /// value is allowed.
+    pub fn used(&self) -> Option<f64> {
+        let allowed = self.allowed?;
+        Some(match self.value {
+            value if value <= 0.0 && value <= allowed => 0.0,
+            value if value.is_nan() || allowed <= 0.0 => f64::INFINITY,
+            value => value / allowed,
+        })
+    }
+}
+
+impl Outcome {
+    /// The figure that is nearest to what is allowed of it, or furthest beyond.
+    pub fn tightest(&self) -> Option<&Figure> {
+        let used = self.figures.iter().filter_map(|f| Some((f, f.used()?)));
+        used.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(figure, _)| figure)
+    }
+
+    /// Group and name, as one would ask for it.
+    pub fn title(&self) -> String {
+        format!("{} / {}", numbers::plain(&self.group), numbers::plain(&self.name))
+    }
+}
+
+impl Verdict {
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Passed => "passed",
+            Verdict::Failed => "failed",
+            Verdict::LeftOut => "left out",
+        }
+    }
+}
+
+impl Level {
+    pub fn word(self) -> &'static str {
+        match self {
+            Level::Quick => "quick",
+            Level::Full => "full",
+        }
     }
 }

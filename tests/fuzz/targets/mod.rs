@@ -7,6 +7,7 @@ mod files;
 mod kiosk;
 mod motor;
 mod network;
+mod reports;
 mod scenes;
 mod voxels;
 
@@ -92,6 +93,14 @@ pub const TARGETS: &[Target] = &[
         also: &["tools/kiosk/echolume.toml"],
     },
     Target { name: "redacted", run: kiosk::redacted, text: true, memory: 64 * MIB, rounds: 60_000, also: &[] },
+    Target {
+        name: "verification",
+        run: reports::verification,
+        text: true,
+        memory: 64 * MIB,
+        rounds: 120_000,
+        also: &[],
+    },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },
 ];
 

@@ -1,0 +1,109 @@
+//! A run as JUnit XML, which CI systems read: a suite a group, a case a check.
+
+use super::baseline::Compared;
+use super::numbers::{of_allowed, plain};
+use super::{Outcome, Run, Verdict, words};
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use std::time::Duration;
+
+/// The whole file. With a comparison there is one suite more, whose only case fails where anything is worse.
+///
+/// # Errors
+/// One line: the XML could not be written.
+pub fn junit(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
+    let mut report = Report::new("echolume verify");
+    report.timestamp = run.date.parse().ok();
+    report.time = duration(run.seconds);
+    for (group, outcomes) in run.groups() {
+        report.add_test_suite(suite(run, group, &outcomes));
+    }
+    if let Some(compared) = compared {
+        report.add_test_suite(baseline(run, compared));
+    }
+    report.to_string().map_err(|e| format!("JUnit XML: {}", plain(&e.to_string())))
+}
+
+/// None of what is no time.
+fn duration(seconds: f64) -> Option<Duration> {
+    Duration::try_from_secs_f64(seconds).ok()
+}
+
+/// An empty suite that says what it ran on: readers show suites by themselves.
+fn suite_on(run: &Run, name: &str) -> TestSuite {
+    let mut suite = TestSuite::new(plain(name));
+    suite.timestamp = run.date.parse().ok();
+    let properties = [
+        ("device", plain(&run.device.name)),
+        ("driver", plain(&run.device.driver)),
+        ("api", plain(&run.device.api)),
+        ("program", plain(&run.program)),
+        ("level", run.level.word().into()),
+        ("validation", run.validation.to_string()),
+        ("date", plain(&run.date)),
+    ];
+    suite.add_properties(properties.iter().map(|(name, value)| (*name, value.as_str())));
+    suite
+}
+
+fn suite(run: &Run, group: &str, outcomes: &[&Outcome]) -> TestSuite {
+    let mut suite = suite_on(run, group);
+    suite.time = duration(outcomes.iter().map(|o| o.seconds).sum());
+    suite.add_test_cases(outcomes.iter().map(|outcome| case(outcome)));
+    suite
+}
+
+fn case(outcome: &Outcome) -> TestCase {
+    let status = match outcome.verdict {
+        Verdict::Passed => TestCaseStatus::success(),
+        Verdict::Failed => {
+            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+            let first = outcome.faults.first().map_or_else(|| "failed".into(), |fault| plain(&fault.what));
+            let more = match outcome.faults.len() {
+                0 | 1 => String::new(),
+                count => format!(" (and {} more)", count - 1),
+            };
+            status.set_message(first + &more).set_type("failed").set_description(words::failure(outcome));
+            status
+        }
+        Verdict::LeftOut => {
+            let mut status = TestCaseStatus::skipped();
+            let why: Vec<String> = outcome.notes.iter().map(|note| plain(note)).collect();
+            status.set_message(if why.is_empty() { "left out".into() } else { why.join("; ") });
+            status
+        }
+    };
+    let mut case = TestCase::new(plain(&outcome.name), status);
+    case.set_classname(plain(&outcome.group));
+    case.time = duration(outcome.seconds);
+    let figures = outcome.figures.iter().map(|f| format!("{}: {}", plain(&f.what), of_allowed(f)));
+    // The notes of what was left out are its message.
+    let notes = outcome.notes.iter().filter(|_| outcome.verdict != Verdict::LeftOut).map(|note| plain(note));
+    let lines: Vec<String> = figures.chain(notes).collect();
+    if !lines.is_empty() {
+        case.set_system_out(lines.join("\n"));
+    }
+    case
+}
+
+fn baseline(run: &Run, compared: &Compared) -> TestSuite {
+    let worse = compared.worse_checks();
+    let status = match worse {
+        0 => TestCaseStatus::success(),
+        _ => {
+            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+            let message = format!(
+                "{worse} {} worse than in {}",
+                if worse == 1 { "check is" } else { "checks are" },
+                compared.baseline
+            );
+            status.set_message(message).set_type("worse").set_description(words::comparison(compared));
+            status
+        }
+    };
+    let mut case = TestCase::new("nothing is worse than before", status);
+    case.set_classname("baseline").set_time(Duration::ZERO);
+    case.set_system_out(words::comparison(compared));
+    let mut suite = suite_on(run, "baseline");
+    suite.set_time(Duration::ZERO).add_test_case(case);
+    suite
+}

@@ -1,0 +1,121 @@
+//! What a run found, as text for a terminal.
+
+use super::baseline::{Class, Compared};
+use super::numbers::{expected_and_got, number, of_allowed, percent, plain, seconds};
+use super::{Fault, Outcome, Run, Verdict, Worst};
+use std::fmt::Write as _;
+
+/// Changes of a kind that a terminal is given, but for those that fail the run.
+const MOST_CHANGES: usize = 40;
+
+/// One line on a group, without its end: what came of its checks, how long they took, and which came nearest to its tolerance.
+pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
+    let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
+    let mut line =
+        format!("{:<18} {}", plain(group), counts([Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(count)));
+    let _ = write!(line, " in {}", seconds(outcomes.iter().map(|o| o.seconds).sum()));
+    let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
+    let used = passed.filter_map(|o| Some((o, o.tightest()?.used()?))).filter(|(_, used)| *used > 0.0);
+    if let Some((outcome, used)) = used.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
+        let _ = write!(line, "; nearest to its tolerance: {}, {}", plain(&outcome.name), percent(used));
+    }
+    line
+}
+
+/// Passed, failed, left out; what there is none of is not told, but for a run of nothing.
+fn counts(of: [usize; 3]) -> String {
+    let words = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(Verdict::word);
+    let told = of.iter().zip(words).filter(|(count, _)| **count > 0).map(|(count, word)| format!("{count} {word}"));
+    let told: Vec<String> = told.collect();
+    if told.is_empty() { "no checks".into() } else { told.join(", ") }
+}
+
+/// A failed check in full, one line an item, the last with its end.
+pub fn failure(outcome: &Outcome) -> String {
+    let mut text = format!("{}: {}\n", outcome.title(), outcome.verdict.word());
+    for fault in &outcome.faults {
+        let _ = writeln!(text, "  {}", plain(&fault.what));
+        for (name, value) in fault_items(fault) {
+            let _ = writeln!(text, "    {name}: {value}");
+        }
+    }
+    for figure in outcome.figures.iter().filter(|f| f.used().is_some_and(|used| used > 1.0)) {
+        let _ = writeln!(text, "  {}: {}", plain(&figure.what), of_allowed(figure));
+    }
+    for note in &outcome.notes {
+        let _ = writeln!(text, "  {}", plain(note));
+    }
+    text
+}
+
+/// What is known of a fault beside what it is, names first; all on one line each.
+pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
+    let mut items = Vec::new();
+    items.extend(fault.pass.as_deref().map(|pass| ("pass", plain(pass))));
+    if !fault.input.is_empty() {
+        items.push(("input", plain(&fault.input)));
+    }
+    if let Some(worst) = &fault.worst {
+        let [expected, got] = expected_and_got(worst.expected, worst.got);
+        items.push(("worst pixel", place(worst)));
+        items.push(("expected", expected));
+        items.push(("got", got));
+        items.push(("beyond tolerance", beyond(worst)));
+    }
+    if !fault.files.is_empty() {
+        items.push(("files", fault.files.iter().map(|f| plain(f)).collect::<Vec<_>>().join(", ")));
+    }
+    items
+}
+
+/// Where the worst texel lies.
+fn place(worst: &Worst) -> String {
+    let [x, y, z] = worst.at;
+    format!("at ({x}, {y}, {z}) of {}, channel {}", plain(&worst.output), worst.channel)
+}
+
+fn beyond(worst: &Worst) -> String {
+    let share = 100.0 * worst.beyond as f64 / worst.texels.max(1) as f64;
+    format!("{} of {} texels ({} %)", worst.beyond, worst.texels, number(share))
+}
+
+/// The last line, without its end.
+pub fn summary(run: &Run) -> String {
+    let device = &run.device;
+    let validation = if run.validation { ", validation layer watching" } else { "" };
+    format!(
+        "passed {}, failed {}, left out {} in {} on {}, {}, Vulkan {} ({}{validation})",
+        run.count(Verdict::Passed),
+        run.count(Verdict::Failed),
+        run.count(Verdict::LeftOut),
+        seconds(run.seconds),
+        plain(&device.name),
+        plain(&device.driver),
+        plain(&device.api),
+        run.level.word(),
+    )
+}
+
+/// What changed since an earlier run, the worst first; lines, the last with its end. What fails the run is told in full; of the
+/// rest, how much more there is.
+pub fn comparison(compared: &Compared) -> String {
+    let mut text = format!("compared with {}\n", compared.baseline);
+    for line in compared.differences.iter().chain(&compared.notes) {
+        let _ = writeln!(text, "{line}");
+    }
+    for class in Class::ALL {
+        let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
+        let told = if class == Class::Worse { changes.len() } else { changes.len().min(MOST_CHANGES) };
+        if told > 0 {
+            let _ = writeln!(text, "{}:", class.word());
+        }
+        for change in &changes[..told] {
+            let _ = writeln!(text, "  {change}");
+        }
+        if told < changes.len() {
+            let _ = writeln!(text, "  and {} more", changes.len() - told);
+        }
+    }
+    let _ = writeln!(text, "{}", compared.conclusion());
+    text
+}
