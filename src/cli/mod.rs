@@ -1,4 +1,4 @@
-//! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage.
+//! Subcommands, logging, and exit codes: 0 done, 1 failed, 2 bad input or usage; of `verify` 3 where there is no device.
 
 mod arriving;
 mod asked;
@@ -103,6 +103,15 @@ pub enum Failure {
     Input(String),
     /// It was right and still did not work: exit code 1.
     Failed(String),
+    /// `verify` has no device to look at: exit code 3.
+    NoDevice(String),
+}
+
+impl Failure {
+    pub fn message(self) -> String {
+        let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = self;
+        message
+    }
 }
 
 pub fn input(error: impl std::fmt::Display) -> Failure {
@@ -144,12 +153,13 @@ pub fn run() -> ExitCode {
         Some(error) => Err(Failure::Failed(format!("standard output: cannot be written: {error}"))),
         None => Ok(()),
     });
-    let (code, message) = match done {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Failed(message)) => (1, message),
-        Err(Failure::Input(message)) => (2, message),
+    let Err(failure) = done else { return ExitCode::SUCCESS };
+    let code = match failure {
+        Failure::Failed(_) => 1,
+        Failure::Input(_) => 2,
+        Failure::NoDevice(_) => 3,
     };
-    let _ = writeln!(std::io::stderr(), "echolume: {}", plain(&message));
+    let _ = writeln!(std::io::stderr(), "echolume: {}", plain(&failure.message()));
     ExitCode::from(code)
 }
 

@@ -128,7 +128,7 @@ impl Wanted {
         let open: Open = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
             Some(source) => Ok(source),
             None => match source.as_ref().map(Arriving::open) {
-                Some(opened) => opened.map_err(|(Failure::Input(why) | Failure::Failed(why))| why),
+                Some(opened) => opened.map_err(Failure::message),
                 None => Err("there is no source".into()),
             },
         });

@@ -1,47 +1,264 @@
 //! `echolume verify`.
 
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Choice, ContextOptions, GpuError};
-use echolume::report::verify::{Level, Verdict};
-use echolume::verify::{self, Bench};
-use std::path::PathBuf;
+use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
+use echolume::picture::{check_target, replace};
+use echolume::report::verify::baseline::{self, Compared, compare};
+use echolume::report::verify::{Level, Outcome, Run, Verdict, html, json, junit, words};
+use echolume::verify::{self, Bench, Check};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Longest baseline that is read, bytes.
+const LONGEST: u64 = 256 << 20;
 
 #[derive(clap::Args)]
+#[command(
+    after_help = "Exit codes: 0 everything is as it should be, 1 something is not, 2 usage or a file, 3 no device.\n\nExamples:\n  \
+                        echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
+                        echolume verify --full --json before.json               (before the driver is updated)\n  \
+                        echolume verify --full --baseline before.json --html after.html\n  \
+                        echolume verify --self-test                             (would it notice?)"
+)]
 pub struct Verify {
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
     device: Option<Choice>,
-    #[arg(long)]
+    /// Every pass, mode and path once: what is run unless --full is given
+    #[arg(long, conflicts_with = "full")]
     quick: bool,
-    #[arg(long, conflicts_with = "quick")]
+    /// Every input of every pass in every scene, and a stress of minutes
+    #[arg(long)]
     full: bool,
-    /// Only checks whose group or name holds this
+    /// Say what changed since this earlier run (its --json), also what stays within tolerance; exit code 1 if it became worse
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
+    /// Ratio of times to the baseline's that is a fault
+    #[arg(long, value_name = "RATIO", default_value_t = 1.25, requires = "baseline")]
+    threshold: f64,
+    /// Write JUnit XML, for CI
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write everything that was measured: the next run's baseline
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a page with pictures side by side
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Where the pictures of failures go: actual, expected, difference; made when there are some
+    #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
+    pictures: PathBuf,
+    /// Plant faults, one after the other, and say which check notices each; one that is not noticed is a failure
+    #[arg(long, conflicts_with_all = ["against", "full"])]
+    self_test: bool,
+    /// Draw the pictures of every mode on this device too, and compare them
+    #[arg(long, value_name = "N|NAME")]
+    against: Option<Choice>,
+    /// Only checks whose group or name holds this; may be given again
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
+    /// List the checks and end
+    #[arg(long)]
+    list: bool,
+    /// Without the validation layer, also where it is installed
+    #[arg(long)]
+    no_validation: bool,
+    /// Print what all pictures add up to, and nothing else
+    #[arg(long, hide = true)]
+    digest: bool,
 }
 
 impl Verify {
     pub fn run(&self) -> Result<(), Failure> {
         let level = if self.full { Level::Full } else { Level::Quick };
-        let options = ContextOptions { device: self.device.clone().unwrap_or(Choice::Best), validation: true };
-        let mut bench = Bench::new(&options, level).map_err(failed)?;
-        let mut checks = verify::checks(level);
-        checks.retain(|c| {
-            self.only.is_empty()
-                || self.only.iter().any(|o| c.group.contains(o.as_str()) || c.name.contains(o.as_str()))
-        });
-        let run = verify::run(&mut bench, &checks, |o| {
-            let figures: Vec<_> = o.figures.iter().map(|f| format!("{} {:.3}", f.what, f.value)).collect();
-            say!("{:?} {} / {}: {:.1} s {}", o.verdict, o.group, o.name, o.seconds, figures.join(", "));
-            for fault in &o.faults {
-                say!("   {fault:?}");
+        if self.list {
+            let checks = self.chosen(verify::checks(level))?;
+            checks.iter().for_each(|check| say!("{} / {}", check.group, check.name));
+            return Ok(());
+        }
+        let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
+        for file in [&self.json, &self.junit, &self.html].into_iter().flatten() {
+            check_target(file).map_err(failed)?;
+        }
+        let earlier = self.baseline.as_deref().map(read).transpose()?;
+        let mut run = self.checked(level)?;
+        self.save_pictures(&mut run);
+        let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
+        self.write(&run, compared.as_ref())?;
+        self.judge(&run, compared.as_ref())
+    }
+
+    /// What is looked at on the device, and what came of it.
+    fn checked(&self, level: Level) -> Result<Run, Failure> {
+        let mut bench = self.bench(level)?;
+        let device = &bench.context.candidate;
+        let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
+        let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };
+        say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
+        let checks = match &self.against {
+            Some(other) => {
+                let other = context(&ContextOptions { device: other.clone(), ..bench.options().clone() })?;
+                say!("against: {}, {}", other.candidate.name, other.candidate.driver.trim());
+                verify::against::checks(level, &other).map_err(failed)?
             }
-            true
+            None => verify::checks(level),
+        };
+        let checks = self.chosen(checks)?;
+        let stopped = stop_on_signal();
+        let mut group: Vec<Outcome> = Vec::new();
+        let run = verify::run(&mut bench, &checks, |outcome| {
+            if group.first().is_some_and(|first| first.group != outcome.group) {
+                tell(&std::mem::take(&mut group));
+            }
+            // Of each group one line, but a failure is told at once.
+            if outcome.verdict == Verdict::Failed {
+                say!("{}", words::failure(outcome).trim_end());
+            }
+            group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
+            !stopped.load(Ordering::Relaxed)
         });
-        let _ = (input("x"), GpuError::NoDevice, PathBuf::new());
-        match run.count(Verdict::Failed) {
-            0 => Ok(()),
-            n => Err(failed(format!("{n} checks failed"))),
+        tell(&group);
+        match run.outcomes.len() == checks.len() {
+            true => Ok(run),
+            false => Err(failed(format!(
+                "interrupted after {} of {} checks; nothing is written",
+                run.outcomes.len(),
+                checks.len()
+            ))),
         }
     }
+
+    /// With validation, where its layer is installed.
+    fn bench(&self, level: Level) -> Result<Bench, Failure> {
+        let device = self.device.clone().unwrap_or(Choice::Best);
+        let with = |validation| Bench::new(&ContextOptions { device: device.clone(), validation }, level);
+        match with(!self.no_validation) {
+            Err(GpuError::NoValidation) => with(false),
+            made => made,
+        }
+        .map_err(no_device)
+    }
+
+    fn chosen(&self, mut checks: Vec<Check>) -> Result<Vec<Check>, Failure> {
+        let holds =
+            |check: &Check, part: &String| check.group.contains(part.as_str()) || check.name.contains(part.as_str());
+        checks.retain(|check| self.only.is_empty() || self.only.iter().any(|part| holds(check, part)));
+        match checks.is_empty() {
+            true => Err(input(format!(
+                "--only {}: no check is called so; --list says what there are",
+                self.only.join(", ")
+            ))),
+            false => Ok(checks),
+        }
+    }
+
+    /// Writes what shows each failure, and names the files in it. A folder that cannot be written to loses only them.
+    fn save_pictures(&self, run: &mut Run) {
+        for outcome in run.outcomes.iter_mut().filter(|o| o.verdict == Verdict::Failed) {
+            for shown in &outcome.pictures {
+                let Some(fault) = shown.fault.and_then(|at| outcome.faults.get_mut(at)) else { continue };
+                let name = file_name(&format!("{}-{}-{}", outcome.group, outcome.name, shown.what));
+                for (kind, picture) in
+                    [("actual", &shown.actual), ("expected", &shown.expected), ("difference", &shown.difference)]
+                {
+                    let file = self.pictures.join(format!("{name}-{kind}.png"));
+                    let made = std::fs::create_dir_all(&self.pictures)
+                        .map_err(|e| format!("{}: {e}", self.pictures.display()));
+                    match made.and_then(|()| picture.save(&file)) {
+                        Ok(()) => fault.files.push(file.display().to_string()),
+                        Err(why) => return tracing::warn!("pictures of failures: {why}"),
+                    }
+                }
+            }
+        }
+    }
+
+    fn write(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
+        let to_json = || json::to_json(run).map_err(|e| e.to_string());
+        let files: [(&Option<PathBuf>, &dyn Fn() -> Result<String, String>); 3] = [
+            (&self.json, &to_json),
+            (&self.junit, &|| junit::junit(run, compared)),
+            (&self.html, &|| html::html(run, compared)),
+        ];
+        for (file, text) in files {
+            let Some(file) = file else { continue };
+            replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
+            say!("written: {}", file.display());
+        }
+        Ok(())
+    }
+
+    fn judge(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
+        if let Some(compared) = compared {
+            say!("{}", words::comparison(compared).trim_end());
+        }
+        say!("{}", words::summary(run));
+        let files: Vec<_> = run.failures().flat_map(|o| &o.faults).flat_map(|f| &f.files).collect();
+        if !files.is_empty() {
+            say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
+        }
+        let worse = compared.filter(|c| c.is_worse()).map_or(0, Compared::worse_checks);
+        match (run.count(Verdict::Failed), worse) {
+            (0, 0) => Ok(()),
+            (0, worse) => Err(failed(format!("{worse} checks became worse since the baseline"))),
+            (count, _) => Err(failed(format!("{count} of {} checks failed", run.outcomes.len()))),
+        }
+    }
+}
+
+fn tell(group: &[Outcome]) {
+    if let Some(first) = group.first() {
+        say!("{}", words::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
+    }
+}
+
+fn context(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
+    Context::new(options).map_err(no_device)
+}
+
+/// What there is no device for is told apart by its exit code.
+fn no_device(error: GpuError) -> Failure {
+    match error {
+        GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
+            Failure::NoDevice(error.to_string())
+        }
+        other => failed(other),
+    }
+}
+
+/// Set when somebody wants it to end; the second time it ends at once.
+fn stop_on_signal() -> Arc<AtomicBool> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP] {
+        // In this order: the first one finds the flag unset, and sets it.
+        let registered = signal_hook::flag::register_conditional_default(signal, stopped.clone())
+            .and_then(|_| signal_hook::flag::register(signal, stopped.clone()));
+        if let Err(fault) = registered {
+            tracing::warn!("signal {signal} cannot be waited for: {fault}");
+        }
+    }
+    stopped
+}
+
+/// Letters and digits of a title, so that it may be a file's name anywhere; of bounded length.
+fn file_name(title: &str) -> String {
+    let plain = title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    let mut name = String::new();
+    plain.for_each(|c| {
+        if c != '-' || !name.ends_with('-') {
+            name.push(c)
+        }
+    });
+    name.chars().take(100).collect::<String>().trim_matches('-').to_string()
+}
+
+fn read(file: &Path) -> Result<Run, Failure> {
+    let fault = |e: &dyn std::fmt::Display| input(format!("--baseline {}: {e}", file.display()));
+    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    if !about.is_file() || about.len() > LONGEST {
+        return Err(fault(&"is not a file of at most 256 MiB, so no --json of verify"));
+    }
+    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    json::from_json(&text).map_err(|e| fault(&e))
 }

@@ -140,7 +140,8 @@ impl View {
             let wanted = first.take().map_or_else(|| view.wanted(), Ok);
             let (wanted, amiss) = match wanted {
                 Ok(wanted) => (wanted, None),
-                Err(Failure::Input(why) | Failure::Failed(why)) => {
+                Err(failure) => {
+                    let why = failure.message();
                     tracing::error!("{why}");
                     (Wanted::nothing(), Some(view.amiss(why)))
                 }

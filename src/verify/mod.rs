@@ -195,7 +195,10 @@ impl Check {
 
 /// Every check of a level, in running order.
 pub fn checks(level: Level) -> Vec<Check> {
-    [passes::checks(level), known_answers::checks(level), modes::checks(level), speed::checks(level)].into_iter().flatten().collect()
+    [passes::checks(level), known_answers::checks(level), modes::checks(level), speed::checks(level)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Runs checks one after the other; `tell` hears of each as it is done, and says whether to go on.

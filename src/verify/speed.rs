@@ -56,7 +56,8 @@ pub fn checks(_: Level) -> Vec<Check> {
 }
 
 fn time(bench: &mut Bench, pass: &'static Pass) -> Result<Found, GpuError> {
-    let repeats = if bench.level == Level::Full { 25 } else { 7 };
+    // What a comparison of so many passes needs at least.
+    let repeats = if bench.level == Level::Full { 30 } else { 8 };
     let scenes = scenes().map_err(GpuError::Broken)?;
     let Some(scene) = scene_of(&scenes, pass) else {
         return Ok(Found::left_out("no scene that is timed needs it"));
