@@ -7,6 +7,7 @@ mod frames;
 mod service;
 mod stream;
 mod support_bundle;
+mod verify;
 mod view;
 
 use common::*;

@@ -1,0 +1,131 @@
+//! `echolume verify` as CI and a cart call it: its exit codes, its files, and what it says of an earlier run.
+
+use crate::common::*;
+use echolume::report::verify::{Run, Unit, Verdict, json};
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+/// Checks that take no time.
+const FEW: [&str; 4] = ["--only", "a sphere in a sweep", "--only", "every level of a picture"];
+
+fn verify(more: &[&str]) -> Ran {
+    run(&[&["verify"], more].concat())
+}
+
+fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
+    let file = folder.path(name);
+    let (code, out, err) = verify(&[more, &["--json", &file]].concat());
+    assert_eq!(code, Some(0), "{out}{err}");
+    (file.clone(), json::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
+}
+
+/// Everything that CI has time for passes on this device, and every file says so.
+#[test]
+fn everything_quick_is_as_it_should_be_here() {
+    let folder = Folder::new("verify-quick");
+    let [junit, html] = ["junit.xml", "page.html"].map(|name| folder.path(name));
+    let pictures = folder.path("pictures");
+    let (_, run) = kept(&folder, "run.json", &["--quick", "--junit", &junit, "--html", &html, "--pictures", &pictures]);
+    println!("{} checks in {:.0} s on {}", run.outcomes.len(), run.seconds, run.device.name);
+    for outcome in run.outcomes.iter().filter(|o| o.verdict == Verdict::LeftOut) {
+        println!("left out: {} / {}: {}", outcome.group, outcome.name, outcome.notes.join("; "));
+    }
+    assert!(run.validation, "the tests need the validation layer");
+    assert!(run.outcomes.len() > 100 && run.count(Verdict::LeftOut) < 10, "{} checks", run.outcomes.len());
+    let document = fs::read_to_string(&junit).expect("written");
+    let document = roxmltree::Document::parse(&document).expect("XML");
+    let root = document.root_element();
+    assert_eq!((root.tag_name().name(), root.attribute("failures")), ("testsuites", Some("0")));
+    let cases = document.descendants().filter(|n| n.has_tag_name("testcase")).count();
+    assert_eq!(cases, run.outcomes.len());
+    let page = fs::read_to_string(&html).expect("written");
+    assert!(page.contains("data:image/png;base64,") && page.contains(&run.device.name));
+    assert!(!std::path::Path::new(&pictures).exists(), "there is nothing to show");
+}
+
+#[test]
+fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has() {
+    let folder = Folder::new("verify-baseline");
+    let chosen = [&FEW[..], &["--only", "median_distance"]].concat();
+    let (file, earlier) = kept(&folder, "before.json", &chosen);
+    let again = |name: &str, changed: &Run, threshold: &str| {
+        let file = folder.write(name, json::to_json(changed).expect("JSON"));
+        verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
+    };
+    // A busy machine is no slower device: any time passes that is not a hundred times longer.
+    let (code, out, err) = verify(&[&chosen[..], &["--baseline", &file, "--threshold", "100"]].concat());
+    assert_eq!(code, Some(0), "{out}{err}");
+    assert!(out.contains("compared with"), "{out}");
+    // Before, everything took a millionth of the time.
+    let mut quick = earlier.clone();
+    for figure in quick.outcomes.iter_mut().flat_map(|o| &mut o.figures).filter(|f| f.unit == Unit::Ns) {
+        figure.value /= 1e6;
+        figure.samples.iter_mut().for_each(|s| *s /= 1e6);
+    }
+    let (code, out, err) = again("quick.json", &quick, "100");
+    assert_eq!(code, Some(1), "{out}{err}");
+    assert!(out.contains("slower") && err.contains("became worse since the baseline"), "{out}{err}");
+    // Before, the sphere was found a thousand times better: told, and no failure.
+    let mut exact = earlier.clone();
+    let sphere = exact.outcomes.iter_mut().find(|o| o.name == "a sphere in a sweep").expect("it was run");
+    sphere.figures[0].value /= 1e3;
+    let (code, out, err) = again("exact.json", &exact, "100");
+    assert_eq!(code, Some(0), "{out}{err}");
+    assert!(out.contains("a sphere in a sweep: largest error") && out.contains("still under"), "{out}");
+}
+
+#[test]
+fn what_cannot_be_verified_is_said_in_one_line_with_its_own_exit_code() {
+    let folder = Folder::new("verify-refused");
+    let text = folder.write("text.json", "no baseline");
+    let other = folder.write("other.json", "{\"format\": \"somebody else's\"}");
+    for (more, named) in [
+        (vec!["--baseline", "/nowhere/run.json"], "--baseline /nowhere/run.json: cannot be read"),
+        (vec!["--baseline", &text], "text.json"),
+        (vec!["--baseline", &other], "somebody else's"),
+        (vec!["--baseline", "/dev/zero"], "is not a file"),
+        (vec!["--baseline", &text, "--threshold", "0.5"], "threshold"),
+        (vec!["--only", "no such check"], "--list"),
+    ] {
+        refuses(&more, &verify(&more), 2, &[named]);
+    }
+    refuses(&["--json"], &verify(&["--json", &folder.path("none/run.json")]), 1, &["there is no folder"]);
+    let full = verify(&[&FEW[..], &["--json", "/dev/full"]].concat());
+    refuses(&["--json"], &full, 1, &["/dev/full: cannot be written"]);
+    let (code, _, err) = verify(&["--quick", "--full"]);
+    assert!(code == Some(2) && err.contains("cannot be used with"), "{err}");
+    refuses(&["--device"], &verify(&["--device", "no such card"]), 3, &["no such card", "there are"]);
+    let mut without = Command::new(PROGRAM);
+    without.arg("verify").env("VK_DRIVER_FILES", "/nowhere.json").env("VK_ICD_FILENAMES", "/nowhere.json");
+    refuses(&["no driver"], &finish(&mut without), 3, &["no Vulkan device"]);
+    assert_eq!(folder.names().len(), 2, "{:?}", folder.names());
+}
+
+#[test]
+fn a_device_against_itself_draws_the_same() {
+    let (code, out, err) = verify(&["--against", "0", "--only", "volume", "--only", "planes"]);
+    assert_eq!(code, Some(0), "{out}{err}");
+    assert!(out.contains("against: ") && out.contains("failed 0"), "{out}");
+}
+
+#[test]
+fn an_interrupted_run_ends_well_after_the_check_it_is_at() {
+    use rustix::process::{Pid, Signal, kill_process};
+    use std::io::{BufRead, BufReader, Read};
+    let folder = Folder::new("verify-interrupted");
+    let file = folder.path("run.json");
+    let mut command = Command::new(PROGRAM);
+    command.args(["verify", "--only", "passes", "--json", &file]);
+    let mut program =
+        command.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().expect("start");
+    let mut said = BufReader::new(program.stdout.take().expect("piped"));
+    said.read_line(&mut String::new()).expect("the device is named");
+    std::thread::sleep(Duration::from_millis(300));
+    kill_process(Pid::from_child(&program), Signal::INT).expect("it runs");
+    let code = program.wait().expect("it ends").code();
+    let mut err = String::new();
+    program.stderr.take().expect("piped").read_to_string(&mut err).expect("text");
+    assert!(code == Some(1) && err.contains("interrupted after"), "{code:?}: {err}");
+    assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
