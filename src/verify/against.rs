@@ -14,7 +14,7 @@ pub fn checks(_: Level, other: &Arc<Context>) -> Result<Vec<Check>, String> {
             let theirs = drawn::picture(&other, &view.scene, &view.frames)?;
             let ours = drawn::picture(&bench.context, &view.scene, &view.frames)?;
             modes::judge(&mut found, &view.name, &theirs, &ours);
-            let what = format!("{}: '{}' beside '{}'", view.name, bench.context.candidate.name, other.candidate.name);
+            let what = format!("'{}' beside '{}'", bench.context.candidate.name, other.candidate.name);
             found.pictures.push(shown::pictures(&what, &theirs, &ours));
             let fault = (!found.faults.is_empty()).then_some(0);
             found.pictures.iter_mut().for_each(|p| p.fault = fault);

@@ -31,7 +31,7 @@ pub struct View {
 
 /// What a view is to show.
 enum Of {
-    /// A ball with a knob behind a wall.
+    /// A ball with a knob and a hollow.
     Ball(Geometry),
     /// The synthetic fetal head, with speckle, as a probe sees it.
     Head,
@@ -60,7 +60,7 @@ fn views() -> Vec<(&'static str, Of, &'static str)> {
         ("volume, lit", fan(), "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {} }"),
         ("volume, depth-coded", fan(), "mode = 'vr'\nvolume = { shading = 'depth-coded', transfer = 'warm' }"),
         ("volume, pre-integrated", fan(), "mode = 'vr'\nvolume = { compositing = 'pre-integrated' }"),
-        ("volume, clipped", fan(), "mode = 'vr'\nclip = [{ at = [0, 50, 0], normal = [-0.3, 1, -0.2] }]"),
+        ("volume, clipped", fan(), "mode = 'vr'\nclip = [{ at = [0, 31, 0], normal = [-0.3, 1, -0.2] }]"),
         ("veil over a surface", fan(), "mode = 'mixed'\nvolume = { veil = 0.5 }\nsurface = { threshold = 0.15 }"),
         ("largest", fan(), "mode = 'mip'"),
         ("smallest", fan(), "mode = 'minip'"),
@@ -115,7 +115,7 @@ pub fn made() -> Result<Vec<View>, String> {
 }
 
 fn view(name: &str, of: Of, toml: &str) -> Result<View, String> {
-    let near = "camera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 2.6, target = [1.0, 32.0, 0.0] }";
+    let near = "camera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 4.8, target = [1.0, 32.0, 0.0] }";
     let camera = match of {
         Of::Ball(Geometry::Sweep(_)) if !toml.contains("camera") => near,
         _ => "",
@@ -140,9 +140,10 @@ fn view(name: &str, of: Of, toml: &str) -> Result<View, String> {
 }
 
 fn ball(p: DVec3) -> f64 {
-    let bump = |radius: f64, at: DVec3| ((radius - p.distance(at)) / 2.0 + 0.5).clamp(0.0, 1.0);
-    // No value that is half-way between two levels.
-    0.12 + 0.8 * bump(9.0, DVec3::new(1.0, 52.0, 0.0)).max(bump(2.5, DVec3::new(3.0, 43.5, 2.0)))
+    let bump = |radius: f64, x, y, z| ((radius - p.distance(DVec3::new(x, y, z))) / 2.0 + 0.5).clamp(0.0, 1.0);
+    let tissue = bump(9.0, 1.0, 52.0, 0.0).max(bump(2.5, 3.0, 43.5, 2.0));
+    // No value that is half-way between two levels, and a hollow for what is darkest.
+    (0.12 + 0.8 * tissue) * (1.0 - 0.9 * bump(3.5, -2.0, 54.0, -1.0))
 }
 
 fn head(toml: &str) -> Result<(Scene, Vec<Texels>), String> {
@@ -170,7 +171,7 @@ fn mode(bench: &mut Bench, name: &str) -> Result<Found, GpuError> {
     let expected = reference(&view.scene, &view.frames);
     let got = drawn::picture(&bench.context, &view.scene, &view.frames)?;
     judge(&mut found, name, &expected, &got);
-    found.pictures.push(shown::pictures(name, &expected, &got));
+    found.pictures.push(shown::pictures("picture", &expected, &got));
     let fault = (!found.faults.is_empty()).then_some(0);
     found.pictures.iter_mut().for_each(|p| p.fault = fault);
     // A picture of one colour would be right of many wrong devices.
