@@ -15,24 +15,41 @@
 //! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
 //!   one to fill the other.
 
+// Elsewhere than in `gpu` nobody can allow it again.
 #![deny(unsafe_code)]
 
+#[forbid(unsafe_code)]
 pub mod barriers;
 #[allow(unsafe_code)]
 pub mod gpu;
+#[forbid(unsafe_code)]
 pub mod kiosk;
+#[forbid(unsafe_code)]
 pub mod live;
+#[forbid(unsafe_code)]
 pub mod measuring;
+#[forbid(unsafe_code)]
 pub mod passes;
+#[forbid(unsafe_code)]
 pub mod picture;
+#[forbid(unsafe_code)]
 pub mod plan;
+#[forbid(unsafe_code)]
 pub mod probe;
+#[forbid(unsafe_code)]
 pub mod queues;
+#[forbid(unsafe_code)]
 pub mod report;
+#[forbid(unsafe_code)]
 pub mod scene;
 #[cfg(feature = "hot-reload")]
+#[forbid(unsafe_code)]
 mod shader_compile;
+#[forbid(unsafe_code)]
 pub mod shader_source;
+#[forbid(unsafe_code)]
 pub mod source;
+#[forbid(unsafe_code)]
 pub mod spirv;
+#[forbid(unsafe_code)]
 pub mod ui;
