@@ -9,6 +9,7 @@
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
 //!   order between them and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
 //!   without a GPU.
+//! - [`files`] reads up to a limit and writes whole or not at all; [`picture`] is what is drawn, as a file.
 //! - [`ui`] is the live volume on a screen, and the hands that turn it.
 //! - [`kiosk`] is what a cart needs around that: its configuration, its logs, and what it tells whoever is to help.
 //! - [`live`] is the loop between a source that does not wait and the device.
@@ -20,6 +21,8 @@
 
 #[forbid(unsafe_code)]
 pub mod barriers;
+#[forbid(unsafe_code)]
+pub mod files;
 #[allow(unsafe_code)]
 pub mod gpu;
 #[forbid(unsafe_code)]

@@ -53,6 +53,7 @@ fn layers_hold() {
         ("src/queues.rs", &["crate::gpu", "ash::vk"]),
         ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),
+        ("src/files", &["crate::", "ash::vk"]),
         ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::report", "ash::vk"]),
         ("src/report", &["crate::gpu", "crate::measuring", "ash::vk"]),
         ("src/gpu", &["crate::report", "crate::measuring"]),
@@ -75,7 +76,8 @@ fn layers_hold() {
     let motor = "src/probe/motor/";
     let crates: &[(&str, &[&str])] = &[
         ("serialport::", &[motor]),
-        ("signal_hook::", &[motor]),
+        ("signal_hook::", &["src/files/signals.rs"]),
+        ("tempfile::", &["src/files/"]),
         // Both wait for what the kernel says of several files at once, which the standard library cannot.
         ("rustix::", &[motor, "src/ui/devices/"]),
         ("evdev::", &["src/ui/devices/"]),
