@@ -2,10 +2,18 @@
 
 pub mod grey;
 
+use crate::files;
+pub use crate::files::{check_target, replace};
+use crate::scene::load::plain;
+
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use std::io::Write;
+use image::{ImageFormat, ImageReader};
+use std::io::Cursor;
 use std::path::Path;
+
+/// Longest file of a picture that is read, bytes: what its pixels may take, too.
+const LONGEST: u64 = 512 << 20;
 
 /// 8-bit red, green, blue, alpha; rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,52 +54,15 @@ impl Picture {
     }
 
     /// Reads a PNG.
+    ///
+    /// # Errors
+    /// One line naming the file and the fault. Files and pixels of more than 512 MiB are refused, whatever the file claims.
     pub fn load(file: &Path) -> Result<Picture, String> {
-        let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be read: {e}", file.display());
-        let bytes = std::fs::read(file).map_err(|e| cannot(&e))?;
-        let image = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png).map_err(|e| cannot(&e))?;
+        let bytes = files::read(file, LONGEST, "picture").map_err(|e| format!("{}: {e}", file.display()))?;
+        // With the limits of the library.
+        let image = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png).decode();
+        let image = image.map_err(|e| format!("{}: cannot be read: {}", file.display(), plain(&e.to_string())))?;
         let rgba = image.to_rgba8();
         Ok(Picture { width: rgba.width(), height: rgba.height(), rgba: rgba.into_raw() })
-    }
-}
-
-/// Writes bytes beside the target first and renames: a full disk leaves the old file as it was.
-///
-/// # Errors
-/// One line naming the file and the fault.
-pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
-    let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
-    if std::fs::metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-        // A device or a pipe is written to; renaming would replace it.
-        let opened = std::fs::OpenOptions::new().write(true).open(file);
-        return opened.and_then(|mut f| f.write_all(bytes)).map_err(|e| cannot(&e));
-    }
-    check_target(file)?;
-    // Through a link to the file itself, and beside it, so that renaming stays within one file system.
-    let target = file.canonicalize().unwrap_or_else(|_| file.to_path_buf());
-    let part = target.with_file_name(format!(".echolume-{}.part", std::process::id()));
-    let opened = std::fs::OpenOptions::new().write(true).create_new(true).open(&part);
-    let mut opened = opened.map_err(|e| cannot(&e))?;
-    let written = opened.write_all(bytes).and_then(|()| std::fs::rename(&part, &target));
-    written.map_err(|e| {
-        let _ = std::fs::remove_file(&part);
-        cannot(&e)
-    })
-}
-
-/// Whether a picture could be written there, before the work is done.
-///
-/// # Errors
-/// One line: the folder does not exist, or the name is a folder's.
-pub fn check_target(file: &Path) -> Result<(), String> {
-    let cannot = |fault: &str| Err(format!("{}: cannot be written: {fault}", file.display()));
-    if file.is_dir() || file.file_name().is_none() {
-        return cannot("it is a folder");
-    }
-    match file.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-            cannot(&format!("there is no folder {}; make it first", folder.display()))
-        }
-        _ => Ok(()),
     }
 }

@@ -1,6 +1,7 @@
 //! Which recording a command is asked to render, and how.
 
 use super::look::Look;
+use super::targets::{self, Target};
 use super::{Failure, input};
 use echolume::gpu::context::list;
 use echolume::gpu::{Choice, Context, Fetch, select};
@@ -9,7 +10,7 @@ use echolume::scene::{Input, Scene};
 use echolume::source::phantom::{self, Phantom};
 use echolume::source::played::Played;
 use echolume::source::{self, Frame, Source};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The arguments that every command which renders has.
@@ -51,14 +52,12 @@ impl Asked {
         self.input.as_ref().map_or("phantom".into(), |file| file.display().to_string())
     }
 
-    /// Refuses to write over what is read.
-    pub fn keep_inputs(&self, flag: &str, output: &Path) -> Result<(), Failure> {
-        let Ok(output) = output.canonicalize() else { return Ok(()) };
-        let inputs = [self.input.as_ref(), self.probe.as_ref(), self.look.scene.as_ref()];
-        match inputs.into_iter().flatten().find(|i| i.canonicalize().is_ok_and(|i| i == output)) {
-            Some(read) => Err(input(format!("{flag} {}: would replace an input", read.display()))),
-            None => Ok(()),
-        }
+    /// Looks at what is to be written, beside what is read: the source's files and what settings come from.
+    pub fn check_targets(&self, targets: &[Target], source: &dyn Source) -> Result<(), Failure> {
+        let mut read = source.files();
+        read.extend(self.probe.clone());
+        read.extend(self.look.files());
+        targets::check(targets, read.iter().map(PathBuf::as_path))
     }
 
     /// Every frame of the volume, in the order of the recording.

@@ -1,13 +1,17 @@
 //! `echolume convert`.
 
+use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::picture::check_target;
+use echolume::files::signals::Writing;
 use echolume::probe::Geometry;
-use echolume::source;
 use echolume::source::convert::{Volume, VolumeFile, lattice};
 use echolume::source::recorder::{Header, Writer};
 use echolume::source::sequence::{self, Sequence};
-use std::path::{Path, PathBuf};
+use echolume::source::{self, Source};
+use std::path::PathBuf;
+
+/// What messages call it.
+const OUTPUT: &str = "output";
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
@@ -48,14 +52,13 @@ impl Convert {
             let there = recording.volumes();
             return Err(input(format!("{shown}: --volume {}: there are {there}, numbered from 0", self.volume)));
         }
-        self.replaces_no_input(&self.output)?;
         let geometry = recording.geometry(self.volume);
         let usual = match &geometry {
             Geometry::Sweep(probe) => probe.sample_pitch,
             Geometry::Cartesian(grid) => grid.spacing.into_iter().fold(f64::INFINITY, f64::min),
         };
         let grid = lattice(&geometry, self.spacing.unwrap_or(usual)).map_err(|e| input(format!("--spacing {e}")))?;
-        check_target(&self.output).map_err(failed)?;
+        self.check_targets(&[(OUTPUT, Some(&self.output))], &*recording)?;
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
         let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
@@ -75,13 +78,9 @@ impl Convert {
         Ok(())
     }
 
-    fn replaces_no_input(&self, output: &Path) -> Result<(), Failure> {
-        let read = [Some(&self.input), self.probe.as_ref()];
-        let same = |file: &PathBuf| output.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
-        match read.into_iter().flatten().find(|file| same(file)) {
-            Some(file) => Err(input(format!("output {}: would replace an input", file.display()))),
-            None => Ok(()),
-        }
+    fn check_targets(&self, targets: &[Target], recording: &dyn Source) -> Result<(), Failure> {
+        let read = recording.files();
+        targets::check(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
     }
 
     /// The frames of all whole volumes.
@@ -89,10 +88,9 @@ impl Convert {
         if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
             return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
         }
-        self.replaces_no_input(&self.output)?;
-        self.replaces_no_input(&sequence::beside(&self.output))?;
-        check_target(&self.output).map_err(failed)?;
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
+        let beside = sequence::beside(&self.output);
+        self.check_targets(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
         let bar = indicatif::ProgressBar::new(volumes as u64).with_message("volumes");
@@ -118,13 +116,25 @@ impl Convert {
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
         let (forward, backward) = if is_backward { (second, first) } else { (first, second) };
         let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range() };
+        // The file is gone again before a signal does its work.
+        let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = indicatif::ProgressBar::new((recording.volumes() * recording.frames_per_volume()) as u64);
-        while let Some(there) = frame {
-            let arrived = recording.arrival().or(there.time).unwrap_or(0.0);
-            writer.frame(&there, arrived).map_err(failed)?;
-            bar.inc(1);
-            frame = recording.next_frame().map_err(input)?;
+        let mut copy = || {
+            while let Some(there) = frame.take() {
+                if let Some(signal) = signals.signal() {
+                    return Err(failed(format!("{}: stopped by {signal}", self.output.display())));
+                }
+                let arrived = recording.arrival().or(there.time).unwrap_or(0.0);
+                writer.frame(&there, arrived).map_err(failed)?;
+                bar.inc(1);
+                frame = recording.next_frame().map_err(input)?;
+            }
+            Ok(())
+        };
+        if let Err(failure) = copy() {
+            writer.discard();
+            return Err(failure);
         }
         bar.finish_and_clear();
         let frames = writer.frames();

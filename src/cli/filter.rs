@@ -1,6 +1,6 @@
 //! `echolume filter`: the 2D filters of slices on an ordinary picture.
 
-use super::{Failure, failed, input, say};
+use super::{Failure, failed, input, say, targets};
 use echolume::gpu::{Choice, Context, Options, Renderer};
 use echolume::measuring::growth::{Row, measure, scene};
 use echolume::passes::{Slot, Texels};
@@ -10,7 +10,7 @@ use echolume::report::regions::{self, Region};
 use echolume::report::times;
 use echolume::scene::Settings;
 use echolume::scene::load::Layers;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A filter of stage 1 under the name that the command line gives it.
@@ -107,7 +107,7 @@ impl Filter {
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
         let scene = scene(&grey, settings).map_err(input)?;
-        self.check_targets()?;
+        targets::check(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
 
         let context = super::look::open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
@@ -187,24 +187,6 @@ impl Filter {
         let region: Region = text.parse().map_err(|e| input(format!("{flag} {text}: {e}")))?;
         region.check([grey.width, grey.height]).map_err(|e| input(format!("{flag} {text}: {e}")))?;
         Ok(Some(region))
-    }
-
-    /// Refuses to write over what is read, or twice to one place, before any work is done.
-    fn check_targets(&self) -> Result<(), Failure> {
-        let there = |file: &Path| file.canonicalize().ok();
-        let targets = [("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())];
-        for (flag, file) in targets.into_iter().filter_map(|(flag, file)| Some((flag, file?))) {
-            picture::check_target(file).map_err(failed)?;
-            if there(file).is_some_and(|t| there(&self.image) == Some(t)) {
-                return Err(input(format!("{flag} {}: would replace the input", file.display())));
-            }
-        }
-        match (&self.output, &self.csv) {
-            (Some(output), Some(csv)) if output == csv || there(output).is_some_and(|t| there(csv) == Some(t)) => {
-                Err(input(format!("--csv {}: is the picture's file", csv.display())))
-            }
-            _ => Ok(()),
-        }
     }
 
     /// The rows of the growth table: the thesis', unless the filter was given its own.

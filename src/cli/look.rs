@@ -20,7 +20,7 @@ pub struct Look {
     transfer: Option<String>,
     /// Settings in TOML
     #[arg(long, value_name = "FILE")]
-    pub scene: Option<PathBuf>,
+    scene: Option<PathBuf>,
     /// Settings that suit a kind of picture: bmode, bone, fetal, phantom, thesis; may be given again, the later over the earlier
     #[arg(long, value_name = "NAME")]
     preset: Vec<String>,
@@ -72,6 +72,11 @@ impl Look {
             layers.set(assignment).map_err(input)?;
         }
         Ok(layers)
+    }
+
+    /// What settings are read from.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.scene.iter().cloned().chain(self.transfer.iter().map(PathBuf::from))
     }
 
     /// Whether the size of the picture was typed.

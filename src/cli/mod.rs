@@ -19,6 +19,7 @@ mod serial;
 mod shown;
 mod stream;
 mod support_bundle;
+mod targets;
 mod verify;
 mod view;
 
@@ -28,6 +29,7 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Prints a line on standard output.
 macro_rules! say {
@@ -37,13 +39,30 @@ pub(crate) use say;
 
 /// What standard output said when it could not be written.
 static UNWRITTEN: Mutex<Option<std::io::Error>> = Mutex::new(None);
+static UNHEARD: AtomicBool = AtomicBool::new(false);
 
 /// Remembers a failure for the end: whoever reads may go away at any time, but a full disk is no success.
 fn print(line: std::fmt::Arguments) {
-    let written = writeln!(std::io::stdout(), "{line}").and_then(|()| std::io::stdout().flush());
-    if let Err(error) = written.or_else(|e| if e.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(e) }) {
-        UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error);
+    let line = harmless(&line.to_string());
+    match writeln!(std::io::stdout(), "{line}").and_then(|()| std::io::stdout().flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => UNHEARD.store(true, Ordering::Relaxed),
+        Err(error) => drop(UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error)),
     }
+}
+
+/// What was read may hold anything, and must not write to the terminal.
+fn harmless(text: &str) -> String {
+    let mut lines = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && c != '\n' { lines.extend(c.escape_default()) } else { lines.push(c) }
+    }
+    lines
+}
+
+/// Whether whoever read standard output has gone away.
+fn unheard() -> bool {
+    UNHEARD.load(Ordering::Relaxed)
 }
 
 #[derive(Parser)]
@@ -166,15 +185,8 @@ pub fn run() -> ExitCode {
 /// One line of bounded length: what was typed or read may hold anything, and must not write to the terminal.
 fn plain(message: &str) -> String {
     const LONGEST: usize = 600;
-    let mut line = String::new();
-    for (i, c) in message.chars().enumerate() {
-        if i == LONGEST {
-            line.push_str(" ...");
-            break;
-        }
-        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
-    }
-    line
+    let line = harmless(&message.chars().take(LONGEST).collect::<String>()).replace('\n', "\\n");
+    if message.chars().nth(LONGEST).is_some() { line + " ..." } else { line }
 }
 
 impl Command {

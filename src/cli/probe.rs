@@ -1,10 +1,11 @@
 //! `echolume probe`: the motor.
 
 use super::serial::{Serial, fault, table};
-use super::{Failure, failed, input, say};
+use super::{Failure, failed, input, say, targets};
 use clap::{Args, Subcommand};
-use echolume::picture::check_target;
-use echolume::probe::motor::{Drive, Fault, Held, MotorError, MotorTable, Position, Settings, Sweep, port};
+use echolume::files::replace;
+use echolume::files::signals::Held;
+use echolume::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -178,9 +179,7 @@ impl SweepArguments {
         let sweep = Sweep { angle: self.angle, rate: self.rate, volumes: self.volumes };
         // Before the port is touched.
         let speed = sweep.speed(&table, settings.round_trip()).map_err(input)?;
-        if let Some(file) = &self.positions {
-            check_target(file).map_err(input)?;
-        }
+        targets::check(&[("--positions", self.positions.as_deref())], self.line.probe.as_deref())?;
         let mut drive = Drive::open(&settings, &table).map_err(fault)?;
         if !self.homed {
             drive.home().map_err(fault)?;
@@ -197,10 +196,7 @@ impl SweepArguments {
             }
         });
         // What was seen until a fault is worth keeping too.
-        let kept = self.positions.as_ref().map_or(Ok(()), |file| {
-            std::fs::write(file, csv(&positions))
-                .map_err(|e| failed(format!("{}: cannot be written: {e}", file.display())))
-        });
+        let kept = self.positions.as_ref().map_or(Ok(()), |file| replace(file, csv(&positions).as_bytes()));
         match swept {
             Ok(volumes) => say!("swept: {volumes} volumes"),
             // Without a number of volumes this is how it ends.
@@ -211,7 +207,7 @@ impl SweepArguments {
             }
             Err(error) => return Err(fault(error)),
         }
-        kept
+        kept.map_err(failed)
     }
 }
 

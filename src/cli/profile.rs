@@ -2,10 +2,11 @@
 
 use super::asked::Asked;
 use super::look::open_device;
+use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
+use echolume::files::{read_text, replace};
 use echolume::gpu::Choice;
 use echolume::measuring::profile;
-use echolume::picture::{check_target, replace};
 use echolume::report::profile as model;
 use echolume::report::profile::{compare, formats, table, trace};
 use std::path::{Path, PathBuf};
@@ -75,11 +76,13 @@ impl Profile {
     fn measure(&self) -> Result<(), Failure> {
         let (mut source, mut scene) = self.asked.open()?;
         scene.settings.slices.still |= self.still;
-        let files = [&self.json, &self.csv, &self.csv_samples, &self.trace];
-        for file in files.into_iter().flatten() {
-            self.asked.keep_inputs("output", file)?;
-            check_target(file).map_err(failed)?;
-        }
+        let targets: [Target; 4] = [
+            ("--json", self.json.as_deref()),
+            ("--csv", self.csv.as_deref()),
+            ("--csv-samples", self.csv_samples.as_deref()),
+            ("--trace", self.trace.as_deref()),
+        ];
+        self.asked.check_targets(&targets, &*source)?;
         if !self.turn.is_finite() {
             return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
         }
@@ -128,6 +131,7 @@ impl Profile {
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
+        targets::check(&[("--json", self.json.as_deref())], [old, new])?;
         let (old, new) = (read(old)?, read(new)?);
         self.judge(&old, &new)
     }
@@ -151,10 +155,6 @@ impl Profile {
 
 fn read(file: &Path) -> Result<model::Profile, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
-    if !about.is_file() || about.len() > LONGEST {
-        return Err(fault(&"is not a file of at most 256 MiB, so no profile"));
-    }
-    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    let text = read_text(file, LONGEST, "profile").map_err(|e| fault(&e))?;
     formats::from_json(&text).map_err(|e| fault(&e))
 }

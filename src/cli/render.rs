@@ -2,9 +2,9 @@
 
 use super::asked::Asked;
 use super::report_error::{nanoseconds, read};
+use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
 use echolume::gpu::{Options, Renderer};
-use echolume::picture;
 use echolume::plan::Plan;
 use echolume::report::curves::{Measure, choose};
 use echolume::report::{dump, times};
@@ -53,7 +53,6 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let (mut source, scene) = self.open()?;
-        self.asked.keep_inputs("-o", &self.output)?;
         if self.explain {
             let scene = self.asked.suited(scene);
             let plan = Plan::new(&scene);
@@ -61,7 +60,9 @@ impl Render {
             return Ok(());
         }
 
-        picture::check_target(&self.output).map_err(failed)?;
+        let target: Target = ("-o", Some(&self.output));
+        self.asked.check_targets(&[target], &*source)?;
+        targets::check(&[target], self.report.as_deref())?;
         if let Some(folder) = &self.dump {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;

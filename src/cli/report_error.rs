@@ -2,11 +2,15 @@
 
 use super::asked::Asked;
 use super::{Failure, failed, input, say};
+use echolume::files::read_text;
 use echolume::measuring::{dials, error};
 use echolume::picture::replace;
 use echolume::report::curves::{self, Measure, choose, plot};
 use echolume::scene::Scene;
 use std::path::{Path, PathBuf};
+
+/// Longest report that is read, bytes.
+const LONGEST: u64 = 64 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -142,11 +146,7 @@ fn write(report: &curves::Report, measure: Measure, folder: &Path) -> Result<(),
 /// A stored report.
 pub(super) fn read(file: &Path) -> Result<curves::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
-    if !about.is_file() || about.len() > 64 << 20 {
-        return Err(fault(&"is not a file of at most 64 MiB, so no report"));
-    }
-    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
     curves::Report::from_json(&text).map_err(|e| fault(&e))
 }
 

@@ -1,10 +1,11 @@
 //! `echolume report tables`.
 
+use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
 use echolume::gpu::Choice;
 use echolume::measuring::tables::{Asked, growth, run};
 use echolume::picture::grey::Grey;
-use echolume::picture::{check_target, replace};
+use echolume::picture::replace;
 use echolume::report::tables::{csv, markdown};
 use std::path::{Path, PathBuf};
 
@@ -43,7 +44,12 @@ impl Tables {
     pub fn run(&self) -> Result<(), Failure> {
         let growth_file =
             self.csv.as_ref().filter(|_| !self.pictures.is_empty()).map(|f| f.with_extension("growth.csv"));
-        self.check_targets(growth_file.as_deref())?;
+        let targets: [Target; 3] = [
+            ("--markdown", self.markdown.as_deref()),
+            ("--csv", self.csv.as_deref()),
+            ("--csv", growth_file.as_deref()),
+        ];
+        targets::check(&targets, self.pictures.iter().map(PathBuf::as_path))?;
         let greys: Vec<Grey> =
             self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
         let context = super::look::open_device(self.device.clone(), false)?;
@@ -71,25 +77,6 @@ impl Tables {
             Some(file) => write(&file, &csv::growth(&report.grown)),
             None => Ok(()),
         }
-    }
-
-    /// Refuses to write over what is read, or twice to one place, before any work is done.
-    fn check_targets(&self, growth_file: Option<&Path>) -> Result<(), Failure> {
-        let there = |file: &Path| file.canonicalize().ok();
-        let same = |a: &Path, b: &Path| a == b || there(a).is_some_and(|a| there(b) == Some(a));
-        let targets =
-            [("--markdown", self.markdown.as_deref()), ("--csv", self.csv.as_deref()), ("--csv", growth_file)];
-        let targets: Vec<(&str, &Path)> = targets.into_iter().filter_map(|(flag, file)| Some((flag, file?))).collect();
-        for (n, (flag, file)) in targets.iter().enumerate() {
-            check_target(file).map_err(failed)?;
-            if self.pictures.iter().any(|picture| same(picture, file)) {
-                return Err(input(format!("{flag} {}: would replace a picture that is read", file.display())));
-            }
-            if targets[..n].iter().any(|(_, before)| same(before, file)) {
-                return Err(input(format!("{flag} {}: is written by another flag", file.display())));
-            }
-        }
-        Ok(())
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::arriving::Arriving;
 use super::look::Look;
-use super::{Failure, failed, input, say};
+use super::{Failure, failed, input, say, unheard};
+use echolume::files::signals::Held;
 use echolume::gpu::Context;
 use echolume::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
 use echolume::picture;
@@ -87,6 +88,8 @@ impl Stream {
 
     /// `context`: another one after its device was lost.
     fn go(&self, stream: &mut Live, update: Update, context: &mut Arc<Context>) -> Result<(), Failure> {
+        // The end of a stream like any other: the recording gets its index. A second signal does not wait for it.
+        let signals = Held::first();
         let began = Instant::now();
         let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
         let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
@@ -129,6 +132,11 @@ impl Stream {
             let more = if update == Update::Whole { 0 } else { 1 };
             let enough = drew && enough_at.is_some_and(|at| pictures > at + more);
             if enough || self.time.is_some_and(|t| began.elapsed() >= *t) {
+                break None;
+            }
+            // Whoever read the lines has gone, and nothing else is kept.
+            let is_for_nobody = self.null && self.record.is_none() && unheard();
+            if is_for_nobody || signals.signal().is_some() {
                 break None;
             }
         };

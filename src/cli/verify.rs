@@ -1,14 +1,14 @@
 //! `echolume verify`.
 
-use super::{Failure, failed, input, say};
+use super::{Failure, failed, input, say, targets};
+use echolume::files::{read_text, replace};
 use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
-use echolume::picture::{check_target, replace};
+
 use echolume::report::verify::baseline::{self, Compared, compare};
 use echolume::report::verify::{Level, Outcome, Run, Verdict, html, json, junit, words};
 use echolume::verify::{self, Bench, Check};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Longest baseline that is read, bytes.
 const LONGEST: u64 = 256 << 20;
@@ -78,9 +78,8 @@ impl Verify {
             return Ok(());
         }
         let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
-        for file in [&self.json, &self.junit, &self.html].into_iter().flatten() {
-            check_target(file).map_err(failed)?;
-        }
+        let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
+        targets::check(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let earlier = self.baseline.as_deref().map(read).transpose()?;
         let mut run = self.checked(level)?;
         self.save_pictures(&mut run);
@@ -105,7 +104,6 @@ impl Verify {
             None => verify::checks(level),
         };
         let checks = self.chosen(checks)?;
-        let stopped = stop_on_signal();
         let mut group: Vec<Outcome> = Vec::new();
         let run = verify::run(&mut bench, &checks, |outcome| {
             if group.first().is_some_and(|first| first.group != outcome.group) {
@@ -116,17 +114,9 @@ impl Verify {
                 say!("{}", words::failure(outcome).trim_end());
             }
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
-            !stopped.load(Ordering::Relaxed)
         });
         tell(&group);
-        match run.outcomes.len() == checks.len() {
-            true => Ok(run),
-            false => Err(failed(format!(
-                "interrupted after {} of {} checks; nothing is written",
-                run.outcomes.len(),
-                checks.len()
-            ))),
-        }
+        Ok(run)
     }
 
     /// With validation, where its layer is installed.
@@ -227,20 +217,6 @@ fn no_device(error: GpuError) -> Failure {
     }
 }
 
-/// Set when somebody wants it to end; the second time it ends at once.
-fn stop_on_signal() -> Arc<AtomicBool> {
-    let stopped = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP] {
-        // In this order: the first one finds the flag unset, and sets it.
-        let registered = signal_hook::flag::register_conditional_default(signal, stopped.clone())
-            .and_then(|_| signal_hook::flag::register(signal, stopped.clone()));
-        if let Err(fault) = registered {
-            tracing::warn!("signal {signal} cannot be waited for: {fault}");
-        }
-    }
-    stopped
-}
-
 /// Letters and digits of a title, so that it may be a file's name anywhere; of bounded length.
 fn file_name(title: &str) -> String {
     let plain = title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
@@ -255,10 +231,6 @@ fn file_name(title: &str) -> String {
 
 fn read(file: &Path) -> Result<Run, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("--baseline {}: {e}", file.display()));
-    let about = std::fs::metadata(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
-    if !about.is_file() || about.len() > LONGEST {
-        return Err(fault(&"is not a file of at most 256 MiB, so no --json of verify"));
-    }
-    let text = std::fs::read_to_string(file).map_err(|e| fault(&format_args!("cannot be read: {e}")))?;
+    let text = read_text(file, LONGEST, "--json of verify").map_err(|e| fault(&e))?;
     json::from_json(&text).map_err(|e| fault(&e))
 }

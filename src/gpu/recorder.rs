@@ -237,10 +237,11 @@ impl Recorder {
         // Before any query begins: lavapipe looks at the pipeline then.
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
-        // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
         let dispatch = || {
-            (0..self.context.faults.times(pass.name))
-                .for_each(|_| unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) });
+            for _ in 0..self.context.faults.times(pass.name) {
+                // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
+                unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
+            }
         };
         match &mut self.stamps {
             Some(stamps) => stamps.dispatch(commands, pass.name, dispatch),

@@ -1,9 +1,10 @@
 //! Ordinary pictures as one channel: what the 2D filters run on outside an examination, and their way back to a file.
 
+use crate::files;
+use crate::scene::load::plain;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, ImageReader, Limits};
-use std::fs::File;
-use std::io::BufReader;
+use std::io::Cursor;
 use std::path::Path;
 
 /// A picture of one channel; rows from the top.
@@ -23,22 +24,21 @@ impl Grey {
     /// (gamma-coded) values, so that grey stored as colour keeps its values; transparency is left out.
     ///
     /// # Errors
-    /// One line naming the file and the fault. No more is allocated than 512 MiB, whatever the file claims.
+    /// One line naming the file and the fault. Files and pixels of more than 512 MiB are refused, whatever the file claims.
     pub fn load(file: &Path) -> Result<Grey, String> {
-        let fault = |e: &dyn std::fmt::Display| format!("{}: cannot be read: {e}", file.display());
-        // A pipe would be waited for.
-        if !std::fs::metadata(file).map_err(|e| fault(&e))?.is_file() {
-            return Err(fault(&"is not a regular file"));
-        }
+        // The library's messages may have several lines, and what the file says in them.
+        let fault =
+            |e: &dyn std::fmt::Display| format!("{}: cannot be read: {}", file.display(), plain(&e.to_string()));
+        let bytes = files::read(file, super::LONGEST, "picture").map_err(|e| format!("{}: {e}", file.display()))?;
         // What it holds decides, not what it is called.
-        let opened = File::open(file).map(BufReader::new).map(ImageReader::new);
-        let mut reader = opened.and_then(|r| r.with_guessed_format()).map_err(|e| fault(&e))?;
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fault(&e))?;
         if !reader.format().is_some_and(|f| f.reading_enabled()) {
             return Err(fault(&"is no picture of a known format; PNG, JPEG, PNM and BMP are read"));
         }
         reader.limits(Limits::default());
         let image = reader.decode().map_err(|e| fault(&e))?;
-        if image.width() == 0 || image.height() == 0 {
+        let (width, height) = (image.width(), image.height());
+        if width == 0 || height == 0 {
             return Err(fault(&"has no pixels"));
         }
         let (colour, channels) = (image.color(), u16::from(image.color().channel_count()));
@@ -48,12 +48,11 @@ impl Grey {
             _ => return Err(fault(&"has samples of more than 16 bits")),
         };
         let values = match (colour.has_color(), sixteen) {
-            (false, false) => image.to_luma8().into_raw().into_iter().map(u16::from).collect(),
-            (false, true) => image.to_luma16().into_raw(),
-            (true, false) => brightness(image.to_rgb8().into_raw().into_iter().map(f64::from).collect()),
-            (true, true) => brightness(image.to_rgb16().into_raw().into_iter().map(f64::from).collect()),
+            (false, false) => image.into_luma8().into_raw().into_iter().map(u16::from).collect(),
+            (false, true) => image.into_luma16().into_raw(),
+            (true, false) => brightness(&image.into_rgb8().into_raw()),
+            (true, true) => brightness(&image.into_rgb16().into_raw()),
         };
-        let (width, height) = (image.width(), image.height());
         Ok(Grey { width, height, sixteen, values, from_colour: colour.has_color() })
     }
 
@@ -100,8 +99,9 @@ impl Grey {
     }
 }
 
-fn brightness(rgb: Vec<f64>) -> Vec<u16> {
-    rgb.chunks_exact(3).map(|p| (0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]).round() as u16).collect()
+fn brightness<T: Copy + Into<f64>>(rgb: &[T]) -> Vec<u16> {
+    let of = |[r, g, b]: [f64; 3]| (0.2126 * r + 0.7152 * g + 0.0722 * b).round() as u16;
+    rgb.chunks_exact(3).map(|p| of([p[0].into(), p[1].into(), p[2].into()])).collect()
 }
 
 #[cfg(test)]
@@ -110,9 +110,9 @@ mod tests {
 
     #[test]
     fn brightness_weighs_as_rec_709_and_leaves_grey_alone() {
-        assert_eq!(brightness(vec![255.0, 0.0, 0.0, 0.0, 255.0, 0.0, 0.0, 0.0, 255.0]), [54, 182, 18]);
+        assert_eq!(brightness(&[255u8, 0, 0, 0, 255, 0, 0, 0, 255]), [54, 182, 18]);
         for v in [0u16, 1, 77, 254, 255, 65535] {
-            assert_eq!(brightness(vec![f64::from(v); 3]), [v]);
+            assert_eq!(brightness(&[v; 3]), [v]);
         }
     }
 

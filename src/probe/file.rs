@@ -7,9 +7,8 @@ mod text;
 
 use super::motor::MotorTable;
 use super::{Advance, Array, Axis, Motion, Probe, Volumes};
+use crate::files;
 use crate::source::InputError;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use tables::{ArrayKind, Direction, MotionKind, Tables};
 
@@ -28,17 +27,7 @@ pub struct ProbeFile {
 impl ProbeFile {
     /// Reads and checks all that can be checked without the recording.
     pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
-        let unreadable = |e| InputError::unreadable(path, &e);
-        // A pipe would be waited for.
-        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-            return Err(InputError::new(path, "file", "is not a regular file"));
-        }
-        let file = File::open(path).map_err(unreadable)?;
-        let mut text = String::new();
-        file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
-        if text.len() as u64 > LONGEST {
-            return Err(InputError::new(path, "file", "is longer than 1 MiB, which no probe file is"));
-        }
+        let text = files::read_text(path, LONGEST, "probe file").map_err(|e| InputError::new(path, "file", e))?;
         ProbeFile::parse(path, &text)
     }
 

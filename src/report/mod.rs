@@ -9,3 +9,8 @@ pub mod tables;
 pub mod times;
 pub mod verify;
 pub mod whole;
+
+/// What a file says of itself, on one line: it may hold anything.
+fn one_line(text: &str) -> String {
+    crate::scene::load::plain(text).chars().take(400).collect()
+}

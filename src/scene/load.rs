@@ -1,8 +1,8 @@
 //! Settings from layers: defaults, a preset, a scene file, and the command line, each overriding the one before.
 
 use super::{Settings, TransferPoint};
+use crate::files;
 use serde::Deserialize;
-use std::io::Read;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -133,19 +133,7 @@ impl Layers {
 
 /// A small text file, whole. `what` it is: said of one that is too long.
 pub(crate) fn read(path: &Path, what: &str) -> Result<String, LoadError> {
-    let fault = |fault: String| LoadError::File { path: path.display().to_string(), fault };
-    let unreadable = |e: std::io::Error| fault(format!("cannot be read: {e}"));
-    // A pipe would be waited for.
-    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(fault("is not a regular file".into()));
-    }
-    let mut text = String::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(LONGEST + 1).read_to_string(&mut text).map_err(unreadable)?;
-    match text.len() as u64 > LONGEST {
-        true => Err(fault(format!("is longer than 1 MiB, which no {what} is"))),
-        false => Ok(text),
-    }
+    files::read_text(path, LONGEST, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
 }
 
 /// The file that a layer names as its transfer function.

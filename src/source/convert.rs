@@ -2,8 +2,8 @@
 //! slice. In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
 
 use super::samples::{SampleType, StoredType};
-use super::unfinished::{Unfinished, unwritable};
 use super::{Frame, InputError};
+use crate::files::Unfinished;
 use crate::probe::{Geometry, Grid, Probe};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -171,9 +171,9 @@ impl Volume {
     /// An ending that is no format, a disk that is full; then no file is left.
     pub fn write(&self, grid: &Grid, sample: SampleType, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         let format = VolumeFile::of(path)?;
-        let (mut unfinished, mut file) = Unfinished::create(path)?;
-        let written = |result: std::io::Result<()>| result.map_err(|e| unwritable(path, &e));
-        written(file.write_all(format.header(grid, sample).as_bytes()))?;
+        let written = |e| InputError::unwritable(path, &e);
+        let mut file = Unfinished::create(path).map_err(written)?;
+        file.write_all(format.header(grid, sample).as_bytes()).map_err(written)?;
         let mut slice = vec![0; grid.size[0] * grid.size[1] * sample.bytes()];
         for z in 0..grid.size[2] {
             slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
@@ -183,11 +183,10 @@ impl Volume {
                     store(sample, self.at(place), voxel);
                 }
             });
-            written(file.write_all(&slice))?;
+            file.write_all(&slice).map_err(written)?;
             each();
         }
-        unfinished.finish(file)?;
-        unfinished.rename()
+        file.finish().and_then(|()| file.rename()).map_err(written)
     }
 }
 

@@ -34,6 +34,11 @@ impl InputError {
         InputError::new(file, "file", format!("cannot be read: {error}"))
     }
 
+    /// The operating system would not let the file be written.
+    pub(crate) fn unwritable(file: &Path, error: &io::Error) -> InputError {
+        InputError::new(file, "file", format!("cannot be written: {error}"))
+    }
+
     /// The numbers of the file do not place its samples.
     pub(crate) fn geometry(file: &Path, error: &GeometryError) -> InputError {
         InputError::new(file, error.field, &error.fault)

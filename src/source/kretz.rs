@@ -17,6 +17,8 @@ const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
 const SOUND_SPEED: f64 = 1540.0;
 /// An angle table of 65536 entries is the longest item that is read whole.
 const LONGEST_TABLE: u64 = 65_536 * 8;
+/// Files have some hundred items; zeros without end are items as well.
+const MOST_ITEMS: usize = 100_000;
 
 type Tag = (u16, u16);
 const SAMPLES: Tag = (0xc000, 1);
@@ -98,7 +100,7 @@ impl<'a> Items<'a> {
         }
         let mut items = Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false };
         let mut at = MAGIC.len() as u64;
-        loop {
+        for _ in 0..MOST_ITEMS {
             let mut head = [0; 8];
             if !fill(&mut input, &mut head).map_err(unreadable)? {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
@@ -139,6 +141,7 @@ impl<'a> Items<'a> {
             input.seek_relative(unread as i64).map_err(unreadable)?;
             at += length;
         }
+        Err(InputError::new(path, "items", format!("are more than {MOST_ITEMS}, before FFFF,FFFF")))
     }
 
     fn fault<T>(&self, tag: Tag, title: &str, fault: impl AsRef<str>) -> Result<T, InputError> {

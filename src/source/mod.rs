@@ -19,7 +19,6 @@ pub mod recording;
 pub mod samples;
 pub mod sequence;
 pub mod swept;
-mod unfinished;
 mod words;
 
 pub use crate::probe::{Geometry, Grid};
@@ -30,7 +29,7 @@ pub use samples::{SampleType, StoredType};
 use contents::Contents;
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// One polar acquisition, or one slice of a Cartesian volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +122,10 @@ pub trait Source: Send {
     fn header(&self) -> recorder::Header {
         live::header_of(self)
     }
+    /// Every file that it is read from.
+    fn files(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
     /// When the frame that was given last arrived, s on the recorder's clock, where that was recorded.
     fn arrival(&self) -> Option<f64> {
         None
@@ -160,5 +163,9 @@ impl Source for Recording {
 
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
         self.next_frame()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        self.files()
     }
 }

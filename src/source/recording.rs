@@ -96,6 +96,11 @@ impl Recording {
         self.contents.frames
     }
 
+    /// The recording, where its samples are, and its probe file.
+    pub fn files(&self) -> Vec<PathBuf> {
+        [self.path.clone(), self.contents.pixels.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
+    }
+
     /// Whole volumes.
     pub fn volumes(&self) -> usize {
         self.volumes.count

@@ -1,10 +1,9 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in NAME.probe.toml beside it.
 
-use super::unfinished::{Unfinished, unwritable};
 use super::{InputError, SampleType, Source};
+use crate::files::Unfinished;
 use crate::probe::{Geometry, ProbeFile, Volumes};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
@@ -86,7 +85,7 @@ impl Sequence {
                 for _ in 0..self.frames {
                     let frame = source.next_frame()?.filter(|frame| frame.volume == volume.number);
                     let gone = || InputError::new(path, "frames", "the input is not what it was a moment ago");
-                    file.write_all(&frame.ok_or_else(gone)?.bytes).map_err(|e| unwritable(path, &e))?;
+                    file.write_all(&frame.ok_or_else(gone)?.bytes).map_err(|e| InputError::unwritable(path, &e))?;
                 }
                 each();
             }
@@ -168,12 +167,16 @@ pub(super) fn header(
     text
 }
 
+fn unwritable(path: &Path) -> impl Fn(io::Error) -> InputError {
+    move |e| InputError::unwritable(path, &e)
+}
+
 /// The sequence and its probe file, both or none.
 pub(super) fn write_both(
     path: &Path,
     header: &str,
     probe: &str,
-    samples: impl FnOnce(&mut BufWriter<File>) -> Result<(), InputError>,
+    samples: impl FnOnce(&mut Unfinished) -> Result<(), InputError>,
 ) -> Result<(), InputError> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     if !ending.eq_ignore_ascii_case("mha") {
@@ -182,15 +185,14 @@ pub(super) fn write_both(
     if path.is_dir() {
         return Err(InputError::new(path, "file", "is a folder"));
     }
-    let (mut sequence, mut file) = Unfinished::create(path)?;
-    file.write_all(header.as_bytes()).map_err(|e| unwritable(path, &e))?;
-    samples(&mut file)?;
-    sequence.finish(file)?;
+    let mut sequence = Unfinished::create(path).map_err(unwritable(path))?;
+    sequence.write_all(header.as_bytes()).map_err(unwritable(path))?;
+    samples(&mut sequence)?;
+    sequence.finish().map_err(unwritable(path))?;
     let beside = beside(path);
-    let (mut geometry, mut file) = Unfinished::create(&beside)?;
-    file.write_all(probe.as_bytes()).map_err(|e| unwritable(&beside, &e))?;
-    geometry.finish(file)?;
+    let mut geometry = Unfinished::create(&beside).map_err(unwritable(&beside))?;
+    geometry.write_all(probe.as_bytes()).and_then(|()| geometry.finish()).map_err(unwritable(&beside))?;
     // The geometry first: frames never stand there without it.
-    geometry.rename()?;
-    sequence.rename()
+    geometry.rename().map_err(unwritable(&beside))?;
+    sequence.rename().map_err(unwritable(path))
 }

@@ -49,10 +49,14 @@ impl Keep {
     pub fn volumes(&mut self, header: Header, volumes: Vec<Kept>) -> Result<(), String> {
         self.save("frames", move |file| {
             let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
-            for frame in volumes.iter().flat_map(|kept| &kept.frames) {
-                writer.frame(frame, frame.time.unwrap_or(0.0)).map_err(|e| e.to_string())?;
+            let mut frames = volumes.iter().flat_map(|kept| &kept.frames);
+            match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
+                Ok(()) => writer.finish().map_err(|e| e.to_string()),
+                Err(e) => {
+                    writer.discard();
+                    Err(e.to_string())
+                }
             }
-            writer.finish().map_err(|e| e.to_string())
         })
     }
 

@@ -4,7 +4,7 @@ use crate::common::*;
 use std::fs;
 
 /// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.
-fn error_report(volume: &str) -> String {
+pub fn error_report(volume: &str) -> String {
     let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
         let time = ms * 1e6;
         format!(

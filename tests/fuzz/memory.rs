@@ -20,6 +20,7 @@ unsafe impl GlobalAlloc for Counting {
         if !counted(layout.size()) {
             return std::ptr::null_mut();
         }
+        // SAFETY: whoever calls answers for the layout.
         unsafe { System.alloc(layout) }
     }
 
@@ -27,11 +28,13 @@ unsafe impl GlobalAlloc for Counting {
         if !counted(layout.size()) {
             return std::ptr::null_mut();
         }
+        // SAFETY: as above.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
         NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: whoever calls got the place from here, and so from there.
         unsafe { System.dealloc(place, layout) }
     }
 }

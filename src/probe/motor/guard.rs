@@ -7,74 +7,9 @@ use super::fault::{Fault, MotorError, Stopped};
 use super::port::{Answer, Port};
 use super::table::MotorTable;
 use super::tmcl::{LENGTH, Request, SUCCESS, command};
-use signal_hook::consts::{SIGINT, SIGTERM};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
-
-#[cfg(unix)]
-const SIGNALS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
-#[cfg(not(unix))]
-const SIGNALS: &[i32] = &[SIGINT, SIGTERM];
-
-/// The process' signal handlers, registered once.
-struct Handlers {
-    /// The number of the last signal; 0: none.
-    received: Arc<AtomicUsize>,
-    /// Nobody holds the signals: they do what they do by default.
-    unheld: Arc<AtomicBool>,
-    holders: Mutex<usize>,
-}
-
-fn handlers() -> &'static Handlers {
-    static HANDLERS: OnceLock<Handlers> = OnceLock::new();
-    HANDLERS.get_or_init(|| {
-        let (received, unheld) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(true)));
-        for &signal in SIGNALS {
-            let registered = signal_hook::flag::register_conditional_default(signal, unheld.clone())
-                .and_then(|_| signal_hook::flag::register_usize(signal, received.clone(), signal as usize));
-            if let Err(error) = registered {
-                tracing::warn!("signal {signal} cannot be caught and would not stop the motor: {error}");
-            }
-        }
-        Handlers { received, unheld, holders: Mutex::new(0) }
-    })
-}
-
-/// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process but are told by [`Held::signal`].
-#[derive(Debug)]
-pub struct Held(());
-
-impl Held {
-    pub fn take() -> Held {
-        let handlers = handlers();
-        let mut holders = handlers.holders.lock().unwrap_or_else(|e| e.into_inner());
-        if *holders == 0 {
-            handlers.received.store(0, Ordering::SeqCst);
-        }
-        *holders += 1;
-        handlers.unheld.store(false, Ordering::SeqCst);
-        Held(())
-    }
-
-    /// The last signal that came, if any.
-    pub fn signal(&self) -> Option<&'static str> {
-        match handlers().received.load(Ordering::SeqCst) as i32 {
-            0 => None,
-            SIGINT => Some("SIGINT"),
-            SIGTERM => Some("SIGTERM"),
-            _ => Some("SIGHUP"),
-        }
-    }
-}
-
-impl Drop for Held {
-    fn drop(&mut self) {
-        let handlers = handlers();
-        let mut holders = handlers.holders.lock().unwrap_or_else(|e| e.into_inner());
-        *holders -= 1;
-        handlers.unheld.store(*holders == 0, Ordering::SeqCst);
-    }
-}
+use crate::files::signals::Held;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Interrupts what a motor is doing from any thread, as a signal would. Clones are one and the same.
 #[derive(Clone, Debug, Default)]

@@ -18,7 +18,7 @@ pub mod turning;
 
 pub use drive::{Drive, Status};
 pub use fault::{Fault, MotorError, Stopped};
-pub use guard::{Held, Interrupter};
+pub use guard::Interrupter;
 pub use port::{Parity, Settings, StopBits};
 pub use sweep::{Direction, Place, Position, Sweep, Track};
 pub use table::MotorTable;

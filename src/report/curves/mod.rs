@@ -185,6 +185,10 @@ impl Report {
     /// # Errors
     /// One line: no JSON, of another format or version, or with numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
+        Report::read(text).map_err(|e| super::one_line(&e))
+    }
+
+    fn read(text: &str) -> Result<Report, String> {
         #[derive(Deserialize)]
         struct Version {
             format: String,

@@ -15,6 +15,10 @@ pub fn to_json(profile: &Profile) -> Result<String, ProfileError> {
 
 /// Total: any text gives a profile that agrees with itself, or an error.
 pub fn from_json(text: &str) -> Result<Profile, ProfileError> {
+    read(text).map_err(ProfileError::on_one_line)
+}
+
+fn read(text: &str) -> Result<Profile, ProfileError> {
     /// Read first: a profile of another version is told from a file that is none.
     #[derive(Deserialize)]
     struct Version {

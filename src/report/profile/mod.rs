@@ -32,6 +32,19 @@ pub enum ProfileError {
     Contents { field: String, fault: String },
 }
 
+impl ProfileError {
+    fn on_one_line(self) -> ProfileError {
+        let line = |text: String| super::one_line(&text);
+        match self {
+            ProfileError::Format { found } => ProfileError::Format { found: line(found) },
+            ProfileError::Json(fault) => ProfileError::Json(line(fault)),
+            ProfileError::Contents { field, fault } => {
+                ProfileError::Contents { field: line(field), fault: line(fault) }
+            }
+        }
+    }
+}
+
 /// One run of `echolume profile`. Every list of times has one entry a repeat, in the order measured, all in ns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -2,7 +2,6 @@
 
 use super::{ARRAY_RADIUS, FAN_ANGLE_DEG, Phantom, SECTOR_ANGLE_DEG, SOUND_SPEED, WOBBLE_RADIUS};
 use crate::source::sequence::{self, MOST_FRAMES};
-use crate::source::unfinished::unwritable;
 use crate::source::{InputError, SampleType};
 use std::fmt::Write as _;
 use std::io::Write;
@@ -20,7 +19,7 @@ pub(super) fn sweep(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
     sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
         for volume in 0..phantom.volumes() {
             for frame in phantom.volume(volume) {
-                file.write_all(&frame.bytes).map_err(|e| unwritable(path, &e))?;
+                file.write_all(&frame.bytes).map_err(|e| InputError::unwritable(path, &e))?;
             }
         }
         Ok(())

@@ -12,7 +12,7 @@
 //! | ... | at a clean end: `INDX`, count (4), for each frame its offset (8) and volume (4), CRC-32 of the index, offset of `INDX` (8), `XEND` |
 //!
 //! Without an index, or with one that is damaged, the frames are gone through once. A frame whose checksum is wrong is left out and
-//! counted; where the lengths lead nowhere, what is behind is lost.
+//! counted; where the lengths lead nowhere, or no frame is for 1 GiB, what is behind is lost.
 
 mod facts;
 mod read;

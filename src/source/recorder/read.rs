@@ -11,6 +11,10 @@ use std::path::{Path, PathBuf};
 const TAIL: u64 = 16;
 /// Bytes of an entry.
 const ENTRY: u64 = 12;
+/// Longest index that is believed, entries: a file with holes in it has room for any. A longer one is made anew.
+const MOST_ENTRIES: u64 = 1 << 24;
+/// Where there was no frame for so many bytes, none is looked for behind.
+const WIDEST_GAP: u64 = 1 << 30;
 
 /// A file of frames that is read.
 pub struct Replay {
@@ -133,7 +137,7 @@ impl Replay {
         self.file.seek(SeekFrom::Start(length.checked_sub(TAIL)?)).ok()?;
         self.file.read_exact(&mut tail).ok()?;
         let at = u64::from_le_bytes(tail[4..12].try_into().ok()?);
-        if tail[12..] != *END || at < first || at > length - TAIL {
+        if tail[12..] != *END || at < first || at > length - TAIL || length - TAIL - at > 8 + ENTRY * MOST_ENTRIES {
             return None;
         }
         let mut index = vec![0; usize::try_from(length - TAIL - at).ok()?];
@@ -163,7 +167,7 @@ impl Replay {
         let record = self.record_bytes();
         // A header may claim frames that the file has no room for.
         let mut bytes = vec![0; if first + record <= length { record as usize } else { 0 }];
-        let mut at = first;
+        let (mut at, mut empty_from) = (first, first);
         self.file.seek(SeekFrom::Start(at))?;
         while at + record <= length {
             self.file.read_exact(&mut bytes)?;
@@ -174,10 +178,14 @@ impl Replay {
             match parsed(&bytes) {
                 Some((frame, _)) if self.index.last().is_none_or(|(_, volume)| frame.volume >= *volume) => {
                     self.index.push((at, frame.volume));
+                    empty_from = at + record;
                 }
                 _ => self.damaged += 1,
             }
             at += record;
+            if at - empty_from > WIDEST_GAP.max(4 * record) {
+                break;
+            }
         }
         self.lost = length - at;
         Ok(())
@@ -261,6 +269,10 @@ impl Source for Replay {
 
     fn header(&self) -> Header {
         self.header.clone()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
     }
 
     fn arrival(&self) -> Option<f64> {

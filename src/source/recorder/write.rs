@@ -1,7 +1,6 @@
 //! Frames to a file, one after the other.
 
 use super::{CRC, END, FRAME, FRAME_HEAD, Header, INDEX, LONGEST_HEADER, MAGIC, VERSION};
-use crate::source::unfinished::unwritable;
 use crate::source::{Frame, InputError};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
@@ -32,7 +31,8 @@ impl Writer {
         if text.len() > LONGEST_HEADER as usize {
             return Err(InputError::new(path, "header", format!("has {} bytes, at most {LONGEST_HEADER}", text.len())));
         }
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| unwritable(path, &e))?;
+        let file =
+            OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| InputError::unwritable(path, &e))?;
         let mut start = Vec::with_capacity(text.len() + 20);
         start.extend(MAGIC);
         start.extend(VERSION.to_le_bytes());
@@ -41,8 +41,13 @@ impl Writer {
         start.extend(CRC.checksum(&start).to_le_bytes());
         let mut writer =
             Writer { path: path.into(), file, header, index: Vec::new(), at: 0, frame: start, torn: false };
-        writer.append()?;
-        Ok(writer)
+        match writer.append() {
+            Ok(()) => Ok(writer),
+            Err(e) => {
+                writer.discard();
+                Err(e)
+            }
+        }
     }
 
     /// Appends a frame that arrived at `arrived` s, on the recorder's own clock. It is with the system when this returns; a volume that is
@@ -81,9 +86,15 @@ impl Writer {
         self.index.push((offset, frame.volume));
         // Once a volume: a frame in the system's hands outlives this process, and a power cut costs a volume at most.
         match begins {
-            true => self.file.sync_data().map_err(|e| unwritable(&self.path, &e)),
+            true => self.file.sync_data().map_err(|e| InputError::unwritable(&self.path, &e)),
             false => Ok(()),
         }
+    }
+
+    /// Takes it back: what is there is not to be taken for all of it.
+    pub fn discard(self) {
+        // Nothing more can be done about a file that will not go.
+        let _ = std::fs::remove_file(&self.path);
     }
 
     /// Frames so far.
@@ -108,12 +119,12 @@ impl Writer {
         self.frame.extend(offset.to_le_bytes());
         self.frame.extend(END);
         self.append()?;
-        self.file.sync_all().map_err(|e| unwritable(&self.path, &e))
+        self.file.sync_all().map_err(|e| InputError::unwritable(&self.path, &e))
     }
 
     /// Writes what is in hand at the end of what is whole.
     fn append(&mut self) -> Result<(), InputError> {
-        let unwritten = |e| unwritable(&self.path, &e);
+        let unwritten = |e| InputError::unwritable(&self.path, &e);
         if std::mem::replace(&mut self.torn, true) {
             use std::io::Seek;
             self.file.set_len(self.at).map_err(unwritten)?;

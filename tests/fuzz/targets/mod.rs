@@ -101,6 +101,10 @@ pub const TARGETS: &[Target] = &[
         rounds: 120_000,
         also: &[],
     },
+    Target { name: "report", run: reports::error_report, text: true, memory: 64 * MIB, rounds: 150_000, also: &[] },
+    Target { name: "profile", run: reports::profile, text: true, memory: 64 * MIB, rounds: 100_000, also: &[] },
+    // A header of some bytes may ask for 512 MiB, which the system gives when they are written.
+    Target { name: "picture", run: reports::picture, text: false, memory: 2048 * MIB, rounds: 5_000, also: &[] },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },
 ];
 

@@ -1,22 +1,68 @@
-//! What an earlier run of the program wrote.
+//! What an earlier run wrote, and ordinary pictures.
 
-use super::told;
-use echolume::report::verify::baseline::{Options, compare};
-use echolume::report::verify::json::{from_json, to_json};
-use echolume::report::verify::{html, junit, words};
+use super::{told, written};
+use echolume::picture::grey::Grey;
+use echolume::report::curves::{Measure, Report, choose, table};
+use echolume::report::profile::{compare, formats, table as passes};
+use echolume::report::verify::{baseline, html as page, json as verified, junit, words};
+use echolume::ui::ladder;
+
+pub fn error_report(bytes: &[u8]) -> String {
+    let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
+        Ok(report) => report,
+        Err(error) => return told(error),
+    };
+    let written = report.to_json().expect("it was checked");
+    assert_eq!(Report::from_json(&written).expect("what was written is right"), report);
+    let mut outcome = String::new();
+    for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
+        table::table(&report, measure);
+        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
+        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
+    }
+    let rungs = ladder::measured(&report).map_or(0, |rungs| rungs.len());
+    format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
+}
+
+pub fn profile(bytes: &[u8]) -> String {
+    let profile = match formats::from_json(&String::from_utf8_lossy(bytes)) {
+        Ok(profile) => profile,
+        Err(error) => return told(error),
+    };
+    let written = formats::to_json(&profile).expect("it was checked");
+    assert_eq!(formats::from_json(&written).expect("what was written is right"), profile);
+    let _ = (formats::csv(&profile), formats::csv_samples(&profile), passes::profile(&profile));
+    match compare::compare(&profile, &profile, &compare::Options::default()) {
+        Ok(compared) => {
+            assert_eq!(compared.regressions().count(), 0, "it is no slower than itself");
+            passes::comparison(&compared)
+        }
+        Err(error) => error.to_string(),
+    }
+}
+
+pub fn picture(bytes: &[u8]) -> String {
+    match Grey::load(&written("picture", bytes)) {
+        Ok(grey) => {
+            assert_eq!(grey.values.len(), grey.width as usize * grey.height as usize);
+            format!("{} {}", grey.sixteen, grey.from_colour)
+        }
+        Err(error) => told(error),
+    }
+}
 
 /// What is taken is written out and read back, does not differ from itself, and makes reports.
 pub fn verification(bytes: &[u8]) -> String {
-    let run = match from_json(&String::from_utf8_lossy(bytes)) {
+    let run = match verified::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(run) => run,
         Err(error) => return told(error),
     };
-    let written = to_json(&run).expect("JSON");
-    let again = from_json(&written).expect("what was written out is right");
-    assert_eq!(to_json(&again).expect("JSON"), written);
-    let compared = compare(&run, &again, &Options::default());
+    let written = verified::to_json(&run).expect("JSON");
+    let again = verified::from_json(&written).expect("what was written out is right");
+    assert_eq!(verified::to_json(&again).expect("JSON"), written);
+    let compared = baseline::compare(&run, &again, &baseline::Options::default());
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
-    html::html(&run, Some(&compared)).expect("a page");
+    page::html(&run, Some(&compared)).expect("a page");
     told(words::summary(&run))
 }

@@ -1,0 +1,100 @@
+//! Inputs without an end, or longer than any can be: each is refused in one line, soon, and without taking the machine with it.
+#![cfg(target_os = "linux")]
+
+use super::common::*;
+use std::fs::{self, File};
+use std::io::{Seek, SeekFrom, Write};
+use std::process::Command;
+
+/// As long as a file may be here: holes take no room.
+const HUGE: u64 = 1 << 40;
+/// KiB of address space that a refusal may need.
+const ROOM: &str = "3000000";
+
+fn bounded(arguments: &[&str]) -> Ran {
+    let mut command = Command::new("bash");
+    command.args(["-c", &format!("ulimit -v {ROOM}; exec timeout 20 \"$@\""), "bash", PROGRAM]).args(arguments);
+    finish(command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY"))
+}
+
+/// A file that begins so and goes on with zeros.
+fn huge(folder: &Folder, name: &str, start: &[u8]) -> String {
+    let path = folder.write(name, start);
+    File::options().write(true).open(&path).expect("opened").set_len(HUGE).expect("a file with a hole");
+    path
+}
+
+#[test]
+fn nothing_that_is_read_may_be_endless() {
+    let folder = Folder::new("endless");
+    let (out, volume) = (folder.path("out.png"), folder.path("out.mha"));
+    let fifo = folder.path("fifo.toml");
+    assert!(Command::new("mkfifo").arg(&fifo).status().expect("run mkfifo").success());
+    // Where @ stands the input goes; what a file of its kind begins with; and whether what it lacks is told at once.
+    let rows: &[(&[&str], &[u8])] = &[
+        (&["info", "@"], b"ObjectType = Image\n"),
+        (&["info", "@"], b"KRETZFILE 1.0   "),
+        (&["info", "@"], b"ECHOFRMS"),
+        (&["info", "@"], b""),
+        (&["info", SWEEP, "--probe", "@"], b"# "),
+        (&["render", "@", "-o", &out], b"ObjectType = Image\nNDims = 3\nDimSize = "),
+        (&["render", SWEEP, "-o", &out, "--scene", "@"], b"mode = 'vr'\n"),
+        (&["render", SWEEP, "-o", &out, "--transfer", "@"], b"points = []\n"),
+        (&["render", BONE, "-o", &out, "--budget", "9ms", "--report", "@"], b"{"),
+        (&["profile", "--compare", "@", "@"], b"{"),
+        (&["verify", "--baseline", "@"], b"{"),
+        (&["report", "error", "--from", "@"], b"{"),
+        (&["report", "tables", "@"], b"\xff\xd8\xff\xe0"),
+        (&["filter", "@", "-o", &out, "--filter", "median"], b"BM"),
+        (&["convert", "@", &volume], b"KRETZFILE 1.0   "),
+        (&["stream", "--null", "--source", "@"], b"ObjectType = Image\n"),
+        (&["stream", "--null", "--source", SWEEP, "--probe", "@"], b"# "),
+        (&["view", "--config", "@"], b"source = 'phantom'\n"),
+        (&["view", "--report", "@"], b"{"),
+        (&["probe", "status", "--port", "/dev/null", "--probe", "@"], b"[motor]\n"),
+    ];
+    let here = folder.path("");
+    for (row, start) in rows {
+        let long = huge(&folder, "long.toml", start);
+        for file in [&long, &fifo, &here, "/dev/zero"] {
+            // A transfer function is a file by its ending.
+            if row.contains(&"--transfer") && !file.ends_with(".toml") {
+                continue;
+            }
+            let all: Vec<&str> = row.iter().map(|word| if *word == "@" { file } else { *word }).collect();
+            refuses(&all, &bounded(&all), 2, &[file]);
+        }
+    }
+    assert!(!fs::exists(&out).expect("look") && !fs::exists(&volume).expect("look"), "something was written");
+}
+
+#[test]
+fn standard_input_without_an_end_or_a_line_is_refused() {
+    let zero = File::open("/dev/zero").expect("zeros");
+    let output =
+        Command::new("timeout").args(["20", PROGRAM, "stream", "--null", "--source", "-"]).stdin(zero).output();
+    let output = output.expect("start the program");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && said.contains("header: is longer than"), "{said}");
+}
+
+/// A file with a hole has room for any index, and for frames that are not there.
+#[test]
+fn a_recording_that_goes_on_in_a_hole_is_read_as_far_as_it_goes() {
+    let folder = Folder::new("hole");
+    let tape = folder.path("tape.frames");
+    done(&["convert", SWEEP, &tape]);
+    let bytes = fs::read(&tape).expect("read");
+    let index = &bytes[bytes.len() - 12..bytes.len() - 4];
+    let mut file = File::options().write(true).open(&tape).expect("opened");
+    file.set_len(u64::from_le_bytes(index.try_into().expect("eight bytes"))).expect("without its index");
+    file.set_len(HUGE).expect("a hole");
+    // An end that says that all of the hole is an index.
+    file.seek(SeekFrom::End(-16)).expect("its end");
+    file.write_all(&[&[0; 4][..], index, b"XEND"].concat()).expect("written");
+    drop(file);
+    let (code, said, err) = bounded(&["info", &tape]);
+    assert_eq!(code, Some(0), "{said} {err}");
+    let has = |title: &str, value: &str| said.lines().any(|l| l.starts_with(title) && l.ends_with(value));
+    assert!(has("frames", " 31") && has("index", "made anew") && has("lost", "bytes at the end"), "{said}");
+}

@@ -1,0 +1,130 @@
+//! A signal in the middle of what takes long: what was there stays, nothing half-made is left, and a stream ends as it always does.
+#![cfg(unix)]
+
+use super::common::*;
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const SIGNALS: [Signal; 3] = [Signal::INT, Signal::TERM, Signal::HUP];
+
+fn start(program: &mut Command) -> Child {
+    program.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("start the program")
+}
+
+fn signal(child: &Child, signal: Signal) {
+    kill_process(Pid::from_child(child), signal).expect("send a signal");
+}
+
+fn eventually(mut is: impl FnMut() -> bool) -> bool {
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(30) {
+        if is() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    false
+}
+
+#[test]
+fn a_signal_leaves_no_half_written_file() {
+    let folder = Folder::new("signals");
+    let (mha, frames, sweep) = (folder.path("out.mha"), folder.path("out.frames"), folder.path("sweep.mha"));
+    done(&["phantom", "--body", "constant", "--no-speckle", "--volumes", "6", "-o", &sweep]);
+    fs::write(&mha, "old").expect("an old file");
+    let before = folder.names();
+    for (row, sent) in [
+        (&["convert", SWEEP, &mha, "--spacing", "0.1"][..], Signal::INT),
+        (&["convert", SWEEP, &mha, "--spacing", "0.1"], Signal::TERM),
+        (&["convert", SWEEP, &mha, "--spacing", "0.1"], Signal::HUP),
+        (&["phantom", "--volumes", "500", "-o", &mha], Signal::TERM),
+        (&["convert", &sweep, &mha, "--sequence"], Signal::INT),
+        (&["convert", &sweep, &frames], Signal::TERM),
+    ] {
+        let mut child = start(Command::new(PROGRAM).args(row));
+        let half = || folder.names().difference(&before).next().is_some();
+        assert!(eventually(half), "{row:?} has begun nothing");
+        signal(&child, sent);
+        let began = Instant::now();
+        let status = child.wait().expect("it ends");
+        assert!(began.elapsed() < Duration::from_secs(5), "{row:?} took {:?} to end", began.elapsed());
+        assert_eq!(status.signal(), Some(sent.as_raw()), "{row:?} ended with {status}");
+        assert_eq!(folder.names(), before, "{row:?}");
+        assert_eq!(fs::read(&mha).expect("the old file"), b"old", "{row:?}");
+    }
+}
+
+#[test]
+fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
+    let folder = Folder::new("computing");
+    let [png, json, md, dir] = ["out.png", "out.json", "out.md", "report"].map(|name| folder.path(name));
+    let picture =
+        folder.write("in.pgm", [b"P5 1500 1500 255\n".to_vec(), (0..1500 * 1500).map(|n| n as u8).collect()].concat());
+    for (n, row) in [
+        &["render", "-o", &png, "--size", "4096x4096", "--set", "ray.step=0.1"][..],
+        &["profile", "--repeat", "10000", "--json", &json],
+        &["verify", "--only", "passes", "--json", &json],
+        &["report", "error", "--dial", "step", "-o", &dir],
+        &["report", "tables", "--markdown", &md],
+        &["filter", &picture, "--growth-table", "--csv", &json],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut child = start(Command::new(PROGRAM).args(row));
+        // It says which device it has taken, and works.
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
+        assert!(line.starts_with("device: "), "{row:?} said {line:?}");
+        let sent = SIGNALS[n % SIGNALS.len()];
+        signal(&child, sent);
+        assert_eq!(child.wait().expect("it ends").signal(), Some(sent.as_raw()), "{row:?}");
+        let left: Vec<_> = folder.names().into_iter().filter(|name| name != "report" && name != "in.pgm").collect();
+        assert!(left.is_empty(), "{row:?} left {left:?}");
+    }
+}
+
+#[test]
+fn a_signal_ends_a_stream_with_its_summary_and_a_finished_recording() {
+    let folder = Folder::new("stream");
+    let started = SIGNALS.map(|sent| {
+        let tape = folder.path(&format!("{}.frames", sent.as_raw()));
+        let stream = ["stream", "--null", "--rate", "3", "--size", "24x24", "--mode", "mip", "--record", &tape];
+        (sent, start(Command::new(PROGRAM).args(stream)), tape)
+    });
+    for (sent, mut child, tape) in started {
+        let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
+        assert!(lines.any(|line| line.contains(" s  frames ")), "it streams");
+        signal(&child, sent);
+        let last = lines.last().expect("a last line");
+        assert!(last.contains("volumes shown"), "{last}");
+        assert_eq!(child.wait().expect("it ends").code(), Some(0));
+        assert!(done(&["info", &tape]).contains("as it was written"), "the index is missing");
+    }
+}
+
+#[test]
+fn a_stream_that_nobody_listens_to_and_nothing_keeps_ends() {
+    let small = ["stream", "--null", "--rate", "3", "--size", "24x24", "--mode", "mip"];
+    let mut child = start(Command::new(PROGRAM).args(small));
+    drop(child.stdout.take());
+    assert!(eventually(|| child.try_wait().expect("wait for it").is_some()), "it goes on for nobody");
+    assert_eq!(child.wait().expect("it has ended").code(), Some(0));
+}
+
+#[test]
+fn a_signal_that_was_to_be_ignored_does_not_end_what_is_written() {
+    let folder = Folder::new("nohup");
+    let out = folder.path("out.mha");
+    let mut ignoring = Command::new("sh");
+    ignoring.args(["-c", "trap '' HUP; exec \"$@\"", "sh", PROGRAM, "convert", SWEEP, &out, "--spacing", "0.5"]);
+    let mut child = start(&mut ignoring);
+    assert!(eventually(|| !folder.names().is_empty()), "it writes");
+    signal(&child, Signal::HUP);
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(folder.names().into_iter().collect::<Vec<_>>(), ["out.mha"]);
+}
