@@ -80,7 +80,9 @@ impl Verify {
         let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
         targets::check(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
-        let earlier = self.baseline.as_deref().map(read).transpose()?;
+        let mut earlier = self.baseline.as_deref().map(read).transpose()?;
+        // What was not asked for is not missing.
+        earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.wants(&o.group, &o.name)));
         let mut run = self.checked(level)?;
         self.save_pictures(&mut run);
         let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
@@ -131,9 +133,7 @@ impl Verify {
     }
 
     fn chosen(&self, mut checks: Vec<Check>) -> Result<Vec<Check>, Failure> {
-        let holds =
-            |check: &Check, part: &String| check.group.contains(part.as_str()) || check.name.contains(part.as_str());
-        checks.retain(|check| self.only.is_empty() || self.only.iter().any(|part| holds(check, part)));
+        checks.retain(|check| self.wants(check.group, &check.name));
         match checks.is_empty() {
             true => Err(input(format!(
                 "--only {}: no check is called so; --list says what there are",
@@ -141,6 +141,11 @@ impl Verify {
             ))),
             false => Ok(checks),
         }
+    }
+
+    fn wants(&self, group: &str, name: &str) -> bool {
+        self.only.is_empty()
+            || self.only.iter().any(|part| group.contains(part.as_str()) || name.contains(part.as_str()))
     }
 
     /// Writes what shows each failure, and names the files in it. A folder that cannot be written to loses only them.
