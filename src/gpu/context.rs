@@ -208,6 +208,14 @@ impl Context {
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
+    /// Bytes of the device's own memory, free or not.
+    pub fn memory(&self) -> u64 {
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        let there = unsafe { self.instance.get_physical_device_memory_properties(self.candidate.handle) };
+        let own = there.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+        own.map(|heap| heap.size).sum()
+    }
+
     /// A time stamp of the device, and when the host read it; none where the device's clock cannot be read.
     pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
         let clock = self.clock.as_ref()?;
@@ -224,6 +232,11 @@ impl Context {
         // SAFETY: the handle belongs to this instance; the call only reads.
         let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
+    }
+
+    /// From now on a format has these features.
+    pub(super) fn take_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
+        self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
     }
 
     /// Names an object in captures and validation messages.

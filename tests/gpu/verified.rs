@@ -1,0 +1,132 @@
+//! The groups of `echolume verify` that look at the whole program: each passes here, and each notices what it is there to notice.
+
+use crate::common::*;
+use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::probe::Geometry;
+use echolume::report::verify::{Level, Outcome, Verdict};
+use echolume::verify::{self, Bench, Check, Found};
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+fn bench() -> Bench {
+    prepared(None)
+}
+
+/// A bench with something wrong in every context.
+fn prepared(wrong: Option<fn(&Context)>) -> Bench {
+    let options = ContextOptions { device: chosen(), validation: true };
+    Bench::prepared(&options, Level::Quick, wrong).expect("bench")
+}
+
+/// The one check of that name.
+fn named(checks: Vec<Check>, name: &str) -> Vec<Check> {
+    let mut checks = checks;
+    checks.retain(|check| check.name == name);
+    assert_eq!(checks.len(), 1, "{name}");
+    checks
+}
+
+/// Runs checks; what failed, in words.
+fn failures(bench: &mut Bench, checks: &[Check]) -> Vec<String> {
+    let tell = |outcome: &Outcome| {
+        println!("{}: {} {:.2} s {:?}", outcome.group, outcome.name, outcome.seconds, outcome.verdict);
+        outcome.figures.iter().for_each(|f| println!("    {} {}", f.what, f.value));
+        outcome.notes.iter().for_each(|note| println!("    {note}"));
+        true
+    };
+    let run = verify::run(bench, checks, tell);
+    let faults = |o: &Outcome| o.faults.iter().map(|f| format!("{}: {f:?}", o.name)).collect::<Vec<_>>();
+    run.outcomes.iter().filter(|o| o.verdict == Verdict::Failed).flat_map(faults).collect()
+}
+
+fn pass(checks: Vec<Check>) {
+    let failed = failures(&mut bench(), &checks);
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+#[test]
+fn the_same_is_drawn_again_in_every_way() {
+    let mut checks = verify::repeats::checks(Level::Quick);
+    checks.retain(|check| check.name != "any number of threads");
+    pass(checks);
+}
+
+/// A program that says something else than this one, or nothing, or is not there.
+#[test]
+fn other_bits_of_another_number_of_threads_are_seen() {
+    let mut bench = bench();
+    if !bench.context.candidate.name.contains("llvmpipe") {
+        return;
+    }
+    let check = || named(verify::repeats::checks(Level::Quick), "any number of threads");
+    let folder = std::env::temp_dir().join(format!("echolume-threads-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let program = |name: &str, text: &str| -> PathBuf {
+        let file = folder.join(name);
+        std::fs::write(&file, format!("#!/bin/sh\n{text}\n")).expect("written");
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755)).expect("a program");
+        file
+    };
+    let digest = verify::repeats::digest(&bench.context).expect("digest");
+    bench.program = Some(program("same", &format!("cat <<'end'\n{digest}end")));
+    assert_eq!(failures(&mut bench, &check()), [""; 0]);
+    let other = digest.replacen(&digest[..16], "0123456789abcdef", 1);
+    bench.program = Some(program(
+        "other",
+        &format!("[ $LP_NUM_THREADS = 7 ] && cat <<'end' || cat <<'same'\n{other}end\n{digest}same"),
+    ));
+    let seen = failures(&mut bench, &check());
+    assert!(seen.len() == 1 && seen[0].contains("LP_NUM_THREADS=7: another picture"), "{seen:?}");
+    bench.program = Some(program("failing", "exit 3"));
+    assert_eq!(failures(&mut bench, &check()).len(), 2);
+    bench.program = Some(folder.join("none"));
+    assert_eq!(check()[0].run(&mut bench).verdict, Verdict::LeftOut);
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+#[test]
+fn a_picture_that_differs_by_one_bit_is_seen() {
+    let mut bench = bench();
+    let modes = bench.modes().expect("pictures");
+    let mut other = modes[3].picture.clone();
+    other.rgba[77] ^= 1;
+    let mut found = Found::default();
+    assert!(verify::repeats::same(&mut found, "itself", &modes[3].picture, &modes[3].picture));
+    assert!(found.faults.is_empty());
+    assert!(!verify::repeats::same(&mut found, "other", &modes[3].picture, &other));
+    assert!(found.faults[0].what.contains("1 of") && found.pictures.len() == 1, "{:?}", found.faults);
+}
+
+#[test]
+fn nothing_depends_on_what_memory_held() {
+    pass(verify::poison::checks(Level::Quick));
+}
+
+/// A pass that is left out leaves its output as it was: zeros, that look like a dark picture.
+#[test]
+fn an_output_that_is_not_written_is_seen() {
+    let mut bench = prepared(Some(|context| context.faults.slow_down("light", 0)));
+    let seen = failures(&mut bench, &named(verify::poison::checks(Level::Quick), "every mode on poisoned memory"));
+    assert!(seen.iter().any(|fault| fault.contains("'picture' are never written")), "{seen:?}");
+}
+
+#[test]
+fn what_fails_says_so_and_leaves_nothing_behind() {
+    pass(verify::failing::checks(Level::Quick));
+    pass(verify::limits::checks(Level::Quick));
+}
+
+#[test]
+fn memory_that_is_not_given_back_is_seen() {
+    let context: Arc<Context> = bench().context.clone();
+    let before = context.allocated();
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }");
+    let renderer: Result<Renderer, GpuError> = Renderer::new(&context, scene, &Options::default());
+    let mut found = Found::default();
+    verify::failing::returned(&mut found, &context, before, "while it is there");
+    assert!(found.faults[0].what.contains("are still held"), "{:?}", found.faults);
+    drop(renderer.expect("renderer"));
+    verify::failing::returned(&mut found, &context, before, "when it is gone");
+    assert_eq!(found.faults.len(), 1);
+}
