@@ -9,6 +9,7 @@ pub mod built_in;
 mod compared;
 pub mod drawn;
 pub mod failing;
+pub mod formats;
 pub mod inputs;
 mod known_answers;
 pub mod limits;
@@ -217,8 +218,15 @@ impl Check {
 
 /// Every check of a level, in running order.
 pub fn checks(level: Level) -> Vec<Check> {
-    let groups =
-        [passes::checks, known_answers::checks, repeats::checks, poison::checks, failing::checks, limits::checks];
+    let groups = [
+        passes::checks,
+        known_answers::checks,
+        repeats::checks,
+        poison::checks,
+        failing::checks,
+        limits::checks,
+        formats::checks,
+    ];
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 

@@ -4,7 +4,7 @@ use crate::common::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
 use echolume::probe::Geometry;
 use echolume::report::verify::{Level, Outcome, Verdict};
-use echolume::verify::{self, Bench, Check, Found};
+use echolume::verify::{self, Bench, Check, Found, built_in};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -129,4 +129,30 @@ fn memory_that_is_not_given_back_is_seen() {
     drop(renderer.expect("renderer"));
     verify::failing::returned(&mut found, &context, before, "when it is gone");
     assert_eq!(found.faults.len(), 1);
+}
+
+#[test]
+fn every_format_and_everything_that_falls_back_gives_the_reference_s_picture() {
+    pass(verify::formats::checks(Level::Quick));
+}
+
+/// A volume that lies half a voxel aside.
+#[test]
+fn a_picture_that_is_not_the_reference_s_is_seen() {
+    use verify::formats::{Largest, reference};
+    let bench = bench();
+    let scene = scene(
+        Geometry::Sweep(wobbler()),
+        BYTES,
+        "mode = 'mip'\npicture = { size = [40, 36] }\nslices = { pixels = 64 }",
+    );
+    let frames = built_in::wall(&scene, 0);
+    let aside = body_frames(&scene, |p| if p.y + 0.4 > 42.0 { 0.8 } else { 0.15 });
+    let (expected, allowed) = (reference(&scene, &frames), [0.6, 3.0]);
+    let (mut largest, mut found) = (Largest::default(), Found::default());
+    let picture = |frames| verify::drawn::picture(&bench.context, &scene, frames).expect("picture");
+    largest.add(&mut found, "itself", &expected, &picture(&frames), allowed);
+    assert!(found.faults.is_empty(), "{:?}", found.faults);
+    largest.add(&mut found, "aside", &expected, &picture(&aside), allowed);
+    assert!(found.faults.len() == 1 && found.pictures.len() == 1, "{:?}", found.faults);
 }
