@@ -10,6 +10,7 @@ mod compared;
 pub mod drawn;
 pub mod failing;
 pub mod formats;
+pub mod hazards;
 pub mod inputs;
 mod known_answers;
 pub mod limits;
@@ -226,6 +227,7 @@ pub fn checks(level: Level) -> Vec<Check> {
         failing::checks,
         limits::checks,
         formats::checks,
+        hazards::checks,
     ];
     groups.into_iter().flat_map(|group| group(level)).collect()
 }

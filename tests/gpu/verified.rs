@@ -156,3 +156,19 @@ fn a_picture_that_is_not_the_reference_s_is_seen() {
     largest.add(&mut found, "aside", &expected, &picture(&aside), allowed);
     assert!(found.faults.len() == 1 && found.pictures.len() == 1, "{:?}", found.faults);
 }
+
+#[test]
+fn frames_that_arrive_while_pictures_are_drawn_change_none_of_them() {
+    pass(verify::hazards::checks(Level::Quick));
+}
+
+/// Each volume is sent into the image that is drawn, and not into the other.
+#[test]
+fn two_volumes_in_one_image_are_seen() {
+    let bench = bench();
+    let mut found = Found::default();
+    let into_the_same = |round: usize| round as u32 % 2;
+    let [compared, wrong] =
+        verify::hazards::taking_turns(&mut found, &bench.context, 1, 4, into_the_same).expect("pictures");
+    assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
+}
