@@ -18,6 +18,7 @@ pub mod passes;
 pub mod poison;
 pub mod repeats;
 mod shown;
+pub mod stamps;
 pub mod threads;
 
 use crate::gpu::single::Single;
@@ -228,6 +229,7 @@ pub fn checks(level: Level) -> Vec<Check> {
         limits::checks,
         formats::checks,
         hazards::checks,
+        stamps::checks,
     ];
     groups.into_iter().flat_map(|group| group(level)).collect()
 }

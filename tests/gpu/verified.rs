@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::passes::Span;
 use echolume::probe::Geometry;
 use echolume::report::verify::{Level, Outcome, Verdict};
 use echolume::verify::{self, Bench, Check, Found, built_in};
@@ -171,4 +172,36 @@ fn two_volumes_in_one_image_are_seen() {
     let [compared, wrong] =
         verify::hazards::taking_turns(&mut found, &bench.context, 1, 4, into_the_same).expect("pictures");
     assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
+}
+
+#[test]
+fn time_stamps_are_sane() {
+    pass(verify::stamps::checks(Level::Quick));
+}
+
+/// Spans of a picture: the host's, and two passes of the device.
+fn spans(first: [f64; 2], second: [f64; 2]) -> Vec<Span> {
+    let span = |name, on_device, [begin, end]: [f64; 2]| Span { name, on_device, begin, end, invocations: None };
+    vec![
+        span("submit", false, [1000.0, 2000.0]),
+        span("raycast_volume", true, first),
+        span("tone", true, second),
+        span("wait", false, [2000.0, 11_000.0]),
+    ]
+}
+
+#[test]
+fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
+    use verify::stamps::looked_at;
+    let [share, outside] = looked_at(&spans([2000.0, 8000.0], [8000.0, 10_000.0])).expect("sane");
+    assert!((share - 0.8).abs() < 1e-9 && outside == 0.0);
+    let of = |first, second| looked_at(&spans(first, second)).expect_err("seen");
+    assert!(of([2000.0, 1500.0], [1500.0, 9000.0]).contains("'raycast_volume' took -500"));
+    assert!(of([2000.0, 8000.0], [5000.0, 9000.0]).contains("lie between"));
+    assert!(of([2000.0, 6.8e10], [6.8e10, 6.9e10]).contains("took"));
+    assert!(of([2000.0, 9000.0], [9000.0, 13_500.0]).contains("all passes"));
+    assert!(of([2000.0, 2000.0], [2000.0, 2000.0]).contains("all passes"));
+    assert!(looked_at(&spans([2000.0, 8000.0], [8000.0, 9000.0])[..1]).is_err());
+    let [_, outside] = looked_at(&spans([20_000.0, 26_000.0], [26_000.0, 27_000.0])).expect("sane in themselves");
+    assert!(outside > 0.5, "the device's clock is another");
 }
