@@ -19,6 +19,7 @@ pub mod poison;
 pub mod repeats;
 mod shown;
 pub mod stamps;
+pub mod stress;
 pub mod threads;
 
 use crate::gpu::single::Single;
@@ -230,6 +231,7 @@ pub fn checks(level: Level) -> Vec<Check> {
         formats::checks,
         hazards::checks,
         stamps::checks,
+        stress::checks,
     ];
     groups.into_iter().flat_map(|group| group(level)).collect()
 }

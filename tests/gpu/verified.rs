@@ -205,3 +205,19 @@ fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
     let [_, outside] = looked_at(&spans([20_000.0, 26_000.0], [26_000.0, 27_000.0])).expect("sane in themselves");
     assert!(outside > 0.5, "the device's clock is another");
 }
+
+#[test]
+fn a_short_stress_leaves_nothing_behind() {
+    pass(verify::stress::checks(Level::Quick));
+}
+
+/// A frame of something else arrives before each picture.
+#[test]
+fn a_renderer_that_draws_otherwise_than_a_fresh_one_is_seen_by_the_stress() {
+    let spoil = |renderer: &mut Renderer, image: u32| {
+        let frame = vec![200; renderer.frame_bytes()];
+        renderer.frame(4, &frame, image)
+    };
+    let found = verify::stress::stress(&mut bench(), 0.1, &spoil).expect("stress");
+    assert!(found.faults.iter().any(|fault| fault.what.contains("values are others")), "{:?}", found.faults);
+}
