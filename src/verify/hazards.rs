@@ -42,7 +42,7 @@ fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     counted(&mut found, sums[0], sums[1]);
     let there = bench.context.queue_count();
     if there < MOST {
-        found.notes.push(format!("{there} queues stand for {MOST}: they order more than as many queues would"));
+        found.notes.push(format!("queues for different work: {there} of {MOST}; one does what several would"));
     }
     Ok(found)
 }
