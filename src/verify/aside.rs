@@ -1,7 +1,7 @@
 //! Contexts of a check's own: devices that are to be lost, that stand for lesser ones, or whose one queue plays several.
 //!
-//! Layers of 1.3.239 do not see that a host waits for a timeline, nor that a queue does. Where one queue plays several they call
-//! everything between submissions a hazard; and where memory that was read back is another renderer's a moment later, that.
+//! Layers of 1.3.239 do not see that a queue waits for a timeline: where one plays several they call everything between submissions a
+//! hazard.
 
 use super::{Bench, Found};
 use crate::gpu::{Context, GpuError};
@@ -29,14 +29,6 @@ impl Aside {
     pub fn of_queues(bench: &Bench, queues: usize) -> Result<Aside, GpuError> {
         let context = bench.another()?;
         Ok(Aside { hears: context.queue_count() >= queues, context })
-    }
-
-    /// One on which renderers are made and dropped and slots are read back.
-    ///
-    /// # Errors
-    /// As of [`Bench::another`].
-    pub fn of_many_renderers(bench: &Bench) -> Result<Aside, GpuError> {
-        Ok(Aside { hears: false, context: bench.another()? })
     }
 
     /// One that lacks something, by what `change` does to what is known of it, before anything is made from it.
