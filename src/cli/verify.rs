@@ -71,6 +71,12 @@ pub struct Verify {
 
 impl Verify {
     pub fn run(&self) -> Result<(), Failure> {
+        if self.digest {
+            let device = self.device.clone().unwrap_or(Choice::Best);
+            let context = context(&ContextOptions { device, validation: false })?;
+            say!("{}", verify::repeats::digest(&context).map_err(failed)?.trim_end());
+            return Ok(());
+        }
         let level = if self.full { Level::Full } else { Level::Quick };
         if self.list {
             let checks = self.chosen(verify::checks(level))?;
@@ -93,6 +99,7 @@ impl Verify {
     /// What is looked at on the device, and what came of it.
     fn checked(&self, level: Level) -> Result<Run, Failure> {
         let mut bench = self.bench(level)?;
+        bench.program = std::env::current_exe().ok();
         let device = &bench.context.candidate;
         let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
         let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };

@@ -213,6 +213,14 @@ impl Context {
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
+    /// Bytes of the device's own memory, free or not.
+    pub fn memory(&self) -> u64 {
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        let there = unsafe { self.instance.get_physical_device_memory_properties(self.candidate.handle) };
+        let own = there.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+        own.map(|heap| heap.size).sum()
+    }
+
     /// A time stamp of the device, and when the host read it; none where the device's clock cannot be read.
     pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
         let clock = self.clock.as_ref()?;
@@ -229,6 +237,11 @@ impl Context {
         // SAFETY: the handle belongs to this instance; the call only reads.
         let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
+    }
+
+    /// From now on a format has these features.
+    pub(super) fn take_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
+        self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
     }
 
     /// Names an object in captures and validation messages.
@@ -291,6 +304,18 @@ impl Context {
 
     pub(super) fn wait_idle(&self) {
         self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
+        self.idle();
+    }
+
+    /// Layers of 1.3.239 do not see that a host waits for a timeline. They see that the device is idle; else memory that is another's a
+    /// moment later would look like a hazard.
+    pub(super) fn show_idle(&self) {
+        if self.messenger.is_some() {
+            self.idle();
+        }
+    }
+
+    fn idle(&self) {
         let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
         // SAFETY: the locks keep every queue of the device to this thread.
         let _ = unsafe { self.device.device_wait_idle() };

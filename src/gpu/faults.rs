@@ -1,6 +1,7 @@
 //! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested;
 //! and slowness, so that what finds it is.
 
+use crate::passes::slots::Format;
 use ash::vk;
 use std::sync::Mutex;
 
@@ -14,11 +15,63 @@ pub enum Seam {
     Acquire,
 }
 
-/// At most one planned failure, and one slow pass.
+/// How a call fails, for those who know no Vulkan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    OutOfDeviceMemory,
+    OutOfHostMemory,
+    DeviceLost,
+    TimeOut,
+}
+
+impl Failure {
+    pub fn result(self) -> vk::Result {
+        match self {
+            Failure::OutOfDeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            Failure::OutOfHostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            Failure::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
+            Failure::TimeOut => vk::Result::TIMEOUT,
+        }
+    }
+}
+
+/// What new memory holds before anything is written to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Poison {
+    /// Texels of floats.
+    pub float: f32,
+    /// Texels that stand for 0..1.
+    pub share: f32,
+    /// Texels of whole numbers.
+    pub whole: u32,
+    /// Buffers.
+    pub byte: u8,
+}
+
+impl Poison {
+    /// Two that differ in every bit that counts: what holds neither of them where it should was computed from them.
+    pub const BOTH: [Poison; 2] = [
+        Poison { float: f32::NAN, share: 2.0 / 3.0, whole: 0xabab_abab, byte: 0xff },
+        Poison { float: -999.5, share: 1.0 / 3.0, whole: 0x5555_5555, byte: 0x55 },
+    ];
+
+    /// As a texel of a format holds it.
+    pub fn seen_in(self, format: Format) -> f64 {
+        match format {
+            Format::R32u | Format::Rg32u => f64::from(self.whole),
+            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.share)).round() / 255.0,
+            Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.share)).round() / 65535.0,
+            _ => f64::from(self.float),
+        }
+    }
+}
+
+/// At most one planned failure, one slow pass, and one poison.
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(Seam, u32, vk::Result)>>,
     slow: Mutex<Option<(&'static str, u32)>>,
+    poison: Mutex<Option<Poison>>,
 }
 
 impl Faults {
@@ -43,7 +96,21 @@ impl Faults {
         }
     }
 
-    /// From now on the pass is dispatched so many times instead of once. It writes the same each time: only time passes.
+    /// Forgets a planned failure that was not reached.
+    pub fn forget(&self) {
+        *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
+    }
+
+    /// From now on new memory holds this; zeros where something relies on them ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
+    pub fn poison(&self, poison: Option<Poison>) {
+        *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
+    }
+
+    pub(super) fn poisoned(&self) -> Option<Poison> {
+        *self.poison.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// From now on the pass is dispatched so many times instead of once. It writes the same each time: only time passes. 0 leaves it out.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }

@@ -1,5 +1,6 @@
 //! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
 
+use super::faults::Poison;
 use super::{Context, Fetch, GpuError};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
@@ -21,6 +22,15 @@ pub fn vulkan(format: Format) -> vk::Format {
         Format::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
         Format::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+    }
+}
+
+/// A poison as texels of a format.
+pub fn held(poison: Poison, format: Format) -> vk::ClearColorValue {
+    match format {
+        Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.whole; 4] },
+        Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 => vk::ClearColorValue { float32: [poison.share; 4] },
+        _ => vk::ClearColorValue { float32: [poison.float; 4] },
     }
 }
 
@@ -102,4 +112,61 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
         }
     }
     Ok(())
+}
+
+/// What a device does with a format.
+pub struct Abilities {
+    pub format: String,
+    pub can: Vec<&'static str>,
+    pub cannot: Vec<&'static str>,
+    /// Columns and rows of the largest sampled image, and texels along each edge of the largest volume; 0 where there is none.
+    pub largest: [u32; 3],
+}
+
+/// Every format that slots have, with everything that slots are used for.
+pub fn abilities(context: &Context) -> Vec<Abilities> {
+    let formats = [
+        Format::R8,
+        Format::R16,
+        Format::R16f,
+        Format::R32f,
+        Format::Rg16,
+        Format::Rg16f,
+        Format::Rg32f,
+        Format::R32u,
+        Format::Rg32u,
+        Format::Rgba16f,
+        Format::Rgba32f,
+        Format::Rgba8,
+    ];
+    let uses = [
+        ("sampled", vk::FormatFeatureFlags::SAMPLED_IMAGE),
+        ("filtered", vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR),
+        ("stored", vk::FormatFeatureFlags::STORAGE_IMAGE),
+        ("copied from", vk::FormatFeatureFlags::TRANSFER_SRC),
+        ("copied to", vk::FormatFeatureFlags::TRANSFER_DST),
+    ];
+    let of = |format: Format| {
+        let there = context.format_features(vulkan(format));
+        let (can, cannot): (Vec<_>, Vec<_>) = uses.iter().partition(|(_, needed)| there.contains(*needed));
+        let edge = |kind| context.image_limits(vulkan(format), kind, vk::ImageUsageFlags::SAMPLED);
+        let extent = |kind| edge(kind).map_or(vk::Extent3D::default(), |limits| limits.max_extent);
+        let (flat, deep) = (extent(vk::ImageType::TYPE_2D), extent(vk::ImageType::TYPE_3D));
+        let names = |of: Vec<&(&'static str, vk::FormatFeatureFlags)>| of.iter().map(|(name, _)| *name).collect();
+        Abilities {
+            format: format!("{format:?}"),
+            can: names(can),
+            cannot: names(cannot),
+            largest: [flat.width, flat.height, deep.width.min(deep.height).min(deep.depth)],
+        }
+    };
+    formats.into_iter().map(of).collect()
+}
+
+/// As if the device could filter no format of a volume.
+pub fn deny_filters(context: &mut Context) {
+    for format in [Format::R8, Format::R16, Format::R16f, Format::R32f].map(vulkan) {
+        let there = context.format_features(format);
+        context.take_features(format, there & !vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    }
 }

@@ -5,6 +5,7 @@ mod bind;
 use super::GpuError;
 use super::context::Context;
 use super::error::Doing;
+use super::formats;
 use super::measured::Measured;
 use super::order::Order;
 use super::pipelines::Pipeline;
@@ -215,10 +216,11 @@ impl Recorder {
         for (image, slot, n) in images {
             let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, Worker::Copy);
             self.barrier(order, &[access]);
-            let zero = vk::ClearColorValue { float32: [0.0; 4] };
+            let poison = self.context.faults.poisoned().filter(|_| !slot.starts_clear());
+            let held = poison.map_or(vk::ClearColorValue { float32: [0.0; 4] }, |p| formats::held(p, image.format));
             // SAFETY: the image is in GENERAL since the transition above.
             unsafe {
-                device.cmd_clear_color_image(self.commands, image.handle, vk::ImageLayout::GENERAL, &zero, &[WHOLE]);
+                device.cmd_clear_color_image(self.commands, image.handle, vk::ImageLayout::GENERAL, &held, &[WHOLE]);
             }
         }
     }

@@ -228,6 +228,9 @@ impl Buffer {
         buffer.allocation = Some(allocation);
         bound.doing(doing)?;
         context.name(handle, name);
+        if let Some(poison) = context.faults.poisoned() {
+            buffer.bytes_mut().fill(poison.byte);
+        }
         if purpose == Purpose::Table && has_texels(context, size) {
             for (n, format) in TEXELS.into_iter().enumerate() {
                 let create = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);

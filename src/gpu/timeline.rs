@@ -87,11 +87,7 @@ impl Timelines {
     /// See [`Timeline::drain`].
     pub fn drain(&self) {
         self.0.iter().for_each(Timeline::drain);
-        if let Some(timeline) = self.0.first().filter(|t| t.context.is_watched()) {
-            // Synchronization validation does not see that the host waited for a timeline (1.3.239): memory that the next renderer
-            // takes anew would look like a hazard with what this one did.
-            timeline.context.wait_idle();
-        }
+        self.0.iter().take(1).for_each(|timeline| timeline.context.show_idle());
     }
 }
 

@@ -286,6 +286,11 @@ impl Slot {
         matches!(self, Slot::SharpVolume | Slot::Volume | Slot::Quads | Slot::TileRanges | Slot::BrickRanges)
     }
 
+    /// Whether texels that no pass writes are read as 0: those of slices outside the sector.
+    pub fn starts_clear(self) -> bool {
+        matches!(self, Slot::SliceA | Slot::SliceB | Slot::SharpVolume | Slot::Volume)
+    }
+
     /// Used by different queues where the device has several, and created CONCURRENT then: all that stage 1 works on, since what is
     /// new is cleared and filled where pictures are made.
     pub fn crosses_queues(self) -> bool {

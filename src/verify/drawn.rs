@@ -1,5 +1,6 @@
 //! Whole pictures: frames in, and what every stage made of them.
 
+use super::built_in;
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
@@ -33,4 +34,33 @@ pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot
     renderer.picture()?;
     let missing = || GpuError::Broken(format!("no pass writes '{}'", slot.name()));
     renderer.read(slot)?.ok_or_else(missing)
+}
+
+/// A scene, what was sent, and what came of it.
+pub struct Drawn {
+    pub name: String,
+    pub scene: Scene,
+    /// As the frames' textures yield them, one array a slice.
+    pub frames: Vec<Texels>,
+    pub picture: Picture,
+}
+
+/// Every mode, one after the other in one renderer: one volume image, one queue, frames in order, everything waited for.
+pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
+    let mut renderer: Option<Renderer> = None;
+    let options = Options { queues: Some(1), ..Options::default() };
+    let draw = |asked: built_in::Asked| {
+        let scene = asked.make().map_err(GpuError::Broken)?;
+        let frames = built_in::wall(&scene, 0);
+        let there = match &mut renderer {
+            Some(there) => {
+                there.change(scene.clone())?;
+                there
+            }
+            None => renderer.insert(Renderer::new(context, scene.clone(), &options)?),
+        };
+        send(there, &frames, 0)?;
+        Ok(Drawn { name: asked.name, scene, frames, picture: there.picture()? })
+    };
+    built_in::modes().into_iter().map(draw).collect()
 }

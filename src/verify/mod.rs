@@ -5,26 +5,38 @@
 //! self-test plants faults and looks which check notices each.
 
 pub mod against;
+mod aside;
 pub mod built_in;
 mod compared;
 pub mod drawn;
+pub mod failing;
+pub mod formats;
+pub mod hazards;
 pub mod inputs;
 mod known_answers;
+pub mod limits;
 pub mod modes;
 pub mod passes;
+pub mod poison;
+pub mod repeats;
 mod shown;
 mod speed;
+pub mod stamps;
+pub mod stress;
+pub mod threads;
 
 use crate::gpu::single::Single;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::measuring::machine;
 use crate::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Verdict};
 use crate::scene::Scene;
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Instant;
 
 pub use compared::{Comparison, compare};
+pub use drawn::Drawn;
 
 /// What checks work on: a device, and the scenes that are part of the program.
 pub struct Bench {
@@ -35,6 +47,9 @@ pub struct Bench {
     scenes: Rc<Vec<(String, Scene)>>,
     /// Done to every context that is made: planted faults.
     prepare: Option<fn(&Context)>,
+    /// The program that checks start again beside themselves: this one, unless it is only a part of one.
+    pub program: Option<PathBuf>,
+    modes: Option<Rc<Vec<Drawn>>>,
     /// Messages of validation that were told.
     told: usize,
 }
@@ -56,12 +71,35 @@ impl Bench {
         let made = |asked: &built_in::Asked| Ok((asked.name.clone(), asked.make()?));
         let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
         let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
-        Ok(Bench { context, level, options: options.clone(), single: None, scenes, prepare, told: 0 })
+        Ok(Bench {
+            context,
+            level,
+            options: options.clone(),
+            single: None,
+            scenes,
+            prepare,
+            program: std::env::current_exe().ok(),
+            modes: None,
+            told: 0,
+        })
     }
 
     /// Scenes by name, which among them need every pass.
     pub fn scenes(&self) -> Rc<Vec<(String, Scene)>> {
         self.scenes.clone()
+    }
+
+    /// Every mode with filters of every stage, drawn in the plainest way: what is drawn in others is held against it.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn modes(&mut self) -> Result<Rc<Vec<Drawn>>, GpuError> {
+        if let Some(modes) = &self.modes {
+            return Ok(modes.clone());
+        }
+        let modes = Rc::new(drawn::modes(&self.context)?);
+        self.modes = Some(modes.clone());
+        Ok(modes)
     }
 
     /// What runs one pass alone.
@@ -195,10 +233,21 @@ impl Check {
 
 /// Every check of a level, in running order.
 pub fn checks(level: Level) -> Vec<Check> {
-    [passes::checks(level), known_answers::checks(level), modes::checks(level), speed::checks(level)]
-        .into_iter()
-        .flatten()
-        .collect()
+    let groups = [
+        passes::checks,
+        known_answers::checks,
+        modes::checks,
+        repeats::checks,
+        poison::checks,
+        failing::checks,
+        limits::checks,
+        formats::checks,
+        hazards::checks,
+        stamps::checks,
+        speed::checks,
+        stress::checks,
+    ];
+    groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
 /// Runs checks one after the other; `tell` hears of each as it is done.

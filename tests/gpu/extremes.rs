@@ -1,17 +1,15 @@
-//! Stiff and extreme cases of light, samples, distance maps and time stamps, a test a case; those of geometry and pictures are
+//! Stiff and extreme cases of light, samples and distance maps, a test a case (those of time stamps are `echolume verify`'s); those of geometry and pictures are
 //! in `extreme_geometry`. Rows of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot pixels, windows wider
 //! than the picture) are in `filters` and, against every reference, in `passes`.
 
 use crate::common::*;
 use crate::shading::{map, plate, run};
-use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::gpu::{Options, Renderer};
 use echolume::passes::{MISS, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
-use echolume::report::times;
 use echolume::scene::{Input, transfer};
 use echolume::source::Recording;
 use half::f16;
-use std::sync::Arc;
 
 /// One ray through `voxels` of constant opacity in steps of `step` voxels, and what it gathers, against 1 - exp(-y).
 struct Medium {
@@ -246,51 +244,6 @@ fn a_light_on_the_surface_itself_gives_finite_colours() {
             }
         }
     }
-}
-
-/// A context whose queue is said to have other time stamps than it has, and the times of one picture.
-fn timed(
-    valid_bits: Option<u32>,
-    period: Option<f32>,
-) -> (String, Vec<echolume::passes::PassTime>, echolume::picture::Picture) {
-    let device = std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().expect("a device"));
-    let mut context = Context::new(&ContextOptions { device, validation: true }).expect("a Vulkan device");
-    let own = Arc::get_mut(&mut context).expect("nobody else has it yet");
-    own.candidate.queues.iter_mut().for_each(|q| q.valid_bits = valid_bits.unwrap_or(q.valid_bits));
-    own.limits.timestamp_period *= period.unwrap_or(1.0);
-    let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\npicture = { size = [96, 96] }");
-    let frames = body_frames(&scene, |p| 0.5 + 0.4 * (0.3 * p.y).sin());
-    let mut renderer = Renderer::new(&context, scene.clone(), &Options::default()).expect("renderer");
-    send(&mut renderer, &frames, 0);
-    let picture = renderer.picture().expect("picture");
-    let times = renderer.take_times().expect("times");
-    drop(renderer);
-    assert!(context.messages().is_empty(), "{:?}", context.messages());
-    (times::table(&times, &scene), times, picture)
-}
-
-/// Row: time stamps of 0 valid bits, 36 valid bits, a period other than 1 ns. (Wrapping itself: `gpu::timing`.)
-#[test]
-fn a_device_without_time_stamps_says_so_and_draws_the_same() {
-    let (table, times, picture) = timed(None, None);
-    let (none_table, none, same) = timed(Some(0), None);
-    assert!(
-        none.is_empty() && none_table.contains("no time stamps") && !none_table.contains("raycast"),
-        "{none_table}"
-    );
-    assert!(picture == same, "time stamps change the picture");
-    if times.is_empty() {
-        return assert!(table.contains("no time stamps"), "this device has none itself: {table}");
-    }
-    let sum = |times: &[echolume::passes::PassTime]| times.iter().map(|t| t.total).sum::<f64>();
-    // 2^36 ns are a minute: masked or not, the same picture takes about as long, and nothing runs backwards.
-    let (_, masked, _) = timed(Some(36), None);
-    assert!(masked.iter().all(|t| t.total >= 0.0 && t.total < 6.8e10), "{masked:?}");
-    // A thousandfold period is a thousandfold time, whatever the noise of one run.
-    let (_, slow, _) = timed(None, Some(1000.0));
-    let ratio = sum(&slow) / sum(&times);
-    assert!((30.0..30_000.0).contains(&ratio), "a period of a thousand ns makes times {ratio:.1} as long");
-    assert_eq!(masked.iter().map(|t| t.name).collect::<Vec<_>>(), times.iter().map(|t| t.name).collect::<Vec<_>>());
 }
 
 /// One hit among misses has no neighbour to make a normal from: it is lit, not black, by every light that shines on it.

@@ -114,29 +114,3 @@ fn sphere_distances(scene: &Scene, centre: DVec3, radius: f64) -> Texels {
         if offset < radius { along - (radius * radius - offset * offset).sqrt() } else { MISS }
     })
 }
-
-/// Volume images that take turns give the same picture, and one does not show through the other.
-#[test]
-fn volume_images_that_take_turns_do_not_mix() {
-    use echolume::gpu::{Options, Renderer};
-    let device = Device::new();
-    let scene = scene(
-        Geometry::Sweep(wobbler()),
-        BYTES,
-        "mode = 'sr'\npicture = { size = [32, 32] }\nslices = { pixels = 48 }",
-    );
-    let near = body_frames(&scene, |p| if p.y > 40.0 { 0.8 } else { 0.0 });
-    let far = body_frames(&scene, |p| if p.y > 55.0 { 0.8 } else { 0.0 });
-    let alone = |frames: &[Texels]| rendered(&device, scene.clone(), frames).picture().expect("picture");
-    let (near_alone, far_alone) = (alone(&near), alone(&far));
-    let options = Options { volume_images: 2, ..Options::default() };
-    let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
-    send(&mut renderer, &near, 0);
-    // The other image is filled while the first is still to be drawn.
-    send(&mut renderer, &far, 1);
-    renderer.show(0).expect("show");
-    assert_eq!(renderer.picture().expect("picture"), near_alone);
-    renderer.show(1).expect("show");
-    assert_eq!(renderer.picture().expect("picture"), far_alone);
-    assert_ne!(near_alone, far_alone);
-}

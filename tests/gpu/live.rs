@@ -132,63 +132,6 @@ pub fn volume_of(renderer: &mut Renderer) -> Texels {
     renderer.read(Slot::Volume).expect("read").expect("there")
 }
 
-/// Prevents slices of another frame, of a frame that was torn, or of another volume image, whatever comes in which order: frames in
-/// any order, whole or line by line, into several volume images, while pictures are begun and ended in between, on one queue or as if
-/// there were three.
-#[test]
-fn every_slice_is_what_a_file_gives_after_any_interleaving() {
-    let mut noise = Noise(17);
-    for (queues, toml) in
-        (1..=3).flat_map(|q| ["mode = 'vr'", "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"].map(|t| (q, t)))
-    {
-        let playing = Playing::new(queues);
-        let device = &playing.device;
-        let views = live::views::Views::new(&header(0.3), &settings(toml), Update::Whole).expect("views");
-        let scene = views.first().clone();
-        let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
-        let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
-        for round in 0..2 {
-            let volumes = [speckled(2 * round), speckled(2 * round + 1)];
-            let mut left: Vec<(usize, usize)> = (0..18).map(|n| (n / 9, n % 9)).collect();
-            let mut drawing = false;
-            while !left.is_empty() {
-                let (image, n) = left.swap_remove((noise.next() * left.len() as f64) as usize);
-                let frame = &volumes[image][n];
-                let slice = frame.slice as u32;
-                if noise.next() < 0.5 {
-                    renderer.frame(slice, &frame.bytes, image as u32).expect("frame");
-                } else {
-                    // A frame that is given up for being begun again, and then all of its lines.
-                    renderer.lines(slice, 0, &frame.bytes[..64 * 5], image as u32).expect("lines");
-                    let chunks = frame.bytes.chunks(64 * 7).enumerate();
-                    let whole =
-                        chunks.map(|(i, c)| renderer.lines(slice, 7 * i as u32, c, image as u32).expect("lines"));
-                    assert_eq!(whole.filter(|whole| *whole).count(), 1);
-                }
-                if noise.next() < 0.3 {
-                    match std::mem::replace(&mut drawing, noise.next() < 0.7) {
-                        true => drop(renderer.end_picture().expect("picture")),
-                        false => renderer.show((noise.next() * 2.0) as u32).expect("show"),
-                    }
-                    renderer.begin_picture().expect("picture");
-                }
-            }
-            for (image, frames) in volumes.iter().enumerate() {
-                let mut plain = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
-                frames.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
-                plain.show(0).expect("show");
-                renderer.show(image as u32).expect("show");
-                assert!(
-                    renderer.picture().expect("picture") == plain.picture().expect("picture"),
-                    "{queues} queues: {toml}"
-                );
-                assert_eq!(volume_of(&mut renderer), volume_of(&mut plain), "{queues} queues, image {image}: {toml}");
-            }
-        }
-        assert!(renderer.torn() > 0);
-    }
-}
-
 /// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
 #[test]
 fn a_whole_volume_is_never_mixed() {

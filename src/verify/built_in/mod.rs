@@ -1,8 +1,10 @@
 //! Inputs that are part of the program: probes, scenes, bodies and noise, the same on every machine. Tests use them too.
 
+mod modes;
 mod planes;
 mod scenes;
 
+pub use modes::{modes, wall};
 pub use planes::{TURNED, geometries};
 pub use scenes::ALL_FILTERS;
 
@@ -63,6 +65,8 @@ pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, Stri
 pub struct Noise(pub u64);
 
 impl Noise {
+    // No iterator: it has no end.
+    #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

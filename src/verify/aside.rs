@@ -1,0 +1,52 @@
+//! Contexts of a check's own: devices that are to be lost, that stand for lesser ones, or whose one queue plays several.
+//!
+//! Layers of 1.3.239 do not see that a queue waits for a timeline: where one plays several they call everything between submissions a
+//! hazard.
+
+use super::{Bench, Found};
+use crate::gpu::{Context, GpuError};
+use crate::report::verify::Fault;
+use std::sync::Arc;
+
+/// Another context on the bench's device; what validation said of it is told at the end.
+pub(super) struct Aside {
+    pub context: Arc<Context>,
+    /// Hazards between submissions are told.
+    hears: bool,
+}
+
+impl Aside {
+    /// # Errors
+    /// As of [`Bench::another`].
+    pub fn new(bench: &Bench) -> Result<Aside, GpuError> {
+        Aside::of_queues(bench, 1)
+    }
+
+    /// One that is used as if it had so many queues.
+    ///
+    /// # Errors
+    /// As of [`Bench::another`].
+    pub fn of_queues(bench: &Bench, queues: usize) -> Result<Aside, GpuError> {
+        let context = bench.another()?;
+        Ok(Aside { hears: context.queue_count() >= queues, context })
+    }
+
+    /// One that lacks something, by what `change` does to what is known of it, before anything is made from it.
+    ///
+    /// # Errors
+    /// As of [`Bench::another`].
+    pub fn lacking(bench: &Bench, change: impl FnOnce(&mut Context)) -> Result<Aside, GpuError> {
+        let mut aside = Aside::new(bench)?;
+        let own = Arc::get_mut(&mut aside.context);
+        own.map(change).ok_or(GpuError::Broken("a context of one's own is somebody else's too".into()))?;
+        Ok(aside)
+    }
+
+    /// Adds what validation said as faults.
+    pub fn tell(&self, found: &mut Found) {
+        let between = |m: &String| !self.hears && m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2");
+        let messages = self.context.messages();
+        let told = messages.iter().filter(|m| !between(m));
+        found.faults.extend(told.map(|message| Fault::new(format!("validation: {message}"))));
+    }
+}

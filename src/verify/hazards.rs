@@ -1,0 +1,243 @@
+//! Frames that arrive while pictures are drawn, on one queue and as if there were three: every picture is the one that is drawn when
+//! everything is waited for, to the byte. Passes are slowed down, so that what may overlap does.
+
+use super::aside::Aside;
+use super::built_in::{BYTES, Noise, scene, wall, wobbler};
+use super::repeats::{counted, same};
+use super::{Bench, Check, Found, drawn};
+use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::passes::{Slot, Texels};
+use crate::picture::Picture;
+use crate::probe::{Advance, Geometry, Probe};
+use crate::queues::MOST;
+use crate::report::verify::Level;
+use crate::scene::Scene;
+use std::sync::Arc;
+
+/// On so many queues: how many pictures were compared, and how many differ.
+type Story = fn(&mut Found, &Aside, usize, Level) -> Result<[usize; 2], GpuError>;
+
+pub fn checks(_: Level) -> Vec<Check> {
+    let of = |name: &str, story: Story| Check::new("hazards", name, move |bench: &mut Bench| on_queues(bench, story));
+    vec![
+        of("a volume arrives while another is drawn", |found, aside, queues, level| {
+            let rounds = if level == Level::Quick { 6 } else { 60 };
+            taking_turns(found, &aside.context, queues, rounds, |round| (round as u32 + 1) % 2)
+        }),
+        of("slices are replaced while they are drawn", replaced),
+        of("frames and pictures in any order", any_order),
+        of("changes of scene on the way", changes),
+    ]
+}
+
+/// The same story on one, two and three queues.
+fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
+    let (mut found, mut sums) = (Found::default(), [0, 0]);
+    for queues in 1..=MOST {
+        let aside = Aside::of_queues(bench, queues)?;
+        let [compared, wrong] = story(&mut found, &aside, queues, bench.level)?;
+        sums = [sums[0] + compared, sums[1] + wrong];
+        aside.tell(&mut found);
+    }
+    counted(&mut found, sums[0], sums[1]);
+    let there = bench.context.queue_count();
+    if there < MOST {
+        found.notes.push(format!("queues for different work: {there} of {MOST}; one does what several would"));
+    }
+    Ok(found)
+}
+
+/// The wobbler, whose motor goes on during a frame.
+fn moving() -> Geometry {
+    let probe = wobbler();
+    Geometry::Sweep(Probe { advance: Advance::Same(0.3 * probe.slices.pitch()), ..probe })
+}
+
+const PLAIN: &str = "mode = 'vr'\npicture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8' }";
+const SMOOTH: &str =
+    "mode = 'sr'\npicture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8', smooth = { elevation = 1.0 } }";
+
+fn made(toml: &str) -> Result<Scene, GpuError> {
+    scene(moving(), BYTES, toml).map_err(GpuError::Broken)
+}
+
+/// Frames as bytes.
+fn stored(scene: &Scene, number: u32) -> Vec<Vec<u8>> {
+    wall(scene, number).iter().map(|frame| frame.encode(Slot::Frames.format(scene))).collect()
+}
+
+fn send(renderer: &mut Renderer, frames: &[Vec<u8>], image: u32) -> Result<(), GpuError> {
+    frames.iter().enumerate().try_for_each(|(k, frame)| renderer.frame(k as u32, frame, image))
+}
+
+/// The picture of these frames by a renderer of its own, each step waited for.
+fn waited_for(context: &Arc<Context>, scene: &Scene, frames: &[Vec<u8>]) -> Result<Picture, GpuError> {
+    Ok(volume_waited_for(context, scene, frames)?.0)
+}
+
+/// The same with the volume.
+fn volume_waited_for(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Vec<u8>],
+) -> Result<(Picture, Option<Texels>), GpuError> {
+    let mut renderer = Renderer::new(context, scene.clone(), &Options { queues: Some(1), ..Options::default() })?;
+    for (k, frame) in frames.iter().enumerate() {
+        renderer.frame(k as u32, frame, 0)?;
+        renderer.take_times()?;
+    }
+    renderer.show(0)?;
+    Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
+}
+
+/// Volumes one after the other, each sent into the image that `into` says while the one before is drawn. Images that take turns do
+/// not mix; sent into the image that is drawn they would.
+pub fn taking_turns(
+    found: &mut Found,
+    context: &Arc<Context>,
+    queues: usize,
+    rounds: usize,
+    into: impl Fn(usize) -> u32,
+) -> Result<[usize; 2], GpuError> {
+    let scene = made(SMOOTH)?;
+    let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
+    let expected: Result<Vec<_>, _> = volumes.iter().map(|frames| waited_for(context, &scene, frames)).collect();
+    let expected = expected?;
+    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let mut renderer = Renderer::new(context, scene, &options)?;
+    send(&mut renderer, &volumes[0], 0)?;
+    let mut wrong = 0;
+    for round in 0..rounds {
+        let slow = if round % 2 == 0 { "raycast_surface" } else { "scan_convert" };
+        context.faults.slow_down(slow, 12);
+        renderer.show(round as u32 % 2)?;
+        renderer.begin_picture()?;
+        // More frames than lanes, which all fill up, while the picture is on its way.
+        send(&mut renderer, &volumes[(round + 1) % 3], into(round))?;
+        let what = format!("volume {round}, {queues} queues, '{slow}' slowed down");
+        wrong += usize::from(!same(found, &what, &expected[round % 3], &renderer.end_picture()?));
+    }
+    context.faults.slow_down("", 1);
+    Ok([rounds, wrong])
+}
+
+/// Slices of the one volume image are sent anew while it is drawn: they wait for the picture, and the next shows them.
+fn replaced(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+    let context = &aside.context;
+    let (scene, mut noise) = (made(PLAIN)?, Noise(5));
+    let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
+    let options = Options { queues: Some(queues), ..Options::default() };
+    let mut renderer = Renderer::new(context, scene.clone(), &options)?;
+    let mut there = volumes[0].clone();
+    send(&mut renderer, &there, 0)?;
+    let (rounds, mut wrong) = (if level == Level::Quick { 4 } else { 40 }, 0);
+    for round in 0..rounds {
+        let expected = waited_for(context, &scene, &there)?;
+        context.faults.slow_down("raycast_volume", 12);
+        renderer.show(0)?;
+        renderer.begin_picture()?;
+        for _ in 0..7 {
+            let slice = (noise.next() * there.len() as f64) as usize;
+            there[slice] = volumes[(round + 1) % 3][slice].clone();
+            renderer.frame(slice as u32, &there[slice], 0)?;
+        }
+        let what = format!("round {round}, {queues} queues");
+        wrong += usize::from(!same(found, &what, &expected, &renderer.end_picture()?));
+        context.faults.slow_down("", 1);
+    }
+    renderer.show(0)?;
+    let what = format!("after all rounds, {queues} queues");
+    wrong += usize::from(!same(found, &what, &waited_for(context, &scene, &there)?, &renderer.picture()?));
+    Ok([rounds + 1, wrong])
+}
+
+/// Frames of two volumes in any order, whole or line by line, torn and begun again, into two volume images, while pictures are begun
+/// and ended in between.
+fn any_order(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+    let (context, mut noise, mut sums) = (&aside.context, Noise(17), [0, 0]);
+    for toml in [PLAIN, SMOOTH] {
+        let scene = made(toml)?;
+        let line = scene.frame_size()[0] as usize;
+        let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+        let mut renderer = Renderer::new(context, scene.clone(), &options)?;
+        context.faults.slow_down("scan_convert", 4);
+        for round in 0..if level == Level::Quick { 1 } else { 12 } {
+            let volumes = [stored(&scene, 2 * round), stored(&scene, 2 * round + 1)];
+            let mut left: Vec<(usize, usize)> =
+                (0..2).flat_map(|i| (0..volumes[i].len()).map(move |k| (i, k))).collect();
+            let mut drawing = false;
+            while !left.is_empty() {
+                let (image, slice) = left.swap_remove((noise.next() * left.len() as f64) as usize);
+                let (frame, k, image) = (&volumes[image][slice], slice as u32, image as u32);
+                if noise.next() < 0.5 {
+                    renderer.frame(k, frame, image)?;
+                } else {
+                    // A frame that is given up for being begun again, and then all of its lines.
+                    renderer.lines(k, 0, &frame[..5 * line], image)?;
+                    let mut whole = 0;
+                    for (n, lines) in frame.chunks(7 * line).enumerate() {
+                        whole += u32::from(renderer.lines(k, 7 * n as u32, lines, image)?);
+                    }
+                    found.expect(whole == 1, || format!("slice {k} was whole {whole} times, {queues} queues"));
+                }
+                if noise.next() < 0.3 {
+                    match std::mem::replace(&mut drawing, noise.next() < 0.7) {
+                        true => drop(renderer.end_picture()?),
+                        false => renderer.show((noise.next() * 2.0) as u32)?,
+                    }
+                    renderer.begin_picture()?;
+                }
+            }
+            for (image, frames) in volumes.iter().enumerate() {
+                let (expected, volume) = volume_waited_for(context, &scene, frames)?;
+                renderer.show(image as u32)?;
+                let what = format!("image {image} of round {round}, {queues} queues, {:?}", scene.settings.mode);
+                let is_same = same(found, &what, &expected, &renderer.picture()?);
+                let there = renderer.read(Slot::Volume)?;
+                found.expect(there == volume, || format!("{what}: the volume is another"));
+                sums = [sums[0] + 1, sums[1] + usize::from(!is_same)];
+            }
+        }
+        context.faults.slow_down("", 1);
+        found.expect(renderer.torn() > 0, || "no frame was given up".into());
+    }
+    Ok(sums)
+}
+
+/// The scene changes while a picture and frames are on their way: another view, other filters of frames, another size.
+fn changes(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+    let context = &aside.context;
+    let scenes = [
+        made(PLAIN)?,
+        made(&format!("{PLAIN}\ncamera = {{ azimuth = 40 }}"))?,
+        made(SMOOTH)?,
+        made(&PLAIN.replace("[24, 24]", "[31, 17]"))?,
+        made(&PLAIN.replace("'r8'", "'r8', median = true"))?,
+    ];
+    let frames: [Vec<Texels>; 2] = [wall(&scenes[0], 0), wall(&scenes[0], 1)];
+    let mut expected = Vec::new();
+    for scene in &scenes {
+        expected.push([drawn::picture(context, scene, &frames[0])?, drawn::picture(context, scene, &frames[1])?]);
+    }
+    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let mut renderer = Renderer::new(context, scenes[0].clone(), &options)?;
+    let (rounds, mut wrong, mut noise) = (if level == Level::Quick { 8 } else { 80 }, 0, Noise(23));
+    for round in 0..rounds {
+        let at = if round < scenes.len() { round } else { (noise.next() * scenes.len() as f64) as usize };
+        context.faults.slow_down("tone", 8);
+        // Frames and a picture of the scene before are on their way still.
+        renderer.begin_picture()?;
+        renderer.change(scenes[at].clone())?;
+        for (image, volume) in frames.iter().enumerate() {
+            drawn::send(&mut renderer, volume, image as u32)?;
+        }
+        renderer.show(round as u32 % 2)?;
+        renderer.begin_picture()?;
+        let late = frames[round % 2][3].encode(Slot::Frames.format(&scenes[at]));
+        renderer.frame(3, &late, round as u32 % 2)?;
+        let what = format!("round {round}, scene {at}, {queues} queues");
+        wrong += usize::from(!same(found, &what, &expected[at][round % 2], &renderer.end_picture()?));
+    }
+    context.faults.slow_down("", 1);
+    Ok([rounds, wrong])
+}
