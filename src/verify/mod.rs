@@ -10,11 +10,13 @@ pub mod drawn;
 pub mod inputs;
 mod known_answers;
 pub mod passes;
+pub mod self_test;
 mod shown;
 
 use crate::gpu::single::Single;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::measuring::machine;
+use crate::passes::planted::Change;
 use crate::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Verdict};
 use crate::scene::Scene;
 use std::rc::Rc;
@@ -30,8 +32,8 @@ pub struct Bench {
     options: ContextOptions,
     single: Option<Single>,
     scenes: Rc<Vec<(String, Scene)>>,
-    /// Done to every context that is made: planted faults.
-    prepare: Option<fn(&Context)>,
+    /// Planted in every context that is made.
+    planted: Option<Change>,
     /// Messages of validation that were told.
     told: usize,
 }
@@ -40,20 +42,28 @@ impl Bench {
     /// # Errors
     /// No device, or none with the validation layer where that is asked for.
     pub fn new(options: &ContextOptions, level: Level) -> Result<Bench, GpuError> {
-        Bench::prepared(options, level, None)
-    }
-
-    /// The same with something done to every context before anything is made from it.
-    ///
-    /// # Errors
-    /// As of [`Bench::new`].
-    pub fn prepared(options: &ContextOptions, level: Level, prepare: Option<fn(&Context)>) -> Result<Bench, GpuError> {
         let context = Context::new(options)?;
-        prepare.iter().for_each(|prepare| prepare(&context));
         let made = |asked: &built_in::Asked| Ok((asked.name.clone(), asked.make()?));
         let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
         let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
-        Ok(Bench { context, level, options: options.clone(), single: None, scenes, prepare, told: 0 })
+        Ok(Bench { context, level, options: options.clone(), single: None, scenes, planted: None, told: 0 })
+    }
+
+    /// Another one on the same device and scenes, with a fault planted.
+    ///
+    /// # Errors
+    /// As of [`Bench::new`].
+    pub fn planted(&self, change: Change) -> Result<Bench, GpuError> {
+        let mut bench = Bench {
+            context: self.context.clone(),
+            options: self.options.clone(),
+            scenes: self.scenes.clone(),
+            single: None,
+            planted: Some(change),
+            ..*self
+        };
+        bench.renew()?;
+        Ok(bench)
     }
 
     /// Scenes by name, which among them need every pass.
@@ -79,7 +89,7 @@ impl Bench {
     /// As of [`Bench::new`].
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
         let context = Context::new(&self.options)?;
-        self.prepare.iter().for_each(|prepare| prepare(&context));
+        self.planted.iter().for_each(|change| context.faults.plant(*change));
         Ok(context)
     }
 
