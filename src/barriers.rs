@@ -2,6 +2,8 @@
 //! before and no barrier lies between, a global memory barrier goes in front of it; nowhere else. The order is a ring: a
 //! tracker lives as long as its slots, so the end of one picture feeds the start of the next.
 
+pub mod oracle;
+
 use crate::passes::{Part, Pass, Slot, Turn};
 use crate::scene::Scene;
 use std::ops::Range;

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 pub mod absent;
+pub mod bent;
 pub mod hoisted;
 pub mod stored;
 pub mod tables;

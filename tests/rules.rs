@@ -49,7 +49,7 @@ fn layers_hold() {
         ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/plan.rs", &["crate::gpu", "ash::vk"]),
-        ("src/barriers.rs", &["crate::gpu", "ash::vk"]),
+        ("src/barriers", &["crate::gpu", "ash::vk"]),
         ("src/queues.rs", &["crate::gpu", "ash::vk"]),
         ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),

@@ -1,9 +1,13 @@
 //! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested;
-//! and slowness, so that what finds it is.
+//! slowness, so that what finds it is; and wrong results, so that the checks of the device are.
 
-use crate::passes::slots::Format;
+use crate::passes::planted::Change;
+use crate::passes::slots::{Filled, Format};
+use crate::passes::{Params, Pass, Slot, Turn};
+use crate::scene::Scene;
 use ash::vk;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock};
 
 /// Where a call into the driver can be made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,12 +70,14 @@ impl Poison {
     }
 }
 
-/// At most one planned failure, one slow pass, and one poison.
+/// At most one planned failure, one slow pass, one poison, and one wrong result.
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(Seam, u32, vk::Result)>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
+    planted: OnceLock<Change>,
+    struck: AtomicU64,
 }
 
 impl Faults {
@@ -119,6 +125,84 @@ impl Faults {
         match *self.slow.lock().unwrap_or_else(|e| e.into_inner()) {
             Some((slow, times)) if slow == pass => times,
             _ => 1,
+        }
+    }
+
+    /// From now on, and for as long as the context lives, the device is told or given something else. Before anything is made from the
+    /// context; the first one holds.
+    pub fn plant(&self, change: Change) {
+        self.planted.get_or_init(|| change);
+    }
+
+    /// How often what is planted changed something.
+    pub fn struck(&self) -> u64 {
+        self.struck.load(Ordering::Relaxed)
+    }
+
+    fn strike(&self, by: impl FnOnce(&Change) -> bool) -> bool {
+        let struck = self.planted.get().is_some_and(by);
+        if struck {
+            self.struck.fetch_add(1, Ordering::Relaxed);
+        }
+        struck
+    }
+
+    /// What a dispatch works on; none if it is left out.
+    pub(super) fn turn(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> Option<Turn> {
+        let mut turn = *turn;
+        self.strike(|change| change.turn(pass.name, scene, &mut turn));
+        (!self.strike(|change| change.leaves_out(pass.name, scene, &turn))).then_some(turn)
+    }
+
+    pub(super) fn numbers(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> Params {
+        let mut params = pass.numbers(scene, turn);
+        self.strike(|change| change.numbers(pass, scene, &mut params));
+        params
+    }
+
+    pub(super) fn invocations(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> [u32; 3] {
+        let mut extent = pass.invocations(scene, turn);
+        self.strike(|change| change.extent(pass.name, &mut extent));
+        extent
+    }
+
+    pub(super) fn constants(&self, pass: &str, constants: &[(&'static str, i32)]) -> Vec<(&'static str, i32)> {
+        let mut constants = constants.to_vec();
+        self.strike(|change| change.constants(pass, &mut constants));
+        constants
+    }
+
+    pub(super) fn words(&self, pass: &str, words: &mut Vec<u32>) -> Result<(), String> {
+        let Some(change) = self.planted.get() else { return Ok(()) };
+        let changed = change.words(pass, words).map_err(|e| e.to_string())?;
+        self.strike(|_| changed);
+        Ok(())
+    }
+
+    pub(super) fn table(&self, slot: Slot, scene: &Scene, mut values: Vec<f32>) -> Vec<f32> {
+        self.strike(|change| change.table(slot, scene, &mut values));
+        values
+    }
+
+    pub(super) fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
+        self.strike(|change| change.frame(scene, bytes));
+    }
+
+    /// Bytes of a slot that a pass alone is given.
+    pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
+        if slot == Slot::Frames {
+            self.frame(scene, &mut bytes);
+        } else if self.planted.get().is_some() && matches!(slot.filled(), Filled::ByScene(_)) {
+            let values = bytemuck::pod_collect_to_vec(&bytes);
+            bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();
+        }
+        bytes
+    }
+
+    pub(super) fn filter(&self) -> vk::Filter {
+        match self.strike(|change| matches!(change, Change::Nearest)) {
+            true => vk::Filter::NEAREST,
+            false => vk::Filter::LINEAR,
         }
     }
 }

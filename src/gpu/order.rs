@@ -1,8 +1,9 @@
 //! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
 
 use super::context::Context;
+use crate::barriers::oracle::Log;
 use crate::barriers::{Access, Barrier, Worker, Workers};
-use crate::queues::Queues;
+use crate::queues::{Queues, Wait};
 use ash::vk;
 
 /// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
@@ -14,20 +15,24 @@ pub struct Order {
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
     /// Leaves out the n-th barrier, to show that something notices.
     pub drop_barrier: Option<u32>,
+    /// All that is recorded and submitted, while someone looks at it.
+    pub log: Option<Log>,
 }
 
 impl Order {
     /// Records the barrier that an operation with these accesses needs, if it needs one.
     pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
-        let Some(Barrier { mut from, mut to }) = self.queues.before(queue, accesses) else { return };
-        self.barriers += 1;
-        if self.drop_barrier == Some(self.barriers) {
-            return;
-        }
+        let barrier = self.queues.before(queue, accesses);
+        self.barriers += u32::from(barrier.is_some());
+        let is_dropped = self.drop_barrier == Some(self.barriers);
         // A queue that only copies knows no shaders.
-        if !context.queue(queue).computes {
-            (from, to) = (from.without(Worker::Compute), to.without(Worker::Compute));
+        let computes = context.queue(queue).computes;
+        let known = |all: Workers| if computes { all } else { all.without(Worker::Compute) };
+        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: known(b.from), to: known(b.to) });
+        if let Some(log) = &mut self.log {
+            log.record(queue, barrier, accesses);
         }
+        let Some(Barrier { from, to }) = barrier else { return };
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(stages(from))
             .src_access_mask(writes(from))
@@ -36,6 +41,18 @@ impl Order {
         let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
         // SAFETY: the command buffer is being recorded, outside any render pass.
         unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
+    }
+
+    /// A submission of this queue is recorded from here on.
+    pub(super) fn begin(&mut self, queue: usize) {
+        self.queues.begin(queue);
+        self.log.iter_mut().for_each(|log| log.begin(queue));
+    }
+
+    /// What was recorded on this queue is on its way, behind these waits, and done at this value of its timeline.
+    pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
+        self.queues.submitted(queue, waits, value);
+        self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));
     }
 }
 

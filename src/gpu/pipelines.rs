@@ -91,8 +91,8 @@ pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 impl Pipelines {
     pub fn new(context: &Arc<Context>, shaders: Arc<Shaders>, fetch: Fetch) -> Result<Pipelines, GpuError> {
         let create = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
+            .mag_filter(context.faults.filter())
+            .min_filter(context.faults.filter())
             .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
             .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
@@ -130,9 +130,11 @@ impl Pipelines {
             };
             words = contract::for_cpu(pass, scene, turn, &words, stores).map_err(at_fault)?;
         }
+        self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         contract::check(pass, scene, turn, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
-        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, &key, &words, module)?);
+        let told = self.context.faults.constants(pass.name, &key.1);
+        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &told, &words, module)?);
         // Another thread may have made it meanwhile: both serve.
         self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
         Ok(pipeline)
@@ -151,12 +153,13 @@ impl Pipeline {
     fn new(
         context: &Arc<Context>,
         sampler: vk::Sampler,
-        key: &Key,
+        name: &'static str,
+        constants: &[(&'static str, i32)],
         words: &[u32],
         module: Module,
     ) -> Result<Pipeline, GpuError> {
         let device = &context.device;
-        let doing = || format!("create pipeline '{}'", key.0);
+        let doing = || format!("create pipeline '{name}'");
         let samplers = [sampler];
         let bindings: Vec<_> = module
             .bindings
@@ -186,22 +189,22 @@ impl Pipeline {
         let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: as above.
         pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.doing(doing)?;
-        context.name(set_layout, key.0);
-        context.name(pipeline.layout, key.0);
+        context.name(set_layout, name);
+        context.name(pipeline.layout, name);
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
             .doing(doing)?;
-        context.name(shader, key.0);
-        let constants: Vec<(u32, i32)> = (pipeline.module.constants.iter())
-            .filter_map(|c| key.1.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
+        context.name(shader, name);
+        let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
+            .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
             .collect();
-        let entries: Vec<_> = constants
+        let entries: Vec<_> = values
             .iter()
             .enumerate()
             .map(|(i, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * i as u32, size: 4 })
             .collect();
-        let values: Vec<u8> = constants.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect();
-        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
+        let bytes: Vec<u8> = values.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect();
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&bytes);
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(shader)
@@ -214,8 +217,8 @@ impl Pipeline {
         // SAFETY: a module may go once its pipelines are made.
         unsafe { device.destroy_shader_module(shader, None) };
         pipeline.handle = made.map_err(|(_, result)| result).doing(doing)?[0];
-        context.name(pipeline.handle, key.0);
-        tracing::debug!("pipeline '{}' {:?}", key.0, key.1);
+        context.name(pipeline.handle, name);
+        tracing::debug!("pipeline '{name}' {constants:?}");
         Ok(pipeline)
     }
 }

@@ -95,7 +95,7 @@ impl Recorder {
 
     /// Waits until the last submission is done, then starts anew.
     pub fn begin(&mut self, order: &mut Order, timelines: &Timelines) -> Result<(), GpuError> {
-        order.queues.begin(self.queue);
+        order.begin(self.queue);
         self.wait(timelines)?;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the device is done with this pool's only command buffer.
@@ -180,7 +180,7 @@ impl Recorder {
         timeline.submitted += 1;
         timeline.doing = self.label.to_string();
         self.done_at = timeline.submitted;
-        order.queues.submitted(self.queue, &waits, self.done_at);
+        order.submitted(self.queue, &waits, self.done_at);
         Ok(())
     }
 
@@ -229,11 +229,13 @@ impl Recorder {
     pub fn dispatch(&mut self, order: &mut Order, work: &Work) -> Result<(), GpuError> {
         let Work { pipeline, scene, pass, turn, .. } = *work;
         self.barrier(order, &barriers::accesses(scene, pass, turn));
+        let Some(turn) = &self.context.faults.turn(pass, scene, turn) else { return Ok(()) };
+        let work = &Work { turn, ..*work };
         self.context.begin_label(self.commands, pass.name);
-        let block = contract::pack(&pipeline.module, &pass.numbers(scene, turn));
+        let block = contract::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, turn));
         let offset = self.place_params(&block)?;
         self.bind(work, offset, block.len() as u64);
-        let extent = pass.invocations(scene, turn);
+        let extent = self.context.faults.invocations(pass, scene, turn);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
         let (device, commands) = (&self.context.device, self.commands);
         // Before any query begins: lavapipe looks at the pipeline then.

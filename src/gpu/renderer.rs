@@ -17,6 +17,7 @@ use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timelines;
+use crate::barriers::oracle::Log;
 use crate::passes::chain;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Filled, Format, Shape};
 use crate::passes::{PassTime, Slot, Span, Texels, Turn, When};
@@ -42,6 +43,8 @@ pub struct Options {
     pub readback: bool,
     /// Called when something was made beside the drawing.
     pub wake: Option<Wake>,
+    /// Keep a log of all that is recorded: [`Renderer::log`].
+    pub log: bool,
 }
 
 impl Default for Options {
@@ -54,6 +57,7 @@ impl Default for Options {
             queues: None,
             readback: true,
             wake: None,
+            log: false,
         }
     }
 }
@@ -138,7 +142,7 @@ impl Renderer {
             beside: None,
             pipelines,
             timelines: Timelines::new(context, queues)?,
-            order: Order { queues: Queues::new(queues), ..Order::default() },
+            order: Order { queues: Queues::new(queues), log: options.log.then(Log::default), ..Order::default() },
             context: context.clone(),
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
@@ -216,7 +220,7 @@ impl Renderer {
             self.slots.fill(slot, &self.scene);
             return Ok(());
         }
-        let values = make(&self.scene);
+        let values = self.context.faults.table(slot, &self.scene, make(&self.scene));
         self.upload(slot, 0, bytemuck::cast_slice(&values))
     }
 

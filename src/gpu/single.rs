@@ -56,6 +56,7 @@ impl Single {
         let mut staged = Vec::new();
         for bind in &reads {
             let Some(bytes) = input(scene, bind, inputs) else { continue };
+            let bytes = self.context.faults.given(bind.slot, scene, bytes);
             match slots.buffer_mut(bind.slot) {
                 Some(buffer) => {
                     let length = buffer.bytes().len().min(bytes.len());

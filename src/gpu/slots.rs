@@ -55,7 +55,7 @@ impl Slots {
     pub fn fill(&mut self, slot: Slot, scene: &Scene) {
         if let (Filled::ByScene(make), Some(Resource::Buffer(buffer))) = (slot.filled(), self.there.get_mut(&(slot, 0)))
         {
-            let values = make(scene);
+            let values = self.context.faults.table(slot, scene, make(scene));
             let bytes: &[u8] = bytemuck::cast_slice(&values);
             let there = buffer.bytes_mut();
             let length = bytes.len().min(there.len());

@@ -6,6 +6,7 @@ pub mod contract;
 mod format;
 pub mod measure;
 mod params;
+pub mod planted;
 pub mod slots;
 pub mod tables;
 pub mod texels;

@@ -1,6 +1,7 @@
 //! The outputs of a pass against those of its reference.
 
-use crate::passes::{Arrays, Bind, Pass, Texels};
+use crate::passes::slots::Format;
+use crate::passes::{Arrays, Bind, Pass, Texels, is_hit};
 use crate::report::verify::Worst;
 use crate::scene::Scene;
 
@@ -13,8 +14,21 @@ pub struct Comparison {
     pub used: f64,
     /// Largest share of an output's texels that are beyond tolerance.
     pub outliers: f64,
+    /// Mean error of the texels within tolerance, with its sign, as a share of what is allowed there: errors that all go one way are
+    /// no rounding. Of an output with enough texels that are written; the largest of all outputs.
+    pub bias: f64,
     /// The worst texel of an output that has more such texels than its pass allows.
     pub worst: Option<Worst>,
+}
+
+/// Texels of which the mean error is looked at: of fewer, a few flipped roundings of whole steps are a bias.
+const ENOUGH: usize = 100;
+/// The same of floats, whose roundings are small.
+const ENOUGH_FLOATS: usize = 20;
+
+fn is_float(format: Format) -> bool {
+    let floats = [Format::R16f, Format::Rg16f, Format::Rgba16f, Format::R32f, Format::Rg32f, Format::Rgba32f];
+    floats.contains(&format)
 }
 
 /// Compares every output. `poison` is what outputs held before: where the reference leaves NaN, that must still be there.
@@ -31,6 +45,9 @@ pub fn compare(
         let (expected, got) = (expected.get(bind.name), got.get(bind.name));
         let format = bind.slot.format(scene);
         let (mut beyond, mut worst) = (0, None);
+        // What the format makes of the expected values: what is left then is not its rounding.
+        let stored = Texels::decode(expected.size, format, &expected.encode(format));
+        let (mut signed, mut room, mut written) = (0.0, 0.0, 0);
         for (i, (e, g)) in expected.values.iter().zip(&got.values).enumerate() {
             let untouched = e.is_nan();
             let e = if untouched { poison } else { *e };
@@ -42,6 +59,13 @@ pub fn compare(
                 if !untouched {
                     all.largest = all.largest.max(error);
                     all.used = all.used.max(error / allowed);
+                    if is_hit(e.abs()) {
+                        let aside = g - if is_float(format) { e } else { stored.values[i] };
+                        // Of floats a driver may store the one below or the one above.
+                        let rounded = if is_float(format) { aside.abs().min(Texels::spacing(format, e)) } else { 0.0 };
+                        let aside = aside - rounded.copysign(aside);
+                        (signed, room, written) = (signed + aside, room + allowed, written + 1);
+                    }
                 }
                 continue;
             }
@@ -50,6 +74,10 @@ pub fn compare(
             if worst.is_none_or(|(_, _, _, w)| error > w || error.is_nan()) {
                 worst = Some((i, e, *g, error));
             }
+        }
+        let enough = if is_float(format) { ENOUGH_FLOATS } else { ENOUGH };
+        if written >= enough && room > 0.0 {
+            all.bias = all.bias.max((signed / room).abs());
         }
         let share = beyond as f64 / expected.values.len() as f64;
         all.outliers = all.outliers.max(share);

@@ -19,6 +19,7 @@ pub mod modes;
 pub mod passes;
 pub mod poison;
 pub mod repeats;
+pub mod self_test;
 mod shown;
 mod speed;
 pub mod stamps;
@@ -28,6 +29,7 @@ pub mod threads;
 use crate::gpu::single::Single;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::measuring::machine;
+use crate::passes::planted::Change;
 use crate::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Verdict};
 use crate::scene::Scene;
 use std::path::PathBuf;
@@ -45,11 +47,13 @@ pub struct Bench {
     options: ContextOptions,
     single: Option<Single>,
     scenes: Rc<Vec<(String, Scene)>>,
-    /// Done to every context that is made: planted faults.
+    /// Done to every context that is made.
     prepare: Option<fn(&Context)>,
     /// The program that checks start again beside themselves: this one, unless it is only a part of one.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
+    /// Planted in every context that is made.
+    planted: Option<Change>,
     /// Messages of validation that were told.
     told: usize,
 }
@@ -78,10 +82,30 @@ impl Bench {
             single: None,
             scenes,
             prepare,
+            planted: None,
             program: std::env::current_exe().ok(),
             modes: None,
             told: 0,
         })
+    }
+
+    /// Another one on the same device and scenes, with a fault planted.
+    ///
+    /// # Errors
+    /// As of [`Bench::new`].
+    pub fn planted(&self, change: Change) -> Result<Bench, GpuError> {
+        let mut bench = Bench {
+            context: self.context.clone(),
+            options: self.options.clone(),
+            scenes: self.scenes.clone(),
+            single: None,
+            planted: Some(change),
+            program: None,
+            modes: None,
+            ..*self
+        };
+        bench.renew()?;
+        Ok(bench)
     }
 
     /// Scenes by name, which among them need every pass.
@@ -120,6 +144,7 @@ impl Bench {
     /// As of [`Bench::new`].
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
         let context = Context::new(&self.options)?;
+        self.planted.iter().for_each(|change| context.faults.plant(*change));
         self.prepare.iter().for_each(|prepare| prepare(&context));
         Ok(context)
     }

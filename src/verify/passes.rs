@@ -16,6 +16,9 @@ use std::collections::HashSet;
 /// What outputs hold before a pass: no pass computes it by chance, and every format stores it (nearly).
 pub const POISON: f64 = 0.654_321;
 
+/// Largest mean error of a dispatch, with its sign, as a share of what is allowed of each texel. Rounding errs both ways.
+pub const BIAS: f64 = 0.1;
+
 /// Faults of one pass that are told one by one.
 const TOLD: usize = 8;
 
@@ -73,55 +76,108 @@ fn variant(scene: &Scene, pass: &Pass) -> Variant {
 }
 
 fn check(bench: &mut Bench, n: usize, pass: &'static Pass) -> Result<Found, GpuError> {
-    let (mut found, mut runs, mut failed) = (Found::default(), 0, 0);
-    let (mut largest, mut used, mut outliers) = (0.0f64, 0.0f64, 0.0f64);
-    let (scenes, level) = (bench.scenes(), bench.level);
+    let (mut sum, scenes) = (Sum::default(), bench.scenes());
     let mut variants = HashSet::new();
-    for (s, (name, scene)) in scenes.iter().enumerate().filter(|(_, (_, scene))| pass.is_needed(scene)) {
-        // Quickly: every pipeline once, and of its other scenes some; noise, and one of the extremes by turns.
-        let is_new = variants.insert(variant(scene, pass));
-        if level == Level::Quick && !is_new && s % 5 != n % 5 {
-            continue;
+    for s in (0..scenes.len()).filter(|s| pass.is_needed(&scenes[*s].1)) {
+        // Quickly: every pipeline once, and of its other scenes some.
+        let is_new = variants.insert(variant(&scenes[s].1, pass));
+        if bench.level == Level::Full || is_new || s % 5 == n % 5 {
+            sum.add(bench, n, pass, s, is_new)?;
         }
+    }
+    Ok(sum.found(pass))
+}
+
+/// What one pass does in one of the bench's scenes, by their places in [`PASSES`] and [`Bench::scenes`].
+///
+/// # Errors
+/// A device that fails.
+pub fn in_scene(bench: &mut Bench, n: usize, scene: usize) -> Result<Found, GpuError> {
+    let mut sum = Sum::default();
+    sum.add(bench, n, &PASSES[n], scene, true)?;
+    Ok(sum.found(&PASSES[n]))
+}
+
+/// What came of many dispatches of a pass.
+#[derive(Default)]
+struct Sum {
+    found: Found,
+    runs: u32,
+    failed: usize,
+    largest: f64,
+    used: f64,
+    outliers: f64,
+    bias: f64,
+}
+
+impl Sum {
+    /// `is_new`: no scene before had its pipeline.
+    fn add(
+        &mut self,
+        bench: &mut Bench,
+        n: usize,
+        pass: &'static Pass,
+        s: usize,
+        is_new: bool,
+    ) -> Result<(), GpuError> {
+        let (scenes, level) = (bench.scenes(), bench.level);
+        let (name, scene) = &scenes[s];
         for (k, kind) in KINDS.iter().enumerate() {
+            // Noise always, and quickly one of the extremes by turns.
             if level == Level::Quick && k > 0 && (!is_new || 1 + s % (KINDS.len() - 1) != k) {
                 continue;
             }
             for iteration in 0..(pass.repeat)(scene) {
                 let result = beside(bench.single()?, scene, pass, iteration, kind, (n * 8 + k) as u64)?;
                 let of = &result.comparison;
-                (largest, used) = (largest.max(of.largest), used.max(of.used));
-                (outliers, runs) = (outliers.max(of.outliers), runs + 1);
-                let Some(worst) = of.worst.clone() else { continue };
-                failed += 1;
-                if failed > TOLD {
+                (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
+                (self.outliers, self.runs) = (self.outliers.max(of.outliers), self.runs + 1);
+                self.bias = self.bias.max(of.bias);
+                let is_biased = of.bias > BIAS;
+                if of.worst.is_none() && !is_biased {
                     continue;
                 }
-                let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
-                let mut picture = shown(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
-                picture.fault = Some(found.faults.len());
-                found.pictures.push(picture);
-                found.faults.push(Fault {
-                    what: format!("{} texels of {} beyond tolerance", worst.beyond, worst.texels),
+                self.failed += 1;
+                if self.failed > TOLD {
+                    continue;
+                }
+                let what = match &of.worst {
+                    Some(worst) => format!("{} texels of {} beyond tolerance", worst.beyond, worst.texels),
+                    None => format!("errors go one way: their mean is {:.2} of what is allowed of each", of.bias),
+                };
+                if let Some(worst) = &of.worst {
+                    let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
+                    let mut picture = shown(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
+                    picture.fault = Some(self.found.faults.len());
+                    self.found.pictures.push(picture);
+                }
+                self.found.faults.push(Fault {
+                    what,
                     pass: Some(pass.name.into()),
                     input: format!("'{name}', iteration {iteration}, {kind}"),
-                    worst: Some(worst),
+                    worst: of.worst.clone(),
                     files: Vec::new(),
                 });
             }
         }
+        Ok(())
     }
-    found.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
-    found.expect(failed <= TOLD, || format!("{} more inputs beyond tolerance", failed - TOLD));
-    found.figures.push(Figure {
-        what: "largest error".into(),
-        value: largest,
-        allowed: None,
-        unit: Unit::Value,
-        samples: Vec::new(),
-    });
-    found.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
-    found.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));
-    found.notes.push(format!("{runs} dispatches; tolerance: {}", pass.tolerance.why));
-    Ok(found)
+
+    fn found(self, pass: &Pass) -> Found {
+        let Sum { mut found, runs, failed, largest, used, outliers, bias } = self;
+        found.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
+        found.expect(failed <= TOLD, || format!("{} more inputs beyond tolerance", failed - TOLD));
+        found.figures.push(Figure {
+            what: "largest error".into(),
+            value: largest,
+            allowed: None,
+            unit: Unit::Value,
+            samples: Vec::new(),
+        });
+        found.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
+        found.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));
+        found.figures.push(Figure::error("mean error, share of the tolerance", bias, BIAS, Unit::Share));
+        found.notes.push(format!("{runs} dispatches; tolerance: {}", pass.tolerance.why));
+        found
+    }
 }

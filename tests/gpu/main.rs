@@ -30,6 +30,7 @@ mod recordings;
 mod reruns;
 mod sector;
 mod seen;
+mod self_test;
 mod shading;
 mod sliding;
 mod stored;

@@ -107,6 +107,9 @@ impl Renderer {
         let staging = self.lanes[self.next_lane].staging.bytes_mut();
         let (from, to) = (offset + at, offset + at + bytes.len());
         self.measured.host("stage", || staging[from..to].copy_from_slice(bytes));
+        if at + bytes.len() == whole {
+            self.context.faults.frame(&self.scene, &mut staging[offset..offset + whole]);
+        }
         if at + bytes.len() < whole {
             self.arriving = Some(Arriving { slice, image, there: at + bytes.len() });
             return Ok(false);

@@ -78,6 +78,11 @@ impl Renderer {
         self.order.barriers
     }
 
+    /// All that was recorded and submitted so far, where [`Options::log`] asked for it.
+    pub fn log(&self) -> Option<&Log> {
+        self.order.log.as_ref()
+    }
+
     /// Leaves out the n-th barrier from here on (1: the first ever recorded), to show that validation notices.
     pub fn drop_barrier(&mut self, n: u32) {
         self.order.drop_barrier = Some(n);

@@ -250,8 +250,7 @@ impl Screen {
             go(Stage::Copied);
         }
         if let (Some(drawn), Some((region, [w, h]))) = (drawn, region) {
-            let queues = &mut drawn.order.queues;
-            queues.begin(0);
+            drawn.order.begin(0);
             let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, Worker::Copy);
             drawn.order.before(&self.context, 0, commands, &[read]);
             if w > 0 && h > 0 {
@@ -326,7 +325,7 @@ impl Screen {
             let timeline = timelines.of_mut(0);
             timeline.submitted += 1;
             timeline.doing = "window".into();
-            order.queues.submitted(0, &after, timeline.submitted);
+            order.submitted(0, &after, timeline.submitted);
         }
         Ok(())
     }

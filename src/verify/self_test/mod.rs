@@ -1,0 +1,182 @@
+//! Whether the checks notice anything: faults are planted on the device's side one at a time, and each must be caught by one of the
+//! checks that `echolume verify` runs. The same check with nothing planted must pass, or it says nothing.
+
+mod dropped;
+mod list;
+mod rays;
+
+use super::{Bench, Check, Found, known_answers, passes};
+use crate::gpu::{ContextOptions, GpuError};
+use crate::passes::planted::Planted;
+use crate::passes::{PASSES, is_hit};
+use crate::report::verify::{Fault, Level, Outcome, Verdict};
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Scenes of a pass that are looked at before the next pass is.
+const SCENES: usize = 6;
+
+/// A fault, and which check noticed it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Caught {
+    pub fault: String,
+    /// What it stands for.
+    pub what: String,
+    /// Group and name of the check; none: nothing noticed.
+    pub by: Option<String>,
+    /// What the check said, or why nothing did.
+    pub found: String,
+    /// s, host's clock.
+    pub seconds: f64,
+}
+
+impl Caught {
+    /// As the other checks report: an uncaught fault is a failure.
+    pub fn outcome(&self) -> Outcome {
+        let fault = || Fault::new(format!("not caught: {}", self.found));
+        Outcome {
+            group: "self-test".into(),
+            name: self.fault.clone(),
+            verdict: if self.by.is_some() { Verdict::Passed } else { Verdict::Failed },
+            seconds: self.seconds,
+            figures: Vec::new(),
+            faults: if self.by.is_some() { Vec::new() } else { vec![fault()] },
+            notes: match &self.by {
+                Some(by) => vec![self.what.clone(), format!("caught by {by}: {}", self.found)],
+                None => vec![self.what.clone()],
+            },
+            pictures: Vec::new(),
+        }
+    }
+}
+
+/// Every fault that is planted, in running order; barriers are dropped besides.
+pub fn faults() -> impl Iterator<Item = &'static Planted> {
+    list::FAULTS.iter().chain(rays::FAULTS)
+}
+
+/// Plants every fault, drops every barrier; `tell` hears of each, and says whether to go on. What is told last is whether the checks
+/// that caught something pass with nothing planted.
+///
+/// # Errors
+/// A device that fails with nothing planted.
+pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Caught) -> bool) -> Result<Vec<Caught>, GpuError> {
+    let mut all = Vec::new();
+    for caught in dropped::all(options)? {
+        all.push(caught);
+        if !all.last().is_some_and(&mut tell) {
+            return Ok(all);
+        }
+    }
+    all.extend(planted(options, faults(), tell)?);
+    Ok(all)
+}
+
+/// The same of faults of the caller's, with no barrier dropped.
+///
+/// # Errors
+/// As of [`run`].
+pub fn planted<'a>(
+    options: &ContextOptions,
+    faults: impl Iterator<Item = &'a Planted>,
+    mut tell: impl FnMut(&Caught) -> bool,
+) -> Result<Vec<Caught>, GpuError> {
+    // A layer that watches has nothing to do with what is computed, and takes most of the time.
+    let options = ContextOptions { validation: false, ..options.clone() };
+    let sound = Bench::new(&options, Level::Quick)?;
+    let mut search = Search { sound, answers: known_answers::checks(Level::Quick), alarms: BTreeMap::new() };
+    let mut all = Vec::new();
+    for fault in faults {
+        all.push(search.caught(fault)?);
+        if !all.last().is_some_and(&mut tell) {
+            return Ok(all);
+        }
+    }
+    let caught = search.nothing();
+    tell(&caught);
+    all.push(caught);
+    Ok(all)
+}
+
+struct Search {
+    /// With nothing planted.
+    sound: Bench,
+    answers: Vec<Check>,
+    /// What checks found with nothing planted.
+    alarms: BTreeMap<String, Option<String>>,
+}
+
+impl Search {
+    fn caught(&mut self, planted: &Planted) -> Result<Caught, GpuError> {
+        let (begun, mut bench) = (Instant::now(), self.sound.planted(planted.change)?);
+        let looked = self.look(planted, &mut bench);
+        let struck = bench.context.faults.struck();
+        let (by, found) = match looked {
+            Some((by, found)) => (Some(by), found),
+            None if struck == 0 => (None, "nothing that a check runs is changed by it".into()),
+            None => (None, format!("{struck} changes, and every check passes")),
+        };
+        let seconds = begun.elapsed().as_secs_f64();
+        Ok(Caught { fault: planted.name.into(), what: planted.what.into(), by, found, seconds })
+    }
+
+    /// The first check that notices, and does not without the fault.
+    fn look(&mut self, planted: &Planted, bench: &mut Bench) -> Option<(String, String)> {
+        let scenes = bench.scenes();
+        for (n, pass) in PASSES.iter().enumerate() {
+            let concerned = (0..scenes.len()).filter(|s| planted.change.concerns(pass, &scenes[*s].1));
+            for s in concerned.take(SCENES) {
+                let Some(found) = alarm(passes::in_scene(bench, n, s)) else { continue };
+                let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
+                let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));
+                if alarms.or_insert_with(|| alarm(passes::in_scene(sound, n, s))).is_none() {
+                    return Some((by, found));
+                }
+            }
+        }
+        for check in &self.answers {
+            let Some(found) = failed(check.run(bench)) else { continue };
+            let (by, sound) = (format!("{}, {}", check.group, check.name), &mut self.sound);
+            if self.alarms.entry(by.clone()).or_insert_with(|| failed(check.run(sound))).is_none() {
+                return Some((by, found));
+            }
+        }
+        None
+    }
+
+    /// Whether what caught something passes with nothing planted.
+    fn nothing(&self) -> Caught {
+        let alarm = self.alarms.iter().find_map(|(check, found)| Some(format!("{check}: {}", found.as_ref()?)));
+        Caught {
+            fault: "nothing".into(),
+            what: "a check that fails with nothing planted proves nothing".into(),
+            by: alarm.is_none().then(|| "no check".into()),
+            found: alarm.unwrap_or_else(|| format!("{} checks pass", self.alarms.len())),
+            seconds: 0.0,
+        }
+    }
+}
+
+/// The first thing that is wrong, in a line.
+fn alarm(found: Result<Found, GpuError>) -> Option<String> {
+    match found {
+        Ok(found) => found.faults.first().map(line),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+fn failed(outcome: Outcome) -> Option<String> {
+    outcome.faults.first().map(line)
+}
+
+fn number(value: f64) -> String {
+    if value.is_nan() || is_hit(value) { format!("{value:.6}") } else { "a miss".into() }
+}
+
+fn line(fault: &Fault) -> String {
+    let input = if fault.input.is_empty() { String::new() } else { format!(", {}", fault.input) };
+    let worst = fault.worst.as_ref().map_or(String::new(), |w| {
+        format!(": {} at {:?} is {} instead of {}", w.output, w.at, number(w.got), number(w.expected))
+    });
+    format!("{}{worst}{input}", fault.what).replace('\n', ", ")
+}
