@@ -6,9 +6,11 @@ use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
 
 use echolume::report::verify::baseline::{self, Compared, compare};
 use echolume::report::verify::{Level, Outcome, Run, Verdict, html, json, junit, words};
+use echolume::verify::self_test::{self, Caught};
 use echolume::verify::{self, Bench, Check};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// Longest baseline that is read, bytes.
 const LONGEST: u64 = 256 << 20;
@@ -50,7 +52,7 @@ pub struct Verify {
     #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
     pictures: PathBuf,
     /// Plant faults, one after the other, and say which check notices each; one that is not noticed is a failure
-    #[arg(long, conflicts_with_all = ["against", "full"])]
+    #[arg(long, conflicts_with_all = ["against", "full", "only", "list"])]
     self_test: bool,
     /// Draw the pictures of every mode on this device too, and compare them
     #[arg(long, value_name = "N|NAME")]
@@ -104,6 +106,9 @@ impl Verify {
         let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
         let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };
         say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
+        if self.self_test {
+            return self.tested(&bench);
+        }
         let checks = match &self.against {
             Some(other) => {
                 let other = context(&ContextOptions { device: other.clone(), ..bench.options().clone() })?;
@@ -126,6 +131,17 @@ impl Verify {
         });
         tell(&group);
         Ok(run)
+    }
+
+    /// Which planted fault each check notices.
+    fn tested(&self, bench: &Bench) -> Result<Run, Failure> {
+        let begun = Instant::now();
+        let tell = |caught: &Caught| match &caught.by {
+            Some(by) => say!("{}: caught by {by}\n    {}", caught.fault, caught.found),
+            None => say!("{}: NOT CAUGHT ({})\n    {}", caught.fault, caught.what, caught.found),
+        };
+        let caught = self_test::run(bench.options(), tell).map_err(failed)?;
+        Ok(bench.run_of(caught.iter().map(Caught::outcome).collect(), begun))
     }
 
     /// With validation, where its layer is installed.

@@ -33,6 +33,11 @@ impl Single {
         Ok(Single { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)?, fetch })
     }
 
+    /// Bits of the weights that the device's own filter has, as it says.
+    pub fn filter_bits(&self) -> u32 {
+        self.context.limits.sub_texel_precision_bits
+    }
+
     /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
     /// `poison` before, so that what the pass leaves out can be told.
     pub fn run(

@@ -37,7 +37,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use compared::{Comparison, compare};
+pub use compared::{Comparison, Slack, compare};
 pub use drawn::Drawn;
 
 /// What checks work on: a device, and the scenes that are part of the program.
@@ -156,6 +156,20 @@ impl Bench {
     /// Whether the validation layer watches.
     pub fn watched(&self) -> bool {
         self.options.validation
+    }
+
+    /// A run that ends now.
+    pub fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+        Run {
+            format: FORMAT.into(),
+            program: machine::program(),
+            date: machine::date(),
+            device: machine::device(&self.context),
+            level: self.level,
+            validation: self.options.validation,
+            seconds: begun.elapsed().as_secs_f64(),
+            outcomes,
+        }
     }
 
     fn renew(&mut self) -> Result<(), GpuError> {
@@ -277,21 +291,12 @@ pub fn checks(level: Level) -> Vec<Check> {
 
 /// Runs checks one after the other; `tell` hears of each as it is done.
 pub fn run(bench: &mut Bench, checks: &[Check], mut tell: impl FnMut(&Outcome)) -> Run {
-    let (date, begun) = (machine::date(), Instant::now());
+    let begun = Instant::now();
     let mut outcomes = Vec::new();
     for check in checks {
         let outcome = check.run(bench);
         tell(&outcome);
         outcomes.push(outcome);
     }
-    Run {
-        format: FORMAT.into(),
-        program: machine::program(),
-        date,
-        device: machine::device(&bench.context),
-        level: bench.level,
-        validation: bench.options.validation,
-        seconds: begun.elapsed().as_secs_f64(),
-        outcomes,
-    }
+    bench.run_of(outcomes, begun)
 }

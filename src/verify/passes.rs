@@ -1,6 +1,7 @@
 //! Every pass alone against its f64 reference: on noise and extremes, at awkward sizes, in every variant of the geometry. Each pass gets
 //! its own inputs, so that errors do not add up; outputs are poisoned before, so that what a pass leaves out is seen.
 
+use super::compared::Slack;
 use super::inputs::{KINDS, inputs_of, turn_of};
 use super::shown::shown;
 use super::{Bench, Check, Comparison, Found, compare};
@@ -52,8 +53,9 @@ pub fn beside(
         expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
     }
     pass.expected(scene, &turn, &inputs, &mut expected);
+    let slack = Slack::of(pass, scene, &turn, single.filter_bits());
     let got = single.run(scene, pass, &turn, &inputs, POISON)?;
-    let comparison = compare(pass, scene, POISON, &expected, &got, &writes);
+    let comparison = compare(pass, scene, slack, POISON, &expected, &got, &writes);
     Ok(Beside { inputs, expected, got, writes, comparison })
 }
 

@@ -12,7 +12,7 @@ use echolume::report::verify::Level;
 use echolume::scene::{Sampling, Scene};
 use echolume::verify::inputs::{inputs_of, turn_of};
 use echolume::verify::passes::{POISON, beside};
-use echolume::verify::{self, Bench};
+use echolume::verify::{self, Bench, Slack};
 use std::collections::HashSet;
 
 /// What `echolume verify --full` does of passes: every input in every scene.
@@ -141,7 +141,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
             expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
         }
         (pass.reference)(wrong, &turn, &right.inputs, &mut expected);
-        let compared = verify::compare(pass, told, POISON, &expected, &right.got, &right.writes);
+        let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
     // One voxel.
@@ -155,7 +155,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(size_of(right.writes[0].slot.shape(&base)), 1));
     (pass.reference)(&base, &Turn::default(), &inputs, &mut expected);
-    let compared = verify::compare(pass, &base, POISON, &expected, &right.got, &right.writes);
+    let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
 }
 

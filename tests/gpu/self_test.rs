@@ -12,9 +12,8 @@ fn options() -> ContextOptions {
 }
 
 /// Looked at with `--nocapture`: which check caught what.
-fn told(caught: &Caught) -> bool {
+fn told(caught: &Caught) {
     println!("{:5.2} s  {:36} {}: {}", caught.seconds, caught.fault, caught.by.as_deref().unwrap_or("-"), caught.found);
-    true
 }
 
 #[test]

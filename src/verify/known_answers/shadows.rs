@@ -8,7 +8,7 @@ use crate::report::verify::{Fault, Figure, Unit};
 use crate::verify::built_in::{BYTES, scene, wobbler};
 use crate::verify::passes::POISON;
 use crate::verify::shown::shown;
-use crate::verify::{Bench, Found, compare};
+use crate::verify::{Bench, Found, Slack, compare};
 
 /// A hill under a low light: most of its shadow is edge, of which noise has little. Held against the reference; here none of the texels
 /// may be beyond tolerance but where a ray to the light grazes the hill.
@@ -30,7 +30,7 @@ pub(super) fn of_a_hill(bench: &mut Bench) -> Result<Found, GpuError> {
     }
     shadow::PASS.expected(&scene, &turn, &inputs, &mut expected);
     let got = bench.single()?.run(&scene, &shadow::PASS, &turn, &inputs, POISON)?;
-    let compared = compare(&shadow::PASS, &scene, POISON, &expected, &got, &writes);
+    let compared = compare(&shadow::PASS, &scene, Slack::default(), POISON, &expected, &got, &writes);
     let edge = expected.get("shadow").values.iter().filter(|v| (0.02..0.98).contains(*v)).count();
     found.expect(edge > 150, || format!("only {edge} texels are an edge of the shadow"));
     if let Some(worst) = compared.worst {
