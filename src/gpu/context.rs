@@ -304,18 +304,6 @@ impl Context {
 
     pub(super) fn wait_idle(&self) {
         self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
-        self.idle();
-    }
-
-    /// Layers of 1.3.239 do not see that a host waits for a timeline. They see that the device is idle; else memory that is another's a
-    /// moment later would look like a hazard.
-    pub(super) fn show_idle(&self) {
-        if self.messenger.is_some() {
-            self.idle();
-        }
-    }
-
-    fn idle(&self) {
         let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
         // SAFETY: the locks keep every queue of the device to this thread.
         let _ = unsafe { self.device.device_wait_idle() };

@@ -87,7 +87,6 @@ impl Timelines {
     /// See [`Timeline::drain`].
     pub fn drain(&self) {
         self.0.iter().for_each(Timeline::drain);
-        self.0.iter().take(1).for_each(|timeline| timeline.context.show_idle());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Contexts of a check's own: devices that are to be lost, that stand for lesser ones, or whose one queue plays several.
 //!
-//! Layers of 1.3.239 do not see that a queue waits for a timeline: where one plays several they call everything between submissions a
-//! hazard.
+//! Layers of 1.3.239 do not see that a queue or the host waits for a timeline. Where one queue plays several they call everything between
+//! submissions a hazard, and where memory that was read back from is taken anew, that.
 
 use super::{Bench, Found};
 use crate::gpu::{Context, GpuError};
@@ -29,6 +29,14 @@ impl Aside {
     pub fn of_queues(bench: &Bench, queues: usize) -> Result<Aside, GpuError> {
         let context = bench.another()?;
         Ok(Aside { hears: context.queue_count() >= queues, context })
+    }
+
+    /// One whose renderers change often, or are made anew after slots were read back.
+    ///
+    /// # Errors
+    /// As of [`Bench::another`].
+    pub fn of_changes(bench: &Bench) -> Result<Aside, GpuError> {
+        Ok(Aside { hears: false, context: bench.another()? })
     }
 
     /// One that lacks something, by what `change` does to what is known of it, before anything is made from it.

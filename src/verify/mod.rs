@@ -293,7 +293,13 @@ pub fn checks(level: Level) -> Vec<Check> {
 pub fn run(bench: &mut Bench, checks: &[Check], mut tell: impl FnMut(&Outcome)) -> Run {
     let begun = Instant::now();
     let mut outcomes = Vec::new();
+    let mut group = checks.first().map_or("", |check| check.group);
     for check in checks {
+        // What validation keeps of one group is none of the next one's: see `aside`.
+        if bench.options.validation && std::mem::replace(&mut group, check.group) != check.group {
+            let renewed = bench.renew();
+            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+        }
         let outcome = check.run(bench);
         tell(&outcome);
         outcomes.push(outcome);

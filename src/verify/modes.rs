@@ -1,5 +1,6 @@
 //! Whole pictures in every mode, of bodies that are known, against the four stages in f64.
 
+use super::aside::Aside;
 use super::built_in::{BYTES, FLOATS, body_frames, cartesian, linear, scene, still, uneven, wobbler};
 use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::GpuError;
@@ -254,10 +255,12 @@ pub fn judge(found: &mut Found, input: &str, expected: &Picture, got: &Picture) 
 fn every_scene(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut drawn_ones, mut mean, mut far) = (Found::default(), 0, 0.0f64, 0.0f64);
     let (scenes, step) = (bench.scenes(), if bench.level == Level::Full { 1 } else { 11 });
+    // One renderer after the other on one device.
+    let aside = Aside::of_changes(bench)?;
     for (name, scene) in scenes.iter().step_by(step) {
         let frames = body_frames(scene, ball);
         let expected = reference(scene, &frames);
-        let got = drawn::picture(&bench.context, scene, &frames)?;
+        let got = drawn::picture(&aside.context, scene, &frames)?;
         let apart = apart(&expected, &got);
         drawn_ones += 1;
         (mean, far) = (mean.max(apart.mean), far.max(apart.far));
@@ -269,6 +272,7 @@ fn every_scene(bench: &mut Bench) -> Result<Found, GpuError> {
             found.faults.push(Fault { input: name.clone(), worst: Some(apart.worst), ..Fault::new(what) });
         }
     }
+    aside.tell(&mut found);
     found.notes.push(format!("{drawn_ones} pictures"));
     found.figures.push(Figure::error("largest mean difference", mean, MEAN, Unit::Levels));
     found.figures.push(Figure::error("values further off than 8 levels", far, EDGES, Unit::Share));

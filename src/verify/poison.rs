@@ -130,7 +130,7 @@ fn tell(found: &mut Found, sums: &Sums) {
 
 fn modes(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut sums, modes) = (Found::default(), Sums::default(), bench.modes()?);
-    let aside = Aside::new(bench)?;
+    let aside = Aside::of_changes(bench)?;
     for of in modes.iter() {
         look(&mut found, &mut sums, &aside.context, (&of.name, &of.scene, &of.frames))?;
     }
@@ -142,7 +142,7 @@ fn modes(bench: &mut Bench) -> Result<Found, GpuError> {
 /// Of the scenes that need every pass a few: passes alone are poisoned in all of them.
 fn variants(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut sums, scenes) = (Found::default(), Sums::default(), bench.scenes());
-    let aside = Aside::new(bench)?;
+    let aside = Aside::of_changes(bench)?;
     let step = if bench.level == Level::Quick { 40 } else { 4 };
     for (name, scene) in scenes.iter().step_by(step) {
         let frames = super::built_in::wall(scene, 0);

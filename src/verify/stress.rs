@@ -89,7 +89,7 @@ struct Stress<'a> {
 /// # Errors
 /// A device that fails.
 pub fn stress(bench: &mut Bench, seconds: f64, spoil: &Spoil) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
+    let (mut found, aside) = (Found::default(), Aside::of_changes(bench)?);
     let context = &aside.context;
     let (held, pipelines) = (context.allocated(), || context.counts.pipelines.load(Ordering::Relaxed));
     let (before, begun) = (pipelines(), Instant::now());

@@ -27,8 +27,6 @@ impl Renderer {
             self.uploads.push(buffer);
             return done.map(|()| None);
         }
-        // The buffer is gone a moment later.
-        self.context.show_idle();
         Ok(Some((buffer, size, format)))
     }
 
