@@ -97,7 +97,8 @@ fn ways(probe: &Probe) -> Vec<Probe> {
 #[test]
 fn indices_come_back_from_space_for_every_array_motion_and_way_of_the_motor() {
     let two = Probe { slices: Axis::Even { first: -1.0, pitch: 2.0, count: 2 }, ..linear() };
-    for probe in [fan(), linear(), two].iter().flat_map(ways) {
+    let seven = Probe { slices: Axis::Even { first: -4.0, pitch: 2.0, count: 7 }, ..linear() };
+    for probe in [fan(), linear(), two, seven].iter().flat_map(ways) {
         probe.check().expect("a probe");
         let slices = probe.slices.len() as f64 - 1.0;
         for n in 0..200 {
