@@ -5,8 +5,11 @@ use echolume::barriers::{Access, Resource, Worker, Workers, accesses};
 use echolume::passes::{Slot, Turn, by_name};
 use std::ops::Range;
 
+/// Slot, volume image, and parts.
+type Touched = Vec<(Slot, u32, Range<u32>)>;
+
 /// What it reads and what it writes.
-fn touched(name: &str, turn: Turn) -> (Vec<(Slot, u32, Range<u32>)>, Vec<(Slot, u32, Range<u32>)>) {
+fn touched(name: &str, turn: Turn) -> (Touched, Touched) {
     let scene = scene(cartesian([6, 8, 5]), FILTERED);
     let all = accesses(&scene, by_name(name).expect("pass"), &turn);
     let of = |write| {

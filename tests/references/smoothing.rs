@@ -47,7 +47,7 @@ fn a_median_of_distances_lets_misses_vote_first() {
                 missed += 1;
             } else {
                 assert!(is_ranked(&hits, hits.len().div_ceil(2) - 1, got), "{got} of {hits:?}");
-                even += usize::from(hits.len() % 2 == 0);
+                even += usize::from(hits.len().is_multiple_of(2));
             }
         }
         assert!(even > 5 && (edge > 3 || missed > 0), "{even} of even number, {missed} missed");
