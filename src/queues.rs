@@ -273,6 +273,7 @@ mod tests {
         submit(&mut queues, &mut values, 1, on(0, true));
         let picture = submit(&mut queues, &mut values, 0, on(0, false));
         assert_eq!(picture.3, [Wait { queue: 1, value: 1 }]);
+        assert!(queues.each[1].done.is_empty(), "what all others have waited for is forgotten");
         assert_eq!(submit(&mut queues, &mut values, 1, on(1, true)).3, []);
         assert_eq!(submit(&mut queues, &mut values, 1, on(0, true)).3, [Wait { queue: 0, value: 1 }]);
     }
@@ -280,10 +281,19 @@ mod tests {
     #[test]
     fn what_was_not_submitted_is_not_waited_for() {
         let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
-        let access = vec![Access::of_slot(Slot::Volume, 0, 0..1, true, Worker::Compute)];
+        let access = |slot| vec![Access::of_slot(slot, 0, 0..1, true, Worker::Compute)];
         queues.begin(1);
-        queues.before(1, &access);
+        assert_eq!(queues.before(1, &access(Slot::Volume)), None);
         queues.begin(1);
-        assert_eq!(submit(&mut queues, &mut values, 0, access).3, []);
+        assert!(queues.before(1, &access(Slot::SharpVolume)).is_some(), "what was given up may have run in part");
+        submit(&mut queues, &mut values, 1, access(Slot::SharpVolume));
+        assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::Volume)).3, []);
+        assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::SharpVolume)).3, [Wait { queue: 1, value: 1 }]);
+    }
+
+    #[test]
+    fn there_are_one_to_three_queues() {
+        assert_eq!([0, 1, 2, 3, 9].map(|count| Queues::new(count).count()), [1, 1, 2, 3, 3]);
+        assert_eq!(Queues::default().count(), 1);
     }
 }

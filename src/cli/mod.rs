@@ -30,6 +30,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tracing_subscriber::filter::filter_fn;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Prints a line on standard output.
 macro_rules! say {
@@ -151,22 +154,22 @@ pub fn run() -> ExitCode {
             return if error.use_stderr() { ExitCode::from(2) } else { ExitCode::SUCCESS };
         }
     };
-    let done = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log()).and_then(|()| {
-        match arguments.command {
-            Command::Render(render) => render.run(),
-            Command::Stream(stream) => stream.run(),
-            Command::View(view) => view.run(),
-            Command::Filter(filter) => filter.run(),
-            Command::Profile(profile) => profile.run(),
-            Command::Verify(verify) => verify.run(),
-            Command::Report(report) => report.run(),
-            Command::Phantom(phantom) => phantom.run(),
-            Command::Convert(convert) => convert.run(),
-            Command::Info(info) => info.run(),
-            Command::Probe(probe) => probe.run(),
-            Command::Devices(devices) => devices.run(),
-            Command::SupportBundle(bundle) => bundle.run(),
-        }
+    let finds = matches!(arguments.command, Command::Verify(_));
+    let log = start_log(arguments.verbose, arguments.log_file.as_deref(), arguments.command.log(), finds);
+    let done = log.and_then(|()| match arguments.command {
+        Command::Render(render) => render.run(),
+        Command::Stream(stream) => stream.run(),
+        Command::View(view) => view.run(),
+        Command::Filter(filter) => filter.run(),
+        Command::Profile(profile) => profile.run(),
+        Command::Verify(verify) => verify.run(),
+        Command::Report(report) => report.run(),
+        Command::Phantom(phantom) => phantom.run(),
+        Command::Convert(convert) => convert.run(),
+        Command::Info(info) => info.run(),
+        Command::Probe(probe) => probe.run(),
+        Command::Devices(devices) => devices.run(),
+        Command::SupportBundle(bundle) => bundle.run(),
     });
     let done = done.and_then(|()| match UNWRITTEN.lock().unwrap_or_else(|e| e.into_inner()).take() {
         Some(error) => Err(Failure::Failed(format!("standard output: cannot be written: {error}"))),
@@ -199,10 +202,12 @@ impl Command {
     }
 }
 
+/// With `finds`, what validation says is part of what the command finds and not logged beside it.
 fn start_log(
     verbose: u8,
     file: Option<&std::path::Path>,
     configured: Option<(PathBuf, u64, u32)>,
+    finds: bool,
 ) -> Result<(), Failure> {
     let level = match verbose {
         0 => tracing::Level::WARN,
@@ -227,7 +232,10 @@ fn start_log(
         return Ok(());
     }
     match file {
-        None => log.without_time().with_writer(std::io::stderr).init(),
+        None => {
+            let told = filter_fn(move |what| !finds || verbose > 0 || what.target() != "validation");
+            log.without_time().with_writer(std::io::stderr).finish().with(told).init();
+        }
         Some(path) => {
             let file = Rotating::open(path, rotating::USUAL_BYTES, rotating::USUAL_FILES);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;

@@ -193,18 +193,9 @@ impl Verify {
     }
 
     fn write(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
-        let to_json = || json::to_json(run).map_err(|e| e.to_string());
-        let files: [(&Option<PathBuf>, &dyn Fn() -> Result<String, String>); 3] = [
-            (&self.json, &to_json),
-            (&self.junit, &|| junit::junit(run, compared)),
-            (&self.html, &|| html::html(run, compared)),
-        ];
-        for (file, text) in files {
-            let Some(file) = file else { continue };
-            replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
-            say!("written: {}", file.display());
-        }
-        Ok(())
+        put(&self.json, || json::to_json(run).map_err(|e| e.to_string()))?;
+        put(&self.junit, || junit::junit(run, compared))?;
+        put(&self.html, || html::html(run, compared))
     }
 
     fn judge(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
@@ -223,6 +214,14 @@ impl Verify {
             (count, _) => Err(failed(format!("{count} of {} checks failed", run.outcomes.len()))),
         }
     }
+}
+
+/// Writes a file, where one is asked for.
+fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
+    let Some(file) = file else { return Ok(()) };
+    replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
+    say!("written: {}", file.display());
+    Ok(())
 }
 
 fn tell(group: &[Outcome]) {

@@ -124,4 +124,64 @@ mod tests {
         assert!(!Axis::Even { first: 0.0, pitch: -1.0, count: 3 }.is_valid());
         assert!(Axis::Even { first: 0.0, pitch: 0.0, count: 1 }.is_valid());
     }
+
+    #[test]
+    fn centred_positions_lie_alike_to_both_sides() {
+        let positions = |axis: &Axis| (0..axis.len()).map(|i| axis.at(i as f64)).collect::<Vec<_>>();
+        assert_eq!(positions(&Axis::centred(0.5, 4)), [-0.75, -0.25, 0.25, 0.75]);
+        assert_eq!(positions(&Axis::centred(3.0, 3)), [-3.0, 0.0, 3.0]);
+        assert_eq!(positions(&Axis::centred(3.0, 1)), [0.0]);
+        assert!(Axis::centred(3.0, 0).is_empty() && !Axis::centred(3.0, 1).is_empty());
+    }
+
+    /// A table from -5 to 15 is even where each entry is to 2e-8.
+    #[test]
+    fn a_table_is_even_to_a_thousand_millionth_of_its_span() {
+        let bent = |by: f64| Axis::from_table(vec![-5.0, 5.0 + by, 15.0]);
+        assert_eq!(bent(1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
+        assert_eq!(bent(-1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
+        assert!(matches!(bent(2.5e-8), Axis::Table(_)) && matches!(bent(-2.5e-8), Axis::Table(_)));
+        assert_eq!(Axis::from_table(vec![3.0, 7.0]), Axis::Even { first: 3.0, pitch: 4.0, count: 2 });
+        assert_eq!(Axis::from_table(vec![7.0]), Axis::Even { first: 7.0, pitch: 1.0, count: 1 });
+        assert_eq!(Axis::from_table(Vec::new()).len(), 0);
+    }
+
+    #[test]
+    fn the_pitch_of_a_table_is_the_mean_and_that_of_one_position_none() {
+        let table = Axis::Table(vec![-2.0, 0.5, 4.0]);
+        assert_eq!((table.len(), table.first(), table.last(), table.pitch()), (3, -2.0, 4.0, 3.0));
+        let even = Axis::Even { first: -2.0, pitch: 0.5, count: 2 };
+        assert_eq!((even.len(), even.first(), even.last(), even.pitch()), (2, -2.0, -1.5, 0.5));
+        assert_eq!(Axis::Even { first: 1.0, pitch: 3.0, count: 1 }.pitch(), 0.0);
+        assert_eq!((Axis::Table(vec![4.0]).pitch(), Axis::Table(Vec::new()).pitch()), (0.0, 0.0));
+        assert!(Axis::Table(Vec::new()).is_empty() && !table.is_empty());
+    }
+
+    #[test]
+    fn tables_go_on_in_a_straight_line_beyond_both_ends() {
+        let table = Axis::Table(vec![-1.0, 1.0, 2.0, 6.0]);
+        for (index, position) in
+            [(0.0, -1.0), (0.5, 0.0), (1.0, 1.0), (1.5, 1.5), (2.25, 3.0), (-1.0, -3.0), (4.0, 10.0)]
+        {
+            assert_eq!((table.at(index), table.index_of(position)), (position, index));
+        }
+        let two = Axis::Table(vec![1.0, 5.0]);
+        assert_eq!((two.at(0.25), two.index_of(2.0), two.pitch()), (2.0, 0.25, 4.0));
+        let one = Axis::Table(vec![7.0]);
+        assert_eq!((one.at(3.0), one.index_of(9.0)), (7.0, 2.0));
+        let even = Axis::Even { first: 1.0, pitch: 4.0, count: 2 };
+        assert_eq!((even.at(2.5), even.index_of(11.0)), (11.0, 2.5));
+        assert!(table.index_of(f64::NAN).is_nan() && even.index_of(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn only_finite_positions_that_rise_are_valid() {
+        let even = |first, pitch, count| Axis::Even { first, pitch, count }.is_valid();
+        assert!(even(-1.0, 0.5, 2) && even(0.0, -1.0, 1));
+        assert!(!even(0.0, 1.0, 0) && !even(0.0, 0.0, 2));
+        assert!(!even(f64::NEG_INFINITY, 1.0, 2) && !even(0.0, f64::INFINITY, 2) && !even(1e308, 1e308, 2));
+        let table = |positions: &[f64]| Axis::Table(positions.to_vec()).is_valid();
+        assert!(table(&[3.0]) && table(&[-1.0, 0.0, 5.0]));
+        assert!(!table(&[]) && !table(&[f64::INFINITY]) && !table(&[0.0, 2.0, 1.0]) && !table(&[0.0, 0.0]));
+    }
 }

@@ -318,7 +318,7 @@ impl Probe {
                     return fault("fan angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
                 }
                 let nearest = self.plane_bounds().0[1];
-                if self.slices.len() > 1 && nearest <= self.axis_depth() {
+                if nearest <= self.axis_depth() {
                     return fault(
                         "wobble radius",
                         format!(

@@ -77,4 +77,35 @@ mod tests {
         assert!(Grid { spacing: [0.5, 1e300, 0.5], ..good }.check().is_err());
         assert!(Grid { origin: [f64::NAN, 0.0, 0.0], ..good }.check().is_err());
     }
+
+    #[test]
+    fn a_lattice_is_taken_up_to_its_limits() {
+        let good = Grid { size: [2, 3, 1], spacing: [1e-6, 1e6, 1.0], origin: [-1e6, 1e6, 0.0] };
+        assert_eq!(good.check(), Ok(()));
+        let fault = |grid: Grid| grid.check().map_err(|e| e.field);
+        assert_eq!(fault(Grid { size: [2, 3, 0], ..good }), Err("size"));
+        assert_eq!(fault(Grid { spacing: [0.9e-6, 1.0, 1.0], ..good }), Err("spacing"));
+        assert_eq!(fault(Grid { spacing: [1.0, 1.0, 1.1e6], ..good }), Err("spacing"));
+        assert_eq!(fault(Grid { origin: [0.0, -1.1e6, 0.0], ..good }), Err("origin"));
+        assert_eq!(fault(Grid { origin: [0.0, 0.0, 1.1e6], ..good }), Err("origin"));
+    }
+
+    #[test]
+    fn the_first_index_of_a_frame_runs_along_a_line_and_of_a_picture_along_x() {
+        use crate::probe::{Advance, Array, Axis, Motion};
+        let cartesian = Geometry::Cartesian(Grid { size: [7, 5, 3], spacing: [1.0; 3], origin: [0.0; 3] });
+        assert_eq!((cartesian.frame_size(), cartesian.slices()), ([7, 5], 3));
+        let sweep = Geometry::Sweep(Probe {
+            array: Array::Linear,
+            lines: Axis::centred(1.0, 24),
+            start_depth: 0.0,
+            sample_pitch: 0.5,
+            samples: 64,
+            motion: Motion::Translated,
+            slices: Axis::centred(1.0, 9),
+            advance: Advance::None,
+            sound_speed: 1540.0,
+        });
+        assert_eq!((sweep.frame_size(), sweep.slices()), ([64, 24], 9));
+    }
 }

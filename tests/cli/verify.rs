@@ -2,6 +2,7 @@
 
 use crate::common::*;
 use echolume::report::verify::{Run, Unit, Verdict, json};
+use echolume::verify::self_test;
 use std::fs;
 use std::process::Command;
 
@@ -41,6 +42,23 @@ fn everything_quick_is_as_it_should_be_here() {
     let page = fs::read_to_string(&html).expect("written");
     assert!(page.contains("data:image/png;base64,") && page.contains(&run.device.name));
     assert!(!std::path::Path::new(&pictures).exists(), "there is nothing to show");
+}
+
+/// Every planted fault, every dropped barrier, and that nothing is noticed where nothing is planted.
+#[test]
+fn every_planted_fault_and_every_dropped_barrier_is_caught() {
+    let folder = Folder::new("verify-self-test");
+    let (_, run) = kept(&folder, "run.json", &["--self-test"]);
+    let planted = self_test::faults().count();
+    // Beside them barriers by the oracle, by the layer, and nothing.
+    assert!(planted >= 24 && run.outcomes.len() == planted + 3, "{planted} of {}", run.outcomes.len());
+    let caught: Vec<String> = run.outcomes.iter().map(|o| format!("{}: {}", o.name, o.notes.join("; "))).collect();
+    println!("{}", caught.join("\n"));
+    assert_eq!(run.count(Verdict::Passed), run.outcomes.len());
+    // More than one kind of check is needed.
+    let by = |group: &str| caught.iter().filter(|c| c.contains(&format!("caught by {group}"))).count();
+    assert!(by("passes") > 10 && by("known answers") > 3 && by("the barrier oracle") == 1, "{caught:?}");
+    assert_eq!(by("synchronization validation"), 1, "{caught:?}");
 }
 
 #[test]

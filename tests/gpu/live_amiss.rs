@@ -135,10 +135,11 @@ fn settings_that_need_frames_again_show_whole_volumes_only() {
     let device = Device::new();
     for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
         let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));
-        let source = Told(events(header(0.0), (0..8).flat_map(speckled)).into(), Duration::from_millis(2), false);
+        let source = Told(events(header(0.0), (0..80).flat_map(speckled)).into(), Duration::from_millis(2), false);
         let mut stream = stream_of(&device, source, before, live::Options::default());
         let (mut pictures, mut frames, mut checked) = (0, 0, 0);
-        while pictures < 20 {
+        // On a busy machine most volumes pass while one is drawn.
+        while checked < 3 {
             match stream.step(Duration::from_millis(20)).expect("step") {
                 Step::Picture(shown) => {
                     pictures += 1;

@@ -1,11 +1,10 @@
-//! Whether the checks of `echolume verify` notice anything: what is planted is caught, and what is not planted is not.
+//! Whether the self-test of `echolume verify` can fail. That what it plants is caught is `cli`'s to say.
 
 use crate::common::chosen;
 use echolume::gpu::ContextOptions;
 use echolume::passes::planted::{Change, Planted};
 use echolume::report::verify::Verdict;
 use echolume::verify::self_test::{self, Caught};
-use std::collections::HashSet;
 
 fn options() -> ContextOptions {
     ContextOptions { device: chosen(), validation: false }
@@ -14,21 +13,6 @@ fn options() -> ContextOptions {
 /// Looked at with `--nocapture`: which check caught what.
 fn told(caught: &Caught) {
     println!("{:5.2} s  {:36} {}: {}", caught.seconds, caught.fault, caught.by.as_deref().unwrap_or("-"), caught.found);
-}
-
-#[test]
-fn every_planted_fault_and_every_dropped_barrier_is_caught() {
-    let all = self_test::run(&options(), told).expect("a device");
-    let planted = self_test::faults().count();
-    assert!(planted >= 24 && all.len() == planted + 3, "{planted} of {}", all.len());
-    let names: HashSet<_> = all.iter().map(|caught| &caught.fault).collect();
-    assert_eq!(names.len(), all.len(), "a name stands for one fault");
-    let uncaught: Vec<_> = all.iter().filter(|caught| caught.by.is_none()).map(|c| (&c.fault, &c.found)).collect();
-    assert!(uncaught.is_empty(), "{uncaught:?}");
-    assert!(all.iter().all(|caught| caught.outcome().verdict == Verdict::Passed));
-    // More than one kind of check is needed.
-    let by = |group: &str| all.iter().filter(|c| c.by.as_ref().is_some_and(|by| by.starts_with(group))).count();
-    assert!(by("passes") > 10 && by("known answers") > 3, "{all:?}");
 }
 
 /// Prevents that everything is called caught.
