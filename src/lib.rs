@@ -7,15 +7,14 @@
 //! - [`passes`] declares every compute pass in one place: its slots, parameters, constants, tolerance and f64 reference.
 //!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
 //! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
-//!   order between them and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
+//!   order between them (and has a second opinion on it) and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
 //!   without a GPU.
 //! - [`files`] reads up to a limit and writes whole or not at all; [`picture`] is what is drawn, as a file.
 //! - [`ui`] is the live volume on a screen, and the hands that turn it.
 //! - [`kiosk`] is what a cart needs around that: its configuration, its logs, and what it tells whoever is to help.
 //! - [`live`] is the loop between a source that does not wait and the device.
-//! - [`verify`] says whether a device and its driver still do what they should.
 //! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
-//!   one to fill the other.
+//!   one to fill the other, and [`verify`] to say whether a device and its driver still do what they should.
 
 // Elsewhere than in `gpu` nobody can allow it again.
 #![deny(unsafe_code)]

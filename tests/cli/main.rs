@@ -30,6 +30,7 @@ fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help
     for (command, named) in [
         ("render", "--explain"),
         ("phantom", "--seed"),
+        ("verify", "--self-test"),
         ("info", "--probe"),
         ("devices", "--verbose"),
         ("support-bundle", "--config"),

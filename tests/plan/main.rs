@@ -5,7 +5,7 @@ mod accesses;
 mod chains;
 mod reruns;
 
-use echolume::passes::When;
+use echolume::passes::{Slot, When};
 use echolume::plan::{Plan, Step, affected};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene};
@@ -55,6 +55,19 @@ fn steps_are_told_apart_by_what_makes_them_run() {
     assert_eq!(names(When::Picture), [(11, "raycast_projection", 0), (12, "tone", 0)]);
     assert_eq!(plan.steps[9].id(), ("aos_slice", 7));
     assert_eq!(plan.steps[9].turn().iteration, 7);
+}
+
+#[test]
+fn a_step_names_what_it_reads_and_what_it_writes() {
+    let scene = scene(fan(Advance::None), "mode = 'vr'");
+    let plan = Plan::new(&scene);
+    let names = |slots: Vec<Slot>| slots.iter().map(|slot| slot.name()).collect::<Vec<_>>();
+    let of = |name: &str| (names(step(&plan, name).reads(&scene)), names(step(&plan, name).writes(&scene)));
+    let (reads, writes) = of("scan_convert");
+    assert!(reads.contains(&"frames") && reads.contains(&"scan_lut"), "{reads:?}");
+    assert_eq!(writes, ["volume"]);
+    let (reads, writes) = of("tone");
+    assert_eq!((reads, writes), (vec!["picture"], vec!["screen"]));
 }
 
 #[test]

@@ -45,8 +45,8 @@ pub(super) fn in_space(bench: &mut Bench) -> Result<Found, GpuError> {
             *largest = if error.is_nan() { error } else { largest.max(error) };
         }
     }
-    found.figures.push(Figure::error("largest error", wide, VIEWS[0].allowed, Unit::Millimetres));
-    found.figures.push(Figure::error("largest error from near", near, VIEWS[3].allowed, Unit::Millimetres));
+    found.figures.push(Figure::error("largest error beyond rounding", wide, VIEWS[0].allowed, Unit::Millimetres));
+    found.figures.push(Figure::error("the same from near", near, VIEWS[3].allowed, Unit::Millimetres));
     Ok(found)
 }
 
