@@ -11,6 +11,13 @@ use std::time::{Duration, Instant};
 
 const SIGNALS: [Signal; 3] = [Signal::INT, Signal::TERM, Signal::HUP];
 
+/// The program, with the signals as they are by default: whoever runs the tests may have had one ignored, as `nohup` does.
+fn program() -> Command {
+    let mut program = Command::new("env");
+    program.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
+    program
+}
+
 fn start(program: &mut Command) -> Child {
     program.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("start the program")
 }
@@ -45,7 +52,7 @@ fn a_signal_leaves_no_half_written_file() {
         (&["convert", &sweep, &mha, "--sequence"], Signal::INT),
         (&["convert", &sweep, &frames], Signal::TERM),
     ] {
-        let mut child = start(Command::new(PROGRAM).args(row));
+        let mut child = start(program().args(row));
         let half = || folder.names().difference(&before).next().is_some();
         assert!(eventually(half), "{row:?} has begun nothing");
         signal(&child, sent);
@@ -75,7 +82,7 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     .into_iter()
     .enumerate()
     {
-        let mut child = start(Command::new(PROGRAM).args(row));
+        let mut child = start(program().args(row));
         // It says which device it has taken, and works.
         let mut line = String::new();
         BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
@@ -94,7 +101,7 @@ fn a_signal_ends_a_stream_with_its_summary_and_a_finished_recording() {
     let started = SIGNALS.map(|sent| {
         let tape = folder.path(&format!("{}.frames", sent.as_raw()));
         let stream = ["stream", "--null", "--rate", "3", "--size", "24x24", "--mode", "mip", "--record", &tape];
-        (sent, start(Command::new(PROGRAM).args(stream)), tape)
+        (sent, start(program().args(stream)), tape)
     });
     for (sent, mut child, tape) in started {
         let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);

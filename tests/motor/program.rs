@@ -14,7 +14,9 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
 type Ran = (Option<i32>, String, String);
 
 fn probe(simulator: &Simulator, action: &str, more: &[&str]) -> Command {
-    let mut command = Command::new(PROGRAM);
+    // Whoever runs the tests may have had a signal ignored, as `nohup` does.
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
     command.args(["probe", action, "--probe", PROBE, "--port"]).arg(simulator.path()).args(more);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
