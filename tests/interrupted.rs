@@ -35,7 +35,8 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
             Some(Event::Frame(_)) => {
                 frames += 1;
                 if frames == 20 {
-                    kill_process(getpid(), Signal::INT).expect("a signal");
+                    // Not SIGINT: what a shell starts in the background has that ignored.
+                    kill_process(getpid(), Signal::TERM).expect("a signal");
                 }
             }
             Some(Event::End(why)) => break why,

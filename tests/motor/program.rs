@@ -226,8 +226,8 @@ fn wrong_input_is_refused_before_the_port_is_touched() {
 
 #[test]
 fn the_simulator_runs_until_it_is_signalled() {
-    let mut child = Command::new(PROGRAM)
-        .args(["probe", "simulate"])
+    let mut child = Command::new("env")
+        .args(["--default-signal=INT", PROGRAM, "probe", "simulate"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
