@@ -20,6 +20,7 @@ mod shown;
 mod stream;
 mod support_bundle;
 mod targets;
+mod turns;
 mod verify;
 mod view;
 

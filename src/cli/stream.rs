@@ -2,6 +2,7 @@
 
 use super::arriving::Arriving;
 use super::look::Look;
+use super::turns::Turns;
 use super::{Failure, failed, input, say, unheard};
 use echolume::files::signals::Held;
 use echolume::gpu::Context;
@@ -30,15 +31,8 @@ pub struct Stream {
     source: Arriving,
     #[command(flatten)]
     look: Look,
-    /// whole: volumes are shown when all of their frames have come; rolling: each frame at once
-    #[arg(long, value_name = "HOW", default_value = "whole")]
-    update: String,
-    /// Volume images that take turns where volumes are whole, 2 or 3
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=3))]
-    images: u32,
-    /// Queues of the device that share the work, 1 to 3 [default: all that it has for different work]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
-    queues: Option<u8>,
+    #[command(flatten)]
+    turns: Turns,
     /// Write each picture into this folder (PNG, named by its volume; rolling: by its number)
     #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
     out: Option<PathBuf>,
@@ -61,7 +55,7 @@ pub struct Stream {
 
 impl Stream {
     pub fn run(&self) -> Result<(), Failure> {
-        let update = update(&self.update)?;
+        let update = self.turns.update()?;
         let settings = self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
@@ -74,8 +68,8 @@ impl Stream {
         let mut context = self.look.device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let options =
-            Options { update, images: self.images, queues: self.queues.map(usize::from), ..Options::default() };
+        let (images, queues) = (self.turns.images, self.turns.queues());
+        let options = Options { update, images, queues, ..Options::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.go(&mut stream, update, &mut context);
         drop(stream);
@@ -172,15 +166,6 @@ impl Stream {
         };
         let file = folder.join(name);
         shown.picture.as_ref().map_or(Ok(()), |picture| picture.save(&file)).map_err(failed)
-    }
-}
-
-/// How volumes become visible, as it was typed.
-pub fn update(text: &str) -> Result<Update, Failure> {
-    match text {
-        "whole" => Ok(Update::Whole),
-        "rolling" => Ok(Update::Rolling),
-        other => Err(input(format!("--update {other}: must be whole or rolling"))),
     }
 }
 

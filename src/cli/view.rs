@@ -4,6 +4,7 @@ use super::arriving::Arriving;
 use super::look::Look;
 use super::report_error::{nanoseconds, read};
 use super::shown::{Place, Wanted};
+use super::turns::Turns;
 use super::{Failure, failed, input, say};
 use echolume::gpu::window::{Pace, display};
 use echolume::gpu::{Context, GpuError, Wake};
@@ -62,15 +63,8 @@ pub struct View {
     /// Size of letters and buttons, 0.5 to 4
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     scale: f32,
-    /// whole: volumes are shown when all of their frames have come; rolling: each frame at once
-    #[arg(long, value_name = "HOW", default_value = "whole")]
-    update: String,
-    /// Volume images that take turns where volumes are whole, 2 or 3
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=3))]
-    images: u32,
-    /// Queues of the device that share the work, 1 to 3 [default: all that it has for different work]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
-    queues: Option<u8>,
+    #[command(flatten)]
+    turns: Turns,
     /// Time of a picture that is held while the view moves, such as 16ms; none: full quality always
     #[arg(long, value_name = "TIME", default_value = "33ms")]
     budget: String,
@@ -182,7 +176,7 @@ impl View {
         // Without a kiosk the end of the source is the end.
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
-        (options.images, options.queues) = (self.images, self.queues.map(usize::from));
+        (options.images, options.queues) = (self.turns.images, self.turns.queues());
         Ok(wanted)
     }
 
@@ -193,7 +187,7 @@ impl View {
         }
         let options = Options {
             settings: self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
-            update: super::stream::update(&self.update)?,
+            update: self.turns.update()?,
             cine: Room { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,

@@ -19,8 +19,8 @@ use std::time::Duration;
 const BYTES: Samples = Samples { stored: StoredType::U8, range: [0.0, 255.0] };
 
 /// A small abdominal wobbler.
-fn wobbler() -> Geometry {
-    Geometry::Sweep(Probe {
+fn wobbler() -> Probe {
+    Probe {
         array: Array::Curved { radius: 40.0 },
         lines: Axis::centred(0.02, 61),
         start_depth: 2.0,
@@ -30,11 +30,11 @@ fn wobbler() -> Geometry {
         slices: Axis::centred(0.05, 25),
         advance: Advance::None,
         sound_speed: 1540.0,
-    })
+    }
 }
 
 fn geometries() -> Vec<Geometry> {
-    let Geometry::Sweep(fan) = wobbler() else { unreachable!() };
+    let fan = wobbler();
     let linear = Probe {
         array: Array::Linear,
         lines: Axis::centred(1.1, 40),
@@ -88,7 +88,7 @@ struct Desk {
 impl Desk {
     fn new(toml: &str) -> Desk {
         Desk {
-            geometry: wobbler(),
+            geometry: Geometry::Sweep(wobbler()),
             controls: Controls::new(settings("", toml)),
             hand: Hand::default(),
             corner: [100.0, 30.0],
