@@ -127,6 +127,29 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
     }
 }
 
+/// What `tools/mutants` makes a crate of is a crate: nothing in it names a module that it leaves behind.
+#[test]
+fn what_mutants_are_planted_in_stands_alone() {
+    let tool = std::fs::read_to_string(top().join("tools/mutants")).expect("tools/mutants");
+    let list = tool.split("\npure=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its list");
+    let copied: Vec<String> = list.split_whitespace().map(|path| format!("src/{path}")).collect();
+    let stands = |name: &str| copied.iter().any(|path| name == path || name.starts_with(&format!("{path}/")));
+    let all = sources("src");
+    for (name, text) in all.iter().filter(|(name, _)| stands(name)) {
+        for module in code(text)
+            .split("crate::")
+            .skip(1)
+            .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next())
+        {
+            let there = |path: &String| path.trim_end_matches(".rs").split('/').nth(1) == Some(module);
+            assert!(copied.iter().any(there), "{name} names crate::{module}, which tools/mutants does not copy");
+        }
+        let folder = format!("{}/", name.trim_end_matches(".rs"));
+        let mut below = all.iter().filter(|(other, _)| other.starts_with(&folder));
+        assert!(below.all(|(other, _)| stands(other)), "{name} is copied by tools/mutants without {folder}");
+    }
+}
+
 #[test]
 fn the_embedded_shaders_are_what_their_sources_say() {
     let text = std::fs::read_to_string(top().join("spirv/SOURCES")).expect("spirv/SOURCES");

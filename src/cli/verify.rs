@@ -1,16 +1,17 @@
 //! `echolume verify`.
 
 use super::{Failure, failed, input, say, targets};
+use echolume::files::signals::Held;
 use echolume::files::{read_text, replace};
 use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
-
 use echolume::report::verify::baseline::{self, Compared, compare};
 use echolume::report::verify::{Level, Outcome, Run, Verdict, html, json, junit, words};
 use echolume::verify::self_test::{self, Caught};
 use echolume::verify::{self, Bench, Check};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::{Duration, Instant};
 
 /// Longest baseline that is read, bytes.
 const LONGEST: u64 = 256 << 20;
@@ -91,35 +92,32 @@ impl Verify {
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // What was not asked for is not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.wants(&o.group, &o.name)));
-        let mut run = self.checked(level)?;
+        let mut bench = self.bench(level)?;
+        let (mut run, stopped) = match self.self_test {
+            true => (self.tested(&bench)?, None),
+            false => self.checked(&mut bench)?,
+        };
         self.save_pictures(&mut run);
         let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
         self.write(&run, compared.as_ref())?;
-        self.judge(&run, compared.as_ref())
+        self.judge(&run, compared.as_ref(), stopped)
     }
 
-    /// What is looked at on the device, and what came of it.
-    fn checked(&self, level: Level) -> Result<Run, Failure> {
-        let mut bench = self.bench(level)?;
-        bench.program = std::env::current_exe().ok();
-        let device = &bench.context.candidate;
-        let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
-        let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };
-        say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
-        if self.self_test {
-            return self.tested(&bench);
-        }
+    /// What is looked at on the device, and what came of it; a signal, if one ended it early.
+    fn checked(&self, bench: &mut Bench) -> Result<(Run, Option<&'static str>), Failure> {
+        let held = Held::first();
+        announce(bench);
         let checks = match &self.against {
             Some(other) => {
                 let other = context(&ContextOptions { device: other.clone(), ..bench.options().clone() })?;
                 say!("against: {}, {}", other.candidate.name, other.candidate.driver.trim());
-                verify::against::checks(level, &other).map_err(failed)?
+                verify::against::checks(bench.level, &other).map_err(failed)?
             }
-            None => verify::checks(level),
+            None => verify::checks(bench.level),
         };
         let checks = self.chosen(checks)?;
-        let mut group: Vec<Outcome> = Vec::new();
-        let run = verify::run(&mut bench, &checks, |outcome| {
+        let (mut ran, mut group) = (0, Vec::<Outcome>::new());
+        let hear = |outcome: &Outcome| {
             if group.first().is_some_and(|first| first.group != outcome.group) {
                 tell(&std::mem::take(&mut group));
             }
@@ -128,13 +126,16 @@ impl Verify {
                 say!("{}", words::failure(outcome).trim_end());
             }
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
-        });
+            ran += 1;
+        };
+        let run = while_told(&held, || verify::run(bench, &checks, || held.signal(), hear));
         tell(&group);
-        Ok(run)
+        Ok((run, held.signal().filter(|_| ran < checks.len())))
     }
 
     /// Which planted fault each check notices.
     fn tested(&self, bench: &Bench) -> Result<Run, Failure> {
+        announce(bench);
         let begun = Instant::now();
         let tell = |caught: &Caught| match &caught.by {
             Some(by) => say!("{}: caught by {by}\n    {}", caught.fault, caught.found),
@@ -198,7 +199,7 @@ impl Verify {
         put(&self.html, || html::html(run, compared))
     }
 
-    fn judge(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
+    fn judge(&self, run: &Run, compared: Option<&Compared>, stopped: Option<&str>) -> Result<(), Failure> {
         if let Some(compared) = compared {
             say!("{}", words::comparison(compared).trim_end());
         }
@@ -206,6 +207,9 @@ impl Verify {
         let files: Vec<_> = run.failures().flat_map(|o| &o.faults).flat_map(|f| &f.files).collect();
         if !files.is_empty() {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
+        }
+        if let Some(signal) = stopped {
+            return Err(failed(format!("{signal} came before all {} checks were run", run.outcomes.len())));
         }
         let worse = compared.filter(|c| c.is_worse()).map_or(0, Compared::worse_checks);
         match (run.count(Verdict::Failed), worse) {
@@ -222,6 +226,30 @@ fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) ->
     replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
     say!("written: {}", file.display());
     Ok(())
+}
+
+fn announce(bench: &Bench) {
+    let device = &bench.context.candidate;
+    let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
+    let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };
+    say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
+}
+
+/// Says at once that a signal came: the check that runs may take a minute.
+fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
+    const OFTEN: Duration = Duration::from_millis(100);
+    let (working, works) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            while held.signal().is_none() && works.recv_timeout(OFTEN) == Err(RecvTimeoutError::Timeout) {}
+            if let Some(signal) = held.signal() {
+                say!("{signal}: ends after this check; once more, and it ends at once with nothing written");
+            }
+        });
+        let done = work();
+        drop(working);
+        done
+    })
 }
 
 fn tell(group: &[Outcome]) {

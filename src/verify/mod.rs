@@ -7,6 +7,7 @@
 pub mod against;
 mod aside;
 pub mod built_in;
+mod check;
 mod compared;
 pub mod drawn;
 pub mod failing;
@@ -30,13 +31,14 @@ use crate::gpu::single::Single;
 use crate::gpu::{Context, ContextOptions, GpuError};
 use crate::measuring::machine;
 use crate::passes::planted::Change;
-use crate::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Verdict};
+use crate::report::verify::{FORMAT, Level, Outcome, Run};
 use crate::scene::Scene;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use check::{Check, Found};
 pub use compared::{Comparison, Slack, compare};
 pub use drawn::Drawn;
 
@@ -187,89 +189,6 @@ impl Bench {
     }
 }
 
-/// What a check found.
-#[derive(Default)]
-pub struct Found {
-    pub figures: Vec<Figure>,
-    pub faults: Vec<Fault>,
-    pub notes: Vec<String>,
-    pub pictures: Vec<Shown>,
-    /// Not run, because this device or system lacks something: what.
-    pub left_out: Option<String>,
-}
-
-impl Found {
-    /// What was not run, and why.
-    pub fn left_out(why: impl Into<String>) -> Found {
-        Found { left_out: Some(why.into()), ..Found::default() }
-    }
-
-    /// A fault unless something holds.
-    pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
-        if !holds {
-            self.faults.push(Fault::new(what()));
-        }
-    }
-
-    /// Keeps an error, and makes it a fault where it is more than allowed. NaN is more than anything.
-    pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
-        let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
-        self.expect(within, what);
-        self.figures.push(figure);
-    }
-}
-
-type Work = Box<dyn Fn(&mut Bench) -> Result<Found, GpuError>>;
-
-/// One thing that is looked at.
-pub struct Check {
-    pub group: &'static str,
-    /// Unique in its group.
-    pub name: String,
-    work: Work,
-}
-
-impl Check {
-    pub fn new(
-        group: &'static str,
-        name: impl Into<String>,
-        work: impl Fn(&mut Bench) -> Result<Found, GpuError> + 'static,
-    ) -> Check {
-        Check { group, name: name.into(), work: Box::new(work) }
-    }
-
-    /// Runs it. A device that fails is a fault of its own, and the next check gets another context.
-    pub fn run(&self, bench: &mut Bench) -> Outcome {
-        let begun = Instant::now();
-        let mut found = (self.work)(bench).unwrap_or_else(|error| {
-            let mut found = Found::default();
-            found.faults.push(Fault::new(error.to_string()));
-            if error.is_device_lost() {
-                bench.renew().unwrap_or_else(|e| found.faults.push(Fault::new(format!("and no other device: {e}"))));
-            }
-            found
-        });
-        let complaints = bench.complaints();
-        found.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
-        let verdict = match (found.faults.is_empty(), &found.left_out) {
-            (false, _) => Verdict::Failed,
-            (true, Some(_)) => Verdict::LeftOut,
-            (true, None) => Verdict::Passed,
-        };
-        found.notes.extend(found.left_out);
-        Outcome {
-            group: self.group.into(),
-            name: self.name.clone(),
-            verdict,
-            seconds: begun.elapsed().as_secs_f64(),
-            figures: found.figures,
-            faults: found.faults,
-            notes: found.notes,
-            pictures: found.pictures,
-        }
-    }
-}
-
 /// Every check of a level, in running order.
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
@@ -289,20 +208,33 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other; `tell` hears of each as it is done.
-pub fn run(bench: &mut Bench, checks: &[Check], mut tell: impl FnMut(&Outcome)) -> Run {
+/// Runs checks one after the other; `tell` hears of each as it is done. Once `stop` has a reason no other is begun, and the one that ran
+/// then says nothing of the device: they are left out.
+pub fn run(
+    bench: &mut Bench,
+    checks: &[Check],
+    stop: impl Fn() -> Option<&'static str>,
+    mut tell: impl FnMut(&Outcome),
+) -> Run {
     let begun = Instant::now();
     let mut outcomes = Vec::new();
     let mut group = checks.first().map_or("", |check| check.group);
     for check in checks {
-        // What validation keeps of one group is none of the next one's: see `aside`.
-        if bench.options.validation && std::mem::replace(&mut group, check.group) != check.group {
-            let renewed = bench.renew();
-            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
-        }
-        let outcome = check.run(bench);
-        tell(&outcome);
-        outcomes.push(outcome);
+        let ran = stop().is_none().then(|| {
+            // What validation keeps of one group is none of the next one's: see `aside`.
+            if bench.options.validation && std::mem::replace(&mut group, check.group) != check.group {
+                let renewed = bench.renew();
+                renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+            }
+            check.run(bench)
+        });
+        outcomes.push(match (ran, stop()) {
+            (Some(outcome), None) => {
+                tell(&outcome);
+                outcome
+            }
+            (_, why) => check.stopped(why.unwrap_or("stopped")),
+        });
     }
     bench.run_of(outcomes, begun)
 }

@@ -2,9 +2,10 @@
 #![cfg(unix)]
 
 use super::common::*;
+use echolume::report::verify::{Verdict, json};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -74,7 +75,7 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     for (n, row) in [
         &["render", "-o", &png, "--size", "4096x4096", "--set", "ray.step=0.1"][..],
         &["profile", "--repeat", "10000", "--json", &json],
-        &["verify", "--only", "passes", "--json", &json],
+        &["verify", "--self-test", "--json", &json],
         &["report", "error", "--dial", "step", "-o", &dir],
         &["report", "tables", "--markdown", &md],
         &["filter", &picture, "--growth-table", "--csv", &json],
@@ -93,6 +94,29 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
         let left: Vec<_> = folder.names().into_iter().filter(|name| name != "report" && name != "in.pgm").collect();
         assert!(left.is_empty(), "{row:?} left {left:?}");
     }
+}
+
+/// What was found until then is written, and the rest is not said to be sound.
+#[test]
+fn a_signal_ends_verify_with_what_it_found() {
+    let folder = Folder::new("verify-stopped");
+    let [json, junit] = ["run.json", "run.xml"].map(|name| folder.path(name));
+    let mut child = start(program().args(["verify", "--only", "passes", "--json", &json, "--junit", &junit]));
+    let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
+    assert!(lines.next().expect("a line").starts_with("device: "));
+    signal(&child, Signal::INT);
+    let said: Vec<String> = lines.collect();
+    let mut error = String::new();
+    child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
+    assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said:?}");
+    assert!(said.iter().any(|line| line.starts_with("SIGINT: ends after this check")), "{said:?}");
+    let run = json::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    let all = run.outcomes.len();
+    assert_eq!(error.trim_end(), format!("echolume: SIGINT came before all {all} checks were run"));
+    let stopped = run.outcomes.iter().filter(|o| o.verdict == Verdict::LeftOut && o.notes == ["not run: SIGINT"]);
+    assert!(stopped.count() > 20, "{:?}", run.outcomes);
+    let skipped = fs::read_to_string(&junit).expect("written").matches("<skipped").count();
+    assert_eq!(skipped, run.count(Verdict::LeftOut));
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn every_pass_matches_its_reference() {
     let mut bench = Bench::new(&options, Level::Full).expect("bench");
     let checks = verify::passes::checks(Level::Full);
     assert_eq!(checks.len(), PASSES.len());
-    let run = verify::run(&mut bench, &checks, |_| ());
+    let run = verify::run(&mut bench, &checks, || None, |_| ());
     for outcome in &run.outcomes {
         let figure = |n: usize| format!("{} {:.2e}", outcome.figures[n].what, outcome.figures[n].value);
         println!("{:24} {}, {}; {}", outcome.name, figure(0), figure(1), outcome.notes.join(" "));

@@ -36,7 +36,7 @@ fn failures(bench: &mut Bench, checks: &[Check]) -> Vec<String> {
         outcome.figures.iter().for_each(|f| println!("    {} {}", f.what, f.value));
         outcome.notes.iter().for_each(|note| println!("    {note}"));
     };
-    let run = verify::run(bench, checks, tell);
+    let run = verify::run(bench, checks, || None, tell);
     let faults = |o: &Outcome| o.faults.iter().map(|f| format!("{}: {f:?}", o.name)).collect::<Vec<_>>();
     run.outcomes.iter().filter(|o| o.verdict == Verdict::Failed).flat_map(faults).collect()
 }
