@@ -228,9 +228,12 @@ fn other_levels_compare_what_both_have() {
         other.lines(),
         ["level: quick -> full", "passes / median: largest error 0.8 -> 1 levels, still under 2"]
     );
-    let note = "the levels differ (quick -> full): 4 checks that only the earlier run has and 1 that only this one has are \
-                not compared";
-    assert_eq!(other.notes, [note]);
+    let inputs = "the levels differ (quick -> full), and with them the inputs of passes: an error that is another may say nothing of \
+                  the device";
+    let checks = "checks that only the earlier run has, 4, and that only this one has, 1, are not compared";
+    assert_eq!(other.notes, [inputs, checks]);
+    let same = changed(|new| new.level = Level::Full);
+    assert_eq!(same.notes, [inputs]);
 }
 
 #[test]

@@ -156,14 +156,16 @@ pub fn compare(old: &Run, new: &Run, options: &Options) -> Compared {
         let missing = |o: &&Outcome| Change::new(Class::Changed, o, format!("missing; before it {}", was(o.verdict)));
         changes.extend(gone.iter().map(missing));
     } else {
-        let levels = [old, new].map(|run| run.level.word());
+        let [was, is] = [old, new].map(|run| run.level.word());
         notes.push(format!(
-            "the levels differ ({} -> {}): {} checks that only the earlier run has and {only_new} that only this one has are \
-             not compared",
-            levels[0],
-            levels[1],
-            gone.len()
+            "the levels differ ({was} -> {is}), and with them the inputs of passes: an error that is another may say nothing of the device"
         ));
+        if gone.len() + only_new > 0 {
+            let gone = gone.len();
+            notes.push(format!(
+                "checks that only the earlier run has, {gone}, and that only this one has, {only_new}, are not compared"
+            ));
+        }
     }
     let times = times::judged(&pairs, [old, new], options);
     changes.extend(errors::judged(&pairs));
