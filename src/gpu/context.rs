@@ -37,7 +37,8 @@ pub struct Context {
     pub candidate: Candidate,
     pub limits: vk::PhysicalDeviceLimits,
     pub device: ash::Device,
-    pub push_descriptor: ash::khr::push_descriptor::Device,
+    /// Descriptors are pushed, where the device can; else they are sets of a pool.
+    pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
     /// Reads the device's clock, where it can be read.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
@@ -162,7 +163,7 @@ impl Context {
             },
         };
         let context = Arc::new(Context {
-            push_descriptor: ash::khr::push_descriptor::Device::new(instance, &device),
+            push_descriptor: (candidate.pushes).then(|| ash::khr::push_descriptor::Device::new(instance, &device)),
             clock: (candidate.calibrated).then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
             queues: {

@@ -21,7 +21,7 @@ pub use beside::{Beside, Wake};
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
-    set_layout: vk::DescriptorSetLayout,
+    pub set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
 }
@@ -173,9 +173,11 @@ impl Pipeline {
                 if b.kind == Kind::Filtered { binding.immutable_samplers(&samplers) } else { binding }
             })
             .collect();
-        let create = vk::DescriptorSetLayoutCreateInfo::default()
-            .flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR)
-            .bindings(&bindings);
+        let flags = match context.push_descriptor {
+            Some(_) => vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR,
+            None => vk::DescriptorSetLayoutCreateFlags::empty(),
+        };
+        let create = vk::DescriptorSetLayoutCreateInfo::default().flags(flags).bindings(&bindings);
         // SAFETY: the structures are complete and outlive the calls; a failure below drops `pipeline`, which frees what is made.
         let set_layout = unsafe { device.create_descriptor_set_layout(&create, None) }.doing(doing)?;
         let mut pipeline = Pipeline {

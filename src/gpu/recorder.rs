@@ -1,6 +1,7 @@
 //! One command buffer: operations with the barriers they need, labels, time stamps, and their parameters.
 
 mod bind;
+mod sets;
 
 use super::GpuError;
 use super::context::Context;
@@ -17,6 +18,7 @@ use crate::barriers::{self, Access, Worker};
 use crate::passes::{Pass, Slot, Turn, contract};
 use crate::scene::Scene;
 use ash::vk;
+use sets::Sets;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -49,6 +51,8 @@ pub struct Recorder {
     commands: vk::CommandBuffer,
     params: Buffer,
     params_used: u64,
+    /// Where descriptors are not pushed.
+    sets: Sets,
     pub stamps: Option<Stamps>,
     /// Value of the timeline at which the last submission is done.
     done_at: u64,
@@ -82,6 +86,7 @@ impl Recorder {
             commands: vk::CommandBuffer::null(),
             params,
             params_used: 0,
+            sets: Sets::new(context),
             stamps,
             done_at: 0,
             collected_to: 0,
@@ -107,6 +112,7 @@ impl Recorder {
         }
         .doing(|| format!("record '{}'", self.label))?;
         self.params_used = 0;
+        self.sets.begin()?;
         if let Some(stamps) = &mut self.stamps {
             stamps.begin(self.commands);
             self.settle();
@@ -234,7 +240,7 @@ impl Recorder {
         self.context.begin_label(self.commands, pass.name);
         let block = contract::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, turn));
         let offset = self.place_params(&block)?;
-        self.bind(work, offset, block.len() as u64);
+        self.bind(work, offset, block.len() as u64)?;
         let extent = self.context.faults.invocations(pass, scene, turn);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
         let (device, commands) = (&self.context.device, self.commands);

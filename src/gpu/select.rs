@@ -40,6 +40,8 @@ pub struct Candidate {
     pub queues: Vec<QueueOf>,
     /// Time stamps can be put on the host's clock.
     pub calibrated: bool,
+    /// Descriptors can be pushed.
+    pub pushes: bool,
     /// Shader invocations can be counted.
     pub statistics: bool,
     /// Pictures can be shown on a window, with panels drawn over them.
@@ -128,7 +130,6 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let mut lacks = Vec::new();
     let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name.into()));
     need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
-    need(has(ash::khr::push_descriptor::NAME), "VK_KHR_push_descriptor");
     if properties.api_version >= vk::API_VERSION_1_3 {
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
@@ -161,6 +162,10 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     if !calibrated {
         without.push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
     }
+    let pushes = has(ash::khr::push_descriptor::NAME);
+    if !pushes {
+        without.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
+    }
     // SAFETY: as above.
     let statistics = unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
     if !statistics {
@@ -182,6 +187,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         without,
         queues,
         calibrated,
+        pushes,
         statistics,
         presents,
         limits: properties.limits,
@@ -268,6 +274,7 @@ mod tests {
             without: vec![],
             queues: vec![],
             calibrated: true,
+            pushes: true,
             statistics: true,
             presents: true,
             limits: vk::PhysicalDeviceLimits::default(),

@@ -163,6 +163,7 @@ fn lacks() -> Vec<Lack> {
         of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(Fetch::Storage), None),
         of("texels by texelFetch", |_| (), reading(Fetch::Textures), None),
         of("texels by imageLoad", |_| (), reading(Fetch::Storage), None),
+        of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
         of("one queue", |_| (), Options { queues: Some(1), ..plain() }, None),
         of("parameters 4096 bytes apart", |c| c.limits.min_uniform_buffer_offset_alignment = 4096, plain(), None),
         of("no time stamps", |c| c.candidate.queues.iter_mut().for_each(|q| q.valid_bits = 0), plain(), None),

@@ -61,7 +61,8 @@ pub fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: boo
             vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities[..count])
         })
         .collect();
-    let mut extensions = vec![ash::khr::push_descriptor::NAME.as_ptr()];
+    let mut extensions = Vec::new();
+    extensions.extend(candidate.pushes.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     extensions.extend(shows.then_some(ash::khr::swapchain::NAME.as_ptr()));
     let core = vk::PhysicalDeviceFeatures::default()

@@ -1,6 +1,7 @@
-//! What a dispatch's shader names, pushed as descriptors: slots by their names, and the parameters.
+//! What a dispatch's shader names, as descriptors: slots by their names, and the parameters. They are pushed, where the device can.
 
 use super::{Recorder, Work};
+use crate::gpu::GpuError;
 use crate::gpu::pipelines::descriptor_type;
 use crate::gpu::slots::Resource;
 use crate::passes::Part;
@@ -15,7 +16,7 @@ enum Listed {
 }
 
 impl Recorder {
-    pub(super) fn bind(&self, work: &Work, params_offset: u64, params_size: u64) {
+    pub(super) fn bind(&mut self, work: &Work, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Work { slots, pipeline, scene, pass, turn } = *work;
         let binds = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
         let mut images = Vec::with_capacity(binds.len());
@@ -62,10 +63,16 @@ impl Recorder {
                 (_, None) => {}
             }
         }
+        // Pushed descriptors go to no set.
+        let set = match self.context.push_descriptor {
+            Some(_) => vk::DescriptorSet::null(),
+            None => self.sets.take(pipeline)?,
+        };
         let writes: Vec<_> = places
             .iter()
             .map(|(binding, listed)| {
                 let write = vk::WriteDescriptorSet::default()
+                    .dst_set(set)
                     .dst_binding(binding.binding)
                     .descriptor_type(descriptor_type(binding.kind));
                 match *listed {
@@ -75,15 +82,19 @@ impl Recorder {
                 }
             })
             .collect();
-        // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait.
+        let (commands, point, layout) = (self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout);
+        // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait. A set of a
+        // pool was taken just now, so that nothing uses it yet.
         unsafe {
-            self.context.push_descriptor.cmd_push_descriptor_set(
-                self.commands,
-                vk::PipelineBindPoint::COMPUTE,
-                pipeline.layout,
-                0,
-                &writes,
-            );
+            match &self.context.push_descriptor {
+                Some(push) => push.cmd_push_descriptor_set(commands, point, layout, 0, &writes),
+                None => {
+                    let device = &self.context.device;
+                    device.update_descriptor_sets(&writes, &[]);
+                    device.cmd_bind_descriptor_sets(commands, point, layout, 0, &[set], &[]);
+                }
+            }
         }
+        Ok(())
     }
 }
