@@ -84,9 +84,9 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     }
     let scene = picture(
         [21, 10],
-        "perona_malik = { scheme = 'aos', conductance = 'exponential', edge = 0.5, step = 4.0, repeat = 1 }",
+        "perona_malik = { scheme = 'aos', conductance = 'exponential', edge = 0.5, step = 4.0, repeat = 2 }",
     );
-    assert_eq!((pass("aos_picture").repeat)(&scene), 4);
+    assert_eq!((pass("aos_picture").repeat)(&scene), 8);
     let shares = "picture_shares, picture_forward";
     for (iteration, expected) in [
         (0, format!("filter/aos_forward.picture: picture -> {shares} [10, 1, 1]")),
@@ -143,7 +143,7 @@ fn filters_that_were_not_asked_for_or_change_nothing_are_not_needed_and_say_why(
 fn filters_of_distance_maps_take_turns() {
     let scene = distances(
         [21, 10],
-        "median = 5, bilateral = { pixels = 1.2, distance = 2.0, repeat = 2 }, sigma = {}, enhanced_sigma = {}, perona_malik = {}",
+        "median = 5, bilateral = { pixels = 1.2, distance = 4.0, repeat = 2 }, sigma = {}, enhanced_sigma = {}, perona_malik = {}",
     );
     for (name, iteration, expected) in [
         ("median_distance", 0, "filter/median.distance: distance_map -> distance_a [21, 3, 1]"),
@@ -158,7 +158,7 @@ fn filters_of_distance_maps_take_turns() {
     assert_eq!(constants(&scene, "median_distance", 0), [("RADIUS", 2)]);
     assert_eq!(constants(&scene, "bilateral_distance", 0), [("RADIUS", 3)]);
     let expected =
-        [("place_narrowness", f64::from((0.5 / 1.44f64) as f32)), ("distance_narrowness", 0.125), ("slice", 1.0)];
+        [("place_narrowness", f64::from((0.5 / 1.44f64) as f32)), ("distance_narrowness", 0.03125), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "bilateral_distance"), expected);
     // Unless it is asked for nobody runs it; its numbers are told all the same.
     assert_eq!(constants(&distances([4, 4], ""), "bilateral_distance", 0), [("RADIUS", 2)]);

@@ -171,7 +171,7 @@ fn eliminated(weights: &[f64], values: &[&[f64]], i: usize) -> (f64, Vec<f64>) {
             let before = if j > 0 { weight(j - 1) } else { 0.0 };
             Row { before: -before, diagonal: 1.0 + before + weight(j), after: -weight(j), right }
         });
-        solved(rows.collect())[i]
+        last_unknown(&rows.collect::<Vec<_>>())
     };
     let channels = values[0].len();
     let forward = (0..channels).map(|c| last(values[..=i].iter().map(|v| v[c]).collect())).collect();
@@ -188,11 +188,12 @@ struct Row {
     right: f64,
 }
 
-/// Cyclic reduction (Hockney 1965): every other unknown is eliminated until one is left.
-fn solved(rows: Vec<Row>) -> Vec<f64> {
+/// The last unknown, by cyclic reduction (Hockney 1965): every other unknown is eliminated until one is left.
+fn last_unknown(rows: &[Row]) -> f64 {
     let none = Row { before: 0.0, diagonal: 1.0, after: 0.0, right: 0.0 };
+    let last = rows[rows.len() - 1];
     if rows.len() == 1 {
-        return vec![rows[0].right / rows[0].diagonal];
+        return last.right / last.diagonal;
     }
     let odd = (1..rows.len()).step_by(2).map(|i| {
         let (low, here, high) = (rows[i - 1], rows[i], rows.get(i + 1).copied().unwrap_or(none));
@@ -204,13 +205,6 @@ fn solved(rows: Vec<Row>) -> Vec<f64> {
             right: here.right - a * low.right - c * high.right,
         }
     });
-    let found = solved(odd.collect());
-    let mut all = vec![0.0; rows.len()];
-    found.into_iter().enumerate().for_each(|(n, u)| all[2 * n + 1] = u);
-    for i in (0..rows.len()).step_by(2) {
-        let before = if i > 0 { rows[i].before * all[i - 1] } else { 0.0 };
-        let after = if i + 1 < rows.len() { rows[i].after * all[i + 1] } else { 0.0 };
-        all[i] = (rows[i].right - before - after) / rows[i].diagonal;
-    }
-    all
+    let last_odd = last_unknown(&odd.collect::<Vec<_>>());
+    if rows.len().is_multiple_of(2) { last_odd } else { (last.right - last.before * last_odd) / last.diagonal }
 }
