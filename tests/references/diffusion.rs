@@ -60,6 +60,9 @@ fn an_explicit_step_moves_each_pixel_towards_its_four_neighbours() {
         &step(&source, 0.2, |g| 0.25 / (0.25 + g * g)),
         "distances",
     );
+    // Heat would carry a miss, far off as it is, to every hit beside it.
+    let scene = distances([8, 7], &explicit("quotient", "edge = inf, step = 0.2"));
+    same(&filtered(&scene, "perona_malik_distance", &source), &step(&source, 0.2, |_| 1.0), "heat of distances");
 }
 
 /// Differences of 0.1, 0.2 and 0.2 make a root mean square of sqrt(0.03): at that edge a half flows. Alpha flows with them and does
