@@ -101,6 +101,9 @@ fn the_flattest_mask_is_the_one_of_least_mean_square() {
     // A slope along x: 24/49 in the masks to its sides, against 4/7 above and 6/9 in the square. That towards +x is the first.
     let slope = plane([7, 7], |x, _| x as f64);
     is(estimated("estimator = 'nagao-matsuyama'", &slope, [3, 3]), 3.0 + 9.0 / 7.0);
+    // Along y it is that towards -y.
+    let slope = plane([7, 7], |_, y| y as f64);
+    is(estimated("estimator = 'nagao-matsuyama'", &slope, [3, 3]), 3.0 - 9.0 / 7.0);
     // A bright column two pixels away: whichever flat mask is taken, its mean is 0.25.
     let wall = plane([7, 7], |x, _| if x == 5 { 9.0 } else { 0.25 });
     is(estimated("estimator = 'nagao-matsuyama'", &wall, [3, 3]), 0.25);

@@ -105,6 +105,16 @@ fn few_that_are_alike_give_way_to_the_four_neighbours() {
     assert_eq!(filtered(&scene, "enhanced_sigma_slice", &one).one(0, 0, 0), 0.4);
 }
 
+/// Slopes whose centre is estimated at 3 + 9/7 along x and at 3 - 9/7 along y, by the first of two masks that are as flat: the pixels
+/// alike are the column at 4, and the row at 2.
+#[test]
+fn a_centre_is_estimated_from_what_lies_that_way() {
+    let scene = slices([7, 7], "enhanced_sigma = { window = 3, largest = 3, sigma = 0.2, centre = 'nagao-matsuyama' }");
+    let at = |slope: Texels| filtered(&scene, "enhanced_sigma_slice", &slope).one(3, 3, 0);
+    assert_eq!(at(plane([7, 7], |x, _| x as f64)), 4.0);
+    assert_eq!(at(plane([7, 7], |_, y| y as f64)), 2.0);
+}
+
 #[test]
 fn windows_of_distances_count_hits_only() {
     let scene = distances([12, 9], "enhanced_sigma = { window = 3, largest = 9, sigma = 0.125, centre = 'median' }");
