@@ -18,7 +18,7 @@ const LONGEST: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 everything is as it should be, 1 something is not, 2 usage or a file, 3 no device.\n\nExamples:\n  \
+    after_help = "Exit codes: 0 everything is as it should be, 1 something is not, or could not be written, 2 usage or an input, 3 no device.\n\nExamples:\n  \
                         echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
                         echolume verify --full --json before.json               (before the driver is updated)\n  \
                         echolume verify --full --baseline before.json --html after.html\n  \
@@ -53,7 +53,7 @@ pub struct Verify {
     #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
     pictures: PathBuf,
     /// Plant faults, one after the other, and say which check notices each; one that is not noticed is a failure
-    #[arg(long, conflicts_with_all = ["against", "full", "only", "list"])]
+    #[arg(long, conflicts_with_all = ["against", "baseline", "full", "only", "list"])]
     self_test: bool,
     /// Draw the pictures of every mode on this device too, and compare them
     #[arg(long, value_name = "N|NAME")]
@@ -91,7 +91,7 @@ impl Verify {
         targets::check(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // What was not asked for is not missing.
-        earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.wants(&o.group, &o.name)));
+        earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.looks_at(o)));
         let mut bench = self.bench(level)?;
         let (mut run, stopped) = match self.self_test {
             true => (self.tested(&bench)?, None),
@@ -128,9 +128,12 @@ impl Verify {
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
             ran += 1;
         };
-        let run = while_told(&held, || verify::run(bench, &checks, || held.signal(), hear));
+        let mut run = while_told(&held, || verify::run(bench, &checks, || held.signal(), hear));
         tell(&group);
-        Ok((run, held.signal().filter(|_| ran < checks.len())))
+        let stopped = held.signal().filter(|_| ran < checks.len());
+        // Whoever reads only the files is to see it too.
+        run.outcomes.extend(stopped.map(|signal| verify::stopped(signal, checks.len() - ran)));
+        Ok((run, stopped))
     }
 
     /// Which planted fault each check notices.
@@ -138,6 +141,7 @@ impl Verify {
         announce(bench);
         let begun = Instant::now();
         let tell = |caught: &Caught| match &caught.by {
+            _ if caught.left_out => say!("{}: left out\n    {}", caught.fault, caught.found),
             Some(by) => say!("{}: caught by {by}\n    {}", caught.fault, caught.found),
             None => say!("{}: NOT CAUGHT ({})\n    {}", caught.fault, caught.what, caught.found),
         };
@@ -167,6 +171,11 @@ impl Verify {
         }
     }
 
+    /// Whether this run would have had a check of an earlier one.
+    fn looks_at(&self, earlier: &Outcome) -> bool {
+        (earlier.group == "against") == self.against.is_some() && self.wants(&earlier.group, &earlier.name)
+    }
+
     fn wants(&self, group: &str, name: &str) -> bool {
         self.only.is_empty()
             || self.only.iter().any(|part| group.contains(part.as_str()) || name.contains(part.as_str()))
@@ -177,7 +186,8 @@ impl Verify {
         for outcome in run.outcomes.iter_mut().filter(|o| o.verdict == Verdict::Failed) {
             for shown in &outcome.pictures {
                 let Some(fault) = shown.fault.and_then(|at| outcome.faults.get_mut(at)) else { continue };
-                let name = file_name(&format!("{}-{}-{}", outcome.group, outcome.name, shown.what));
+                let of = shown.fault.map_or(0, |at| at + 1);
+                let name = file_name(&format!("{}-{}-{of}-{}", outcome.group, outcome.name, shown.what));
                 for (kind, picture) in
                     [("actual", &shown.actual), ("expected", &shown.expected), ("difference", &shown.difference)]
                 {
@@ -209,7 +219,7 @@ impl Verify {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
         }
         if let Some(signal) = stopped {
-            return Err(failed(format!("{signal} came before all {} checks were run", run.outcomes.len())));
+            return Err(failed(format!("{signal} came before all {} checks were run", run.outcomes.len() - 1)));
         }
         let worse = compared.filter(|c| c.is_worse()).map_or(0, Compared::worse_checks);
         match (run.count(Verdict::Failed), worse) {

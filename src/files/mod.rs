@@ -53,7 +53,11 @@ pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
     }
     check_place(file)?;
     let mut unfinished = Unfinished::create(file).map_err(|e| cannot(&e))?;
-    unfinished.write_all(bytes).and_then(|()| unfinished.rename()).map_err(|e| cannot(&e))
+    unfinished
+        .write_all(bytes)
+        .and_then(|()| unfinished.finish())
+        .and_then(|()| unfinished.rename())
+        .map_err(|e| cannot(&e))
 }
 
 /// Whether a file could be written there, before the work is done.

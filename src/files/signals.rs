@@ -94,6 +94,11 @@ impl Handlers {
     }
 }
 
+/// The last signal that came while somebody held them, if any: for work that can end early.
+pub fn received() -> Option<&'static str> {
+    handlers().signal().map(|(_, name)| name)
+}
+
 /// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process but are told by [`Held::signal`].
 #[derive(Debug)]
 pub struct Held {

@@ -18,6 +18,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
+/// The first layers whose synchronization validation surely knows timelines (Vulkan-ValidationLayers #8559, September 2024).
+const SEES_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
 
 #[derive(Clone, Debug)]
 pub struct ContextOptions {
@@ -34,6 +36,8 @@ pub struct Context {
     pub(super) shows: Option<Shows>,
     messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Box<Mutex<Vec<String>>>,
+    /// The validation layer sees that submissions wait for timelines.
+    sees_timelines: bool,
     pub candidate: Candidate,
     pub limits: vk::PhysicalDeviceLimits,
     pub device: ash::Device,
@@ -103,16 +107,18 @@ impl Context {
         let entry = load()?;
         // SAFETY: only reads the list of layers.
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
-        if options.validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION)) {
+        let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION));
+        if options.validation && layer.is_none() {
             return Err(GpuError::NoValidation);
         }
+        let sees_timelines = layer.is_some_and(|l| l.spec_version >= SEES_TIMELINES);
         // SAFETY: only reads the list of extensions.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
         let debug_utils = options.validation
             || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
         let instance = create_instance(&entry, options.validation, debug_utils, target)?;
         // The loader stays loaded until the instance is gone, also when nothing comes of it.
-        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, target);
+        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, sees_timelines, target);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
             unsafe { instance.destroy_instance(None) };
@@ -125,6 +131,7 @@ impl Context {
         instance: &ash::Instance,
         options: &ContextOptions,
         debug_utils: bool,
+        sees_timelines: bool,
         target: Option<&Target>,
     ) -> Result<Arc<Context>, GpuError> {
         let mut candidates = select::candidates(instance)?;
@@ -183,6 +190,7 @@ impl Context {
             entry,
             messenger,
             messages,
+            sees_timelines,
             candidate,
             device,
             allocator: Mutex::new(Some(allocator)),
@@ -206,6 +214,12 @@ impl Context {
     /// What validation has said so far; silence is the pass mark.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// Whether hazards between submissions that validation tells are some: older layers do not see that one queue waits for another's
+    /// timeline, and where there is one queue there is nothing to see.
+    pub fn hears_queues(&self) -> bool {
+        self.sees_timelines || self.queue_count() == 1
     }
 
     /// Bytes of device memory that something holds now.

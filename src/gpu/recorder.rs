@@ -126,12 +126,7 @@ impl Recorder {
         if self.context.shows.is_none() || !self.context.candidate.is_software() {
             return;
         }
-        let barrier = [vk::MemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-        // SAFETY: the command buffer is being recorded, outside any render pass.
-        unsafe { self.context.device.cmd_pipeline_barrier2(self.commands, &dependency) };
+        flush(&self.context.device, self.commands);
     }
 
     /// Adds the times of the last submission, once, when it is done.
@@ -248,7 +243,11 @@ impl Recorder {
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
         let dispatch = || {
-            for _ in 0..self.context.faults.times(pass.name) {
+            for n in 0..self.context.faults.times(pass.name) {
+                // One that is slow is so one after the other, also where there is room for several at once.
+                if n > 0 {
+                    flush(device, commands);
+                }
                 // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
                 unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
             }
@@ -328,6 +327,18 @@ impl Recorder {
     fn barrier(&self, order: &mut Order, accesses: &[Access]) {
         order.before(&self.context, self.queue, self.commands, accesses);
     }
+}
+
+/// Everything before it is done, and seen by everything behind it.
+fn flush(device: &ash::Device, commands: vk::CommandBuffer) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
+    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+    // SAFETY: the command buffer is being recorded, outside any render pass.
+    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
 }
 
 fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {

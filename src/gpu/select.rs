@@ -70,6 +70,11 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
+    /// Its memory is the machine's.
+    pub fn shares_memory(&self) -> bool {
+        self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
+    }
+
     /// Of the time stamps of the queue that renders; 0 for none.
     pub fn valid_bits(&self) -> u32 {
         self.queues.first().map_or(0, |q| q.valid_bits)

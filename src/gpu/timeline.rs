@@ -90,6 +90,16 @@ impl Timelines {
     }
 }
 
+impl Drop for Timelines {
+    fn drop(&mut self) {
+        // lavapipe (Mesa 22.3, `vk_queue_submit_destroy`) lets go of the timelines that a submission waited for after its own has told
+        // that it is done: one that is destroyed at once may still be locked there.
+        if let [first, _, ..] = &self.0[..] {
+            first.context.wait_idle();
+        }
+    }
+}
+
 impl Drop for Timeline {
     fn drop(&mut self) {
         // SAFETY: the owner waited for the device before it drops its timeline.

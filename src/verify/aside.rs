@@ -52,9 +52,15 @@ impl Aside {
 
     /// Adds what validation said as faults.
     pub fn tell(&self, found: &mut Found) {
-        let between = |m: &String| !self.hears && m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2");
-        let messages = self.context.messages();
-        let told = messages.iter().filter(|m| !between(m));
-        found.faults.extend(told.map(|message| Fault::new(format!("validation: {message}"))));
+        let told = told(&self.context, self.context.messages(), self.hears);
+        found.faults.extend(told.iter().map(|message| Fault::new(format!("validation: {message}"))));
     }
+}
+
+/// Messages of validation that are to be believed; those of hazards between submissions only where one hears them.
+pub(super) fn told(context: &Context, mut messages: Vec<String>, hears: bool) -> Vec<String> {
+    if !hears || !context.hears_queues() {
+        messages.retain(|m| !(m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2")));
+    }
+    messages
 }

@@ -59,7 +59,7 @@ impl Check {
     /// Runs it. A device that fails is a fault of its own, and the next check gets another context.
     pub fn run(&self, bench: &mut Bench) -> Outcome {
         let begun = Instant::now();
-        let mut found = (self.work)(bench).unwrap_or_else(|error| {
+        let mut found = self.found(bench).unwrap_or_else(|error| {
             let mut found = Found::default();
             found.faults.push(Fault::new(error.to_string()));
             if error.is_device_lost() {
@@ -78,10 +78,23 @@ impl Check {
         self.outcome(verdict, found, begun)
     }
 
+    /// What it finds, with the device's error as it is.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub(super) fn found(&self, bench: &mut Bench) -> Result<Found, GpuError> {
+        (self.work)(bench)
+    }
+
     /// It was not run, or not to its end.
     pub(super) fn stopped(&self, why: &str) -> Outcome {
         let found = Found { notes: vec![format!("not run: {why}")], ..Found::default() };
         self.outcome(Verdict::LeftOut, found, Instant::now())
+    }
+
+    pub(super) fn failed(&self, why: String) -> Outcome {
+        let found = Found { faults: vec![Fault::new(why)], ..Found::default() };
+        self.outcome(Verdict::Failed, found, Instant::now())
     }
 
     fn outcome(&self, verdict: Verdict, found: Found, begun: Instant) -> Outcome {

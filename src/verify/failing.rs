@@ -10,6 +10,7 @@ use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::Geometry;
+use crate::queues::MOST;
 use crate::report::verify::{Figure, Level, Unit};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -121,35 +122,57 @@ fn a_change(bench: &mut Bench) -> Result<Found, GpuError> {
     Ok(found)
 }
 
-/// After a submission that failed the same work can be sent again: its successors are ordered still.
+/// After a submission that failed the same work can be sent again: its successors are ordered still. Each of a volume and its picture
+/// fails once, however many there are with so many queues.
 fn submissions(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
-    let context = &aside.context;
-    let sound = sound(context, SMALL)?;
-    let format = Slot::Frames.format(&sound.scene);
-    for after in 0..12 {
-        let mut renderer = Renderer::new(context, sound.scene.clone(), &Options::default())?;
-        context.faults.inject(Seam::Submit, after, Failure::OutOfHostMemory.result());
-        let mut failed = 0;
-        for (k, frame) in sound.frames.iter().enumerate() {
-            let bytes = frame.encode(format);
-            if renderer.frame(k as u32, &bytes, 0).is_err() {
-                failed += 1;
-                renderer.frame(k as u32, &bytes, 0)?;
-            }
+    let mut found = Found::default();
+    let mut all = 0;
+    for queues in 1..=MOST {
+        let aside = Aside::of_queues(bench, queues)?;
+        let sound = sound(&aside.context, SMALL)?;
+        let mut after = 0;
+        while failed_once(&mut found, &aside.context, &sound, queues, after)? {
+            after += 1;
         }
-        renderer.show(0)?;
-        let picture = renderer.picture().or_else(|_| {
-            failed += 1;
-            renderer.picture()
-        })?;
-        context.faults.forget();
-        same(&mut found, &format!("submission {after} failed and was sent again"), &sound.picture, &picture);
-        found.expect(failed == u32::from(after < 10), || format!("submission {after} failed: {failed} errors"));
+        let least = sound.frames.len() as u32 + 1;
+        found.expect(after >= least, || format!("{queues} queues: only {after} submissions could fail"));
+        all += after;
+        aside.tell(&mut found);
     }
-    found.figures.push(count("submissions that failed", 10));
-    aside.tell(&mut found);
+    found.figures.push(count("submissions that failed", all as usize));
     Ok(found)
+}
+
+/// One submission fails, the `after`th, and what sent it is done once more. Whether there was such a submission.
+fn failed_once(
+    found: &mut Found,
+    context: &Arc<Context>,
+    sound: &Sound,
+    queues: usize,
+    after: u32,
+) -> Result<bool, GpuError> {
+    let format = Slot::Frames.format(&sound.scene);
+    let options = Options { queues: Some(queues), ..Options::default() };
+    let mut renderer = Renderer::new(context, sound.scene.clone(), &options)?;
+    context.faults.inject(Seam::Submit, after, Failure::OutOfHostMemory.result());
+    let mut failed = 0;
+    for (k, frame) in sound.frames.iter().enumerate() {
+        let bytes = frame.encode(format);
+        if renderer.frame(k as u32, &bytes, 0).is_err() {
+            failed += 1;
+            renderer.frame(k as u32, &bytes, 0)?;
+        }
+    }
+    renderer.show(0)?;
+    let picture = renderer.picture().or_else(|_| {
+        failed += 1;
+        renderer.picture()
+    })?;
+    context.faults.forget();
+    let what = format!("{queues} queues, submission {after} failed and was sent again");
+    same(found, &what, &sound.picture, &picture);
+    found.expect(failed <= 1, || format!("{queues} queues, submission {after} failed: {failed} errors"));
+    Ok(failed > 0)
 }
 
 /// A device that is lost or does not come back says what it was doing; another context on it draws as before.

@@ -4,7 +4,7 @@
 use super::aside::Aside;
 use super::built_in::{BYTES, scene, wall, wobbler};
 use super::failing::count;
-use super::{Bench, Check, Found, drawn, shown};
+use super::{Bench, Check, Found, drawn, modes, shown};
 use crate::gpu::{Context, Fetch, GpuError, Options, formats};
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
@@ -107,7 +107,8 @@ impl Largest {
         let fault = Some(found.faults.len());
         found.pictures.push(Shown { fault, ..shown::pictures(what, expected, got) });
         let [mean, most] = is;
-        found.faults.push(Fault::new(format!("{what}: {mean:.2} levels off on average, {most} at most")));
+        let said = format!("{what}: {mean:.2} levels off on average, {most} at most");
+        found.faults.push(Fault { worst: Some(modes::apart(expected, got).worst), ..Fault::new(said) });
     }
 
     fn tell(&self, found: &mut Found, [mean, most]: [f64; 2]) {

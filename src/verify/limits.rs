@@ -87,9 +87,9 @@ fn beyond(bench: &mut Bench) -> Result<Found, GpuError> {
 
 /// More volume images than the device has memory for.
 fn beyond_memory(bench: &mut Bench) -> Result<Found, GpuError> {
-    if bench.context.candidate.is_software() {
+    if bench.context.candidate.shares_memory() {
         return Ok(Found::left_out(
-            "a software device hands out memory that the machine has not, and is killed for it",
+            "a device in the machine's memory is handed out more than there is, and killed for it",
         ));
     }
     let (mut found, aside) = (Found::default(), Aside::new(bench)?);

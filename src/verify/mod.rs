@@ -185,7 +185,7 @@ impl Bench {
         let messages = self.context.messages();
         let new = messages[self.told.min(messages.len())..].to_vec();
         self.told = messages.len();
-        new
+        aside::told(&self.context, new, true)
     }
 }
 
@@ -208,8 +208,7 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other; `tell` hears of each as it is done. Once `stop` has a reason no other is begun, and the one that ran
-/// then says nothing of the device: they are left out.
+/// Runs checks one after the other; `tell` hears of each as it is done. Once `stop` has a reason no other is begun: they are left out.
 pub fn run(
     bench: &mut Bench,
     checks: &[Check],
@@ -220,21 +219,26 @@ pub fn run(
     let mut outcomes = Vec::new();
     let mut group = checks.first().map_or("", |check| check.group);
     for check in checks {
-        let ran = stop().is_none().then(|| {
-            // What validation keeps of one group is none of the next one's: see `aside`.
-            if bench.options.validation && std::mem::replace(&mut group, check.group) != check.group {
-                let renewed = bench.renew();
-                renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
-            }
-            check.run(bench)
-        });
-        outcomes.push(match (ran, stop()) {
-            (Some(outcome), None) => {
-                tell(&outcome);
-                outcome
-            }
-            (_, why) => check.stopped(why.unwrap_or("stopped")),
-        });
+        if let Some(why) = stop() {
+            outcomes.push(check.stopped(why));
+            continue;
+        }
+        // What validation keeps of one group is none of the next one's: see `aside`.
+        if bench.options.validation && std::mem::replace(&mut group, check.group) != check.group {
+            let renewed = bench.renew();
+            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+        }
+        // A driver that crashes says nothing more.
+        tracing::info!("check: {} / {}", check.group, check.name);
+        let outcome = check.run(bench);
+        tell(&outcome);
+        outcomes.push(outcome);
     }
     bench.run_of(outcomes, begun)
+}
+
+/// What stands for the checks that a signal left out: a run that was not whole is not sound.
+pub fn stopped(signal: &str, left: usize) -> Outcome {
+    Check::new("run", "every check was run", |_| Ok(Found::default()))
+        .failed(format!("{signal}: {left} checks were not"))
 }

@@ -8,7 +8,7 @@ use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
-use crate::report::verify::{Fault, Figure, Level, Unit, Worst};
+use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::report::whole;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{Options, Phantom};
@@ -21,6 +21,11 @@ pub const MEAN: f64 = 0.2;
 pub const FAR: u8 = 8;
 /// Share of a picture's values that may be far off: edges that move by a pixel where a detector's or a shadow's threshold is met.
 pub const EDGES: f64 = 0.02;
+
+/// Pixels along an edge of a tile: what one workgroup draws.
+const TILE: u32 = 8;
+/// Share of a tile's pixels that may be far off: an edge that moves by a pixel crosses it once or twice, a workgroup that is lost takes all.
+const LOST: f64 = 0.5;
 
 /// The same mean of scenes that were not chosen for their pictures: one flat colour half-way between two levels may be the other one
 /// everywhere, but for its alpha.
@@ -176,12 +181,11 @@ fn mode(bench: &mut Bench, name: &str) -> Result<Found, GpuError> {
     let expected = reference(&view.scene, &view.frames);
     let got = drawn::picture(&bench.context, &view.scene, &view.frames)?;
     judge(&mut found, name, &expected, &got);
-    found.pictures.push(shown::pictures("picture", &expected, &got));
-    let fault = (!found.faults.is_empty()).then_some(0);
-    found.pictures.iter_mut().for_each(|p| p.fault = fault);
     // A picture of one colour would be right of many wrong devices.
     let darkest = expected.rgba.chunks_exact(4).map(|p| p[1]).min();
     found.expect(darkest != expected.rgba.chunks_exact(4).map(|p| p[1]).max(), || "there is nothing to see".into());
+    let fault = (!found.faults.is_empty()).then_some(0);
+    found.pictures.push(Shown { fault, ..shown::pictures("picture", &expected, &got) });
     Ok(found)
 }
 
@@ -199,6 +203,8 @@ pub struct Apart {
     /// Share of the values that are.
     pub far: f64,
     pub largest: u8,
+    /// Largest share of a tile's pixels that are far off.
+    pub tile: f64,
     pub worst: Worst,
 }
 
@@ -225,7 +231,20 @@ pub fn apart(expected: &Picture, got: &Picture) -> Apart {
         beyond: far,
         texels: count,
     };
-    Apart { mean: sum / (count - far).max(1) as f64, far: far as f64 / count as f64, largest, worst }
+    let (mean, far) = (sum / (count - far).max(1) as f64, far as f64 / count as f64);
+    Apart { mean, far, largest, tile: worst_tile(expected, got), worst }
+}
+
+fn worst_tile(expected: &Picture, got: &Picture) -> f64 {
+    let across = expected.width.div_ceil(TILE).max(1);
+    let mut tiles = vec![[0u32; 2]; (across * expected.height.div_ceil(TILE)) as usize];
+    for (i, (e, g)) in expected.rgba.chunks_exact(4).zip(got.rgba.chunks_exact(4)).enumerate() {
+        let (x, y) = (i as u32 % expected.width, i as u32 / expected.width);
+        let is_far = e.iter().zip(g).any(|(e, g)| e.abs_diff(*g) > FAR);
+        let [far, all] = &mut tiles[(y / TILE * across + x / TILE) as usize];
+        (*far, *all) = (*far + u32::from(is_far), *all + 1);
+    }
+    tiles.iter().map(|[far, all]| f64::from(*far) / f64::from((*all).max(1))).fold(0.0, f64::max)
 }
 
 /// Keeps how far a picture is from the expected one, and says where it is too far.
@@ -236,23 +255,20 @@ pub fn judge(found: &mut Found, input: &str, expected: &Picture, got: &Picture) 
         });
     }
     let apart = apart(expected, got);
-    if apart.mean > MEAN || apart.far > EDGES {
+    if apart.mean > MEAN || apart.far > EDGES || apart.tile > LOST {
         let what = format!(
-            "mean difference {:.3} levels, {:.2} % of the values off by more than {FAR}",
+            "mean difference {:.3} levels, {:.2} % of the values off by more than {FAR}, up to {:.0} % of a tile's pixels",
             apart.mean,
-            100.0 * apart.far
+            100.0 * apart.far,
+            100.0 * apart.tile
         );
         found.faults.push(Fault { input: input.into(), worst: Some(apart.worst), ..Fault::new(what) });
     }
     found.figures.push(Figure::error("mean difference", apart.mean, MEAN, Unit::Levels));
     found.figures.push(Figure::error("values further off than 8 levels", apart.far, EDGES, Unit::Share));
-    found.figures.push(Figure {
-        what: "largest difference".into(),
-        value: apart.largest.into(),
-        allowed: None,
-        unit: Unit::Levels,
-        samples: Vec::new(),
-    });
+    found.figures.push(Figure::error("pixels of a tile that are", apart.tile, LOST, Unit::Share));
+    let largest = Figure::error("largest difference", apart.largest.into(), 0.0, Unit::Levels);
+    found.figures.push(Figure { allowed: None, ..largest });
 }
 
 /// The scenes that passes are held against their references in, whole: extremes of every setting, one after the other.

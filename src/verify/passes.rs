@@ -175,6 +175,7 @@ impl Sum {
             allowed: None,
             unit: Unit::Value,
             samples: Vec::new(),
+            fleeting: false,
         });
         found.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
         found.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));

@@ -3,11 +3,11 @@
 
 use super::aside::Aside;
 use super::built_in::Noise;
-use super::{Bench, Check, Drawn, Found, drawn, shown, threads};
+use super::{Bench, Check, Drawn, Found, drawn, modes, shown, threads};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::Slot;
 use crate::picture::Picture;
-use crate::report::verify::{Fault, Figure, Level, Unit};
+use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::source::igtl::crc64;
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -106,21 +106,18 @@ pub fn same(found: &mut Found, what: &str, expected: &Picture, got: &Picture) ->
     if expected == got {
         return true;
     }
-    let apart = expected.rgba.iter().zip(&got.rgba);
-    let (mut other, mut largest) = (0, 0);
-    for (a, b) in apart.filter(|(a, b)| a != b) {
-        (other, largest) = (other + 1, largest.max(a.abs_diff(*b)));
-    }
     let size = |p: &Picture| format!("{}x{}", p.width, p.height);
-    let said = match size(expected) == size(got) {
-        true => format!("{what}: {other} of {} values are others, by {largest} levels at most", expected.rgba.len()),
-        false => format!("{what}: expected {}, got {}", size(expected), size(got)),
-    };
-    if size(expected) == size(got) {
-        let fault = Some(found.faults.len());
-        found.pictures.push(crate::report::verify::Shown { fault, ..shown::pictures(what, expected, got) });
+    if size(expected) != size(got) {
+        found.expect(false, || format!("{what}: expected {}, got {}", size(expected), size(got)));
+        return false;
     }
-    found.faults.push(Fault::new(said));
+    let apart = modes::apart(expected, got);
+    let other = expected.rgba.iter().zip(&got.rgba).filter(|(a, b)| a != b).count();
+    let values = expected.rgba.len();
+    let said = format!("{what}: {other} of {values} values are others, by {} levels at most", apart.largest);
+    let fault = Some(found.faults.len());
+    found.pictures.push(Shown { fault, ..shown::pictures(what, expected, got) });
+    found.faults.push(Fault { worst: Some(Worst { beyond: other, ..apart.worst }), ..Fault::new(said) });
     false
 }
 

@@ -6,11 +6,12 @@ use super::built_in::{self, Noise};
 use super::failing::{count, returned};
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn};
+use crate::files::signals;
 use crate::gpu::{Context, Fetch, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::{Plan, Rerun};
-use crate::report::verify::Level;
+use crate::report::verify::{Figure, Level};
 use crate::scene::Scene;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -109,14 +110,15 @@ pub fn stress(bench: &mut Bench, seconds: f64, spoil: &Spoil) -> Result<Found, G
         pipelines: 0,
     };
     let goes_on = |stress: &Stress| begun.elapsed().as_secs_f64() < seconds || stress.compared < COMPARED;
-    while goes_on(&stress) && found.faults.len() < 8 {
+    // Minutes are too long for whoever waits for its end.
+    while goes_on(&stress) && found.faults.len() < 8 && signals::received().is_none() {
         stress.step(&mut found)?;
     }
+    found.left_out = signals::received().map(|signal| format!("not to its end: {signal}"));
     let (made, most) = ((pipelines() - before) as usize, stress.pipelines);
     found.expect(made <= most, || format!("{made} pipelines were made, {most} different ones were needed"));
-    found.figures.push(count("pictures", stress.pictures));
-    found.figures.push(count("renderers", stress.made));
-    found.figures.push(count("pipelines", made));
+    let done = [("pictures", stress.pictures), ("renderers", stress.made), ("pipelines", made)];
+    found.figures.extend(done.map(|(what, n)| Figure { fleeting: true, ..count(what, n) }));
     counted(&mut found, stress.compared, stress.wrong);
     drop(stress);
     returned(&mut found, context, held, "all renderers are gone");

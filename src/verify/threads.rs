@@ -74,6 +74,9 @@ fn begin(program: &Path, arguments: &[String], number: Option<u32>) -> std::io::
     let mut command = Command::new(program);
     command.args(arguments).env_remove(VARIABLE);
     command.envs(number.map(|n| (VARIABLE, n.to_string())));
+    // A signal that a terminal sends to all is for this program to tell of.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()
 }
 

@@ -161,8 +161,9 @@ pub fn any_run() -> impl Strategy<Value = Run> {
     let unit =
         prop::sample::select(vec![Unit::Value, Unit::Levels, Unit::Millimetres, Unit::Ns, Unit::Share, Unit::Count]);
     let samples = prop::collection::vec(0.0..1e9f64, 0..12);
-    let figure = (nasty(), value.clone(), prop::option::of(-1.0..10.0f64), unit, samples)
-        .prop_map(|(what, value, allowed, unit, samples)| Figure { what, value, allowed, unit, samples });
+    let figure = (nasty(), value.clone(), prop::option::of(-1.0..10.0f64), unit, samples).prop_map(
+        |(what, value, allowed, unit, samples)| Figure { what, value, allowed, unit, samples, fleeting: false },
+    );
     let worst = (nasty(), value.clone(), value, 0..9usize).prop_map(|(output, expected, got, beyond)| Worst {
         output,
         at: [beyond; 3],

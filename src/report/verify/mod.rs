@@ -131,6 +131,9 @@ pub struct Figure {
     /// Times one by one, in the order measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<f64>,
+    /// Depends on when it was measured, and says nothing of the device: told, and never compared.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fleeting: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -208,7 +211,7 @@ impl Fault {
 impl Figure {
     /// An error and what is allowed of it.
     pub fn error(what: impl Into<String>, value: f64, allowed: f64, unit: Unit) -> Figure {
-        Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new() }
+        Figure { what: what.into(), value, allowed: Some(allowed), unit, samples: Vec::new(), fleeting: false }
     }
 
     /// Times of one and the same work in the order measured, ns.
@@ -217,7 +220,7 @@ impl Figure {
     /// There are none, or one of them is not finite.
     pub fn times(what: impl Into<String>, samples: Vec<f64>) -> Result<Figure, SampleError> {
         let value = Sample::new(&samples)?.median();
-        Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples })
+        Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
     }
 
     /// How much of what is allowed it takes: beyond 1 fails, and what is not a number takes infinitely much. None where any

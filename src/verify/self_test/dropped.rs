@@ -8,7 +8,7 @@ use crate::passes::Texels;
 use crate::probe::Geometry;
 use crate::scene::Scene;
 use crate::verify::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
-use crate::verify::drawn;
+use crate::verify::{aside, drawn};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -103,6 +103,7 @@ fn by_oracle(options: &ContextOptions) -> Result<Caught, GpuError> {
             let missed = barriers - implied;
             format!("{missed} of {barriers} barriers and {waits} of {waits} waits in {runs} recordings; semaphores imply the rest")
         }),
+        left_out: false,
         seconds: begun.elapsed().as_secs_f64(),
     })
 }
@@ -117,11 +118,11 @@ fn by_layer(options: &ContextOptions) -> Result<Caught, GpuError> {
         what: "barriers are left out while synchronization validation looks on".into(),
         by: by.map(String::from),
         found,
+        left_out: false,
         seconds: begun.elapsed().as_secs_f64(),
     };
-    let watched = ContextOptions { validation: true, ..options.clone() };
     let recorded = |dropped: Option<u32>| -> Result<(u32, Vec<String>), GpuError> {
-        let context = Context::new(&watched)?;
+        let context = Context::new(options)?;
         let (scene, frames) = made(&toml)?;
         let mut renderer = Renderer::new(&context, scene, &Options::default())?;
         dropped.iter().for_each(|n| renderer.drop_barrier(*n));
@@ -129,14 +130,13 @@ fn by_layer(options: &ContextOptions) -> Result<Caught, GpuError> {
         renderer.picture()?;
         let barriers = renderer.barriers();
         drop(renderer);
-        Ok((barriers, context.messages()))
+        Ok((barriers, aside::told(&context, context.messages(), true)))
     };
-    let (barriers, messages) = match recorded(None) {
-        Err(GpuError::NoValidation) => {
-            return Ok(caught(Some("nothing"), "left out: there is no validation layer".into()));
-        }
-        recorded => recorded?,
-    };
+    if !options.validation {
+        let why = "the validation layer does not watch".to_string();
+        return Ok(Caught { left_out: true, ..caught(None, why) });
+    }
+    let (barriers, messages) = recorded(None)?;
     if let Some(message) = messages.first() {
         return Ok(caught(None, format!("nothing is left out, and validation says {message}")));
     }

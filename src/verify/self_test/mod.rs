@@ -26,6 +26,8 @@ pub struct Caught {
     pub by: Option<String>,
     /// What the check said, or why nothing did.
     pub found: String,
+    /// Nobody looked.
+    pub left_out: bool,
     /// s, host's clock.
     pub seconds: f64,
 }
@@ -33,18 +35,19 @@ pub struct Caught {
 impl Caught {
     /// As the other checks report: an uncaught fault is a failure.
     pub fn outcome(&self) -> Outcome {
-        let fault = || Fault::new(format!("not caught: {}", self.found));
+        let (verdict, faults, note) = match &self.by {
+            _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.found.clone())),
+            Some(by) => (Verdict::Passed, Vec::new(), Some(format!("caught by {by}: {}", self.found))),
+            None => (Verdict::Failed, vec![Fault::new(format!("not caught: {}", self.found))], None),
+        };
         Outcome {
             group: "self-test".into(),
             name: self.fault.clone(),
-            verdict: if self.by.is_some() { Verdict::Passed } else { Verdict::Failed },
+            verdict,
             seconds: self.seconds,
             figures: Vec::new(),
-            faults: if self.by.is_some() { Vec::new() } else { vec![fault()] },
-            notes: match &self.by {
-                Some(by) => vec![self.what.clone(), format!("caught by {by}: {}", self.found)],
-                None => vec![self.what.clone()],
-            },
+            faults,
+            notes: [Some(self.what.clone()), note].into_iter().flatten().collect(),
             pictures: Vec::new(),
         }
     }
@@ -109,36 +112,38 @@ impl Search {
         let looked = self.look(planted, &mut bench);
         let struck = bench.context.faults.struck();
         let (by, found) = match looked {
-            Some((by, found)) => (Some(by), found),
-            None if struck == 0 => (None, "nothing that a check runs is changed by it".into()),
-            None => (None, format!("{struck} changes, and every check passes")),
+            Ok((by, found)) => (Some(by), found),
+            Err(Some(error)) => (None, format!("the device refused it, and no check compared anything: {error}")),
+            Err(None) if struck == 0 => (None, "nothing that a check runs is changed by it".into()),
+            Err(None) => (None, format!("{struck} changes, and every check passes")),
         };
         let seconds = begun.elapsed().as_secs_f64();
-        Ok(Caught { fault: planted.name.into(), what: planted.what.into(), by, found, seconds })
+        Ok(Caught { fault: planted.name.into(), what: planted.what.into(), by, found, left_out: false, seconds })
     }
 
-    /// The first check that notices, and does not without the fault.
-    fn look(&mut self, planted: &Planted, bench: &mut Bench) -> Option<(String, String)> {
-        let scenes = bench.scenes();
+    /// The first check that notices, and does not without the fault; else what the device said, if it did not do as it was told: that is
+    /// no comparison, and notices nothing.
+    fn look(&mut self, planted: &Planted, bench: &mut Bench) -> Result<(String, String), Option<String>> {
+        let (scenes, mut refused) = (bench.scenes(), None);
         for (n, pass) in PASSES.iter().enumerate() {
             let concerned = (0..scenes.len()).filter(|s| planted.change.concerns(pass, &scenes[*s].1));
             for s in concerned.take(SCENES) {
-                let Some(found) = alarm(passes::in_scene(bench, n, s)) else { continue };
+                let Some(found) = alarm(passes::in_scene(bench, n, s), &mut refused) else { continue };
                 let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
                 let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));
-                if alarms.or_insert_with(|| alarm(passes::in_scene(sound, n, s))).is_none() {
-                    return Some((by, found));
+                if alarms.or_insert_with(|| sound_alarm(passes::in_scene(sound, n, s))).is_none() {
+                    return Ok((by, found));
                 }
             }
         }
         for check in &self.answers {
-            let Some(found) = failed(check.run(bench)) else { continue };
+            let Some(found) = alarm(check.found(bench), &mut refused) else { continue };
             let (by, sound) = (format!("{}, {}", check.group, check.name), &mut self.sound);
-            if self.alarms.entry(by.clone()).or_insert_with(|| failed(check.run(sound))).is_none() {
-                return Some((by, found));
+            if self.alarms.entry(by.clone()).or_insert_with(|| sound_alarm(check.found(sound))).is_none() {
+                return Ok((by, found));
             }
         }
-        None
+        Err(refused)
     }
 
     /// Whether what caught something passes with nothing planted.
@@ -149,21 +154,22 @@ impl Search {
             what: "a check that fails with nothing planted proves nothing".into(),
             by: alarm.is_none().then(|| "no check".into()),
             found: alarm.unwrap_or_else(|| format!("{} checks pass", self.alarms.len())),
+            left_out: false,
             seconds: 0.0,
         }
     }
 }
 
-/// The first thing that is wrong, in a line.
-fn alarm(found: Result<Found, GpuError>) -> Option<String> {
-    match found {
-        Ok(found) => found.faults.first().map(line),
-        Err(error) => Some(error.to_string()),
-    }
+/// The first thing that is wrong, in a line. An error of the device is kept aside.
+fn alarm(found: Result<Found, GpuError>, refused: &mut Option<String>) -> Option<String> {
+    let found = found.map_err(|error| refused.get_or_insert(error.to_string()).clone()).ok()?;
+    found.faults.first().map(line)
 }
 
-fn failed(outcome: Outcome) -> Option<String> {
-    outcome.faults.first().map(line)
+/// The same with nothing planted: there an error is an alarm, too.
+fn sound_alarm(found: Result<Found, GpuError>) -> Option<String> {
+    let mut refused = None;
+    alarm(found, &mut refused).or(refused)
 }
 
 fn number(value: f64) -> String {

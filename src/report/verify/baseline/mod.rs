@@ -219,7 +219,7 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
     let mut told = |figure: &Figure, what: &str| {
         changes.push(Change::new(Class::Changed, new, format!("{}: {what}", plain(&figure.what))));
     };
-    for figure in &new.figures {
+    for figure in new.figures.iter().filter(|f| !f.fleeting) {
         match old.figures.iter().find(|f| f.what == figure.what) {
             Some(earlier) if earlier.unit == figure.unit => pairs.push(Pair { of: new, old: earlier, new: figure }),
             Some(_) => told(figure, "measured in another unit than before, not compared"),
@@ -227,7 +227,9 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
             None => {}
         }
     }
-    for figure in old.figures.iter().filter(|f| both_passed && new.figures.iter().all(|g| g.what != f.what)) {
+    for figure in
+        old.figures.iter().filter(|f| both_passed && !f.fleeting && new.figures.iter().all(|g| g.what != f.what))
+    {
         told(figure, "measured before, and not now");
     }
     changes
