@@ -4,6 +4,7 @@
 use crate::common::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
 use echolume::passes::Span;
+use echolume::picture::Picture;
 use echolume::probe::Geometry;
 use echolume::report::verify::{Level, Outcome, Verdict};
 use echolume::verify::{self, Bench, Check, Found, built_in};
@@ -150,6 +151,25 @@ fn two_volumes_in_one_image_are_seen() {
     let [compared, wrong] =
         verify::hazards::taking_turns(&mut found, &bench.context, 1, 4, into_the_same).expect("pictures");
     assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
+}
+
+/// A tile of a picture is less than one in a hundred of its values: of all of them 2 may be far off, of a tile's half.
+#[test]
+fn one_lost_workgroup_of_a_picture_is_seen() {
+    let grey = Picture { width: 80, height: 64, rgba: vec![128; 4 * 80 * 64] };
+    let judged = |first: u32, size: [u32; 2]| {
+        let (mut found, mut got) = (Found::default(), grey.clone());
+        let place = |i: usize| [i as u32 % 80, i as u32 / 80];
+        let texels = got.rgba.chunks_exact_mut(4).enumerate();
+        let within = |at: u32, size: u32| (first..first + size).contains(&at);
+        let lost = texels.filter(|(i, _)| place(*i).iter().zip(size).all(|(at, size)| within(*at, size)));
+        lost.for_each(|(_, texel)| texel.fill(0));
+        verify::modes::judge(&mut found, "grey", &grey, &got);
+        found.faults.len()
+    };
+    assert_eq!(judged(16, [8, 8]), 1, "a workgroup");
+    assert_eq!(judged(16, [3, 24]), 0, "an edge that moved");
+    assert_eq!(judged(16, [0, 0]), 0);
 }
 
 #[test]

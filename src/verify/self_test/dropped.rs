@@ -101,7 +101,7 @@ fn by_oracle(options: &ContextOptions) -> Result<Caught, GpuError> {
         by: missed.is_none().then(|| "the barrier oracle".into()),
         found: missed.unwrap_or_else(|| {
             let missed = barriers - implied;
-            format!("{missed} of {barriers} barriers and {waits} of {waits} waits in {runs} recordings; semaphores imply the rest")
+            format!("{missed} of {barriers} barriers and {waits} of {waits} waits in {runs} recordings; the rest stand where a queue waits for another")
         }),
         left_out: false,
         seconds: begun.elapsed().as_secs_f64(),
