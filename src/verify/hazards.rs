@@ -4,13 +4,13 @@
 use super::aside::Aside;
 use super::built_in::{BYTES, Noise, scene, wall, wobbler};
 use super::repeats::{counted, same};
-use super::{Bench, Check, Found, drawn};
+use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
 use crate::queues::MOST;
-use crate::report::verify::Level;
+use crate::report::verify::{Fault, Level, Shown};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -194,7 +194,16 @@ fn any_order(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> R
                 let what = format!("image {image} of round {round}, {queues} queues, {:?}", scene.settings.mode);
                 let is_same = same(found, &what, &expected, &renderer.picture()?);
                 let there = renderer.read(Slot::Volume)?;
-                found.expect(there == volume, || format!("{what}: the volume is another"));
+                if there != volume {
+                    let fault = Some(found.faults.len());
+                    if let (Some(volume), Some(there)) = (&volume, &there) {
+                        let plane = volume.size[0] * volume.size[1] * volume.channels;
+                        let other = volume.values.iter().zip(&there.values).position(|(e, g)| e != g);
+                        let slice = other.map_or(0, |i| i / plane.max(1));
+                        found.pictures.push(Shown { fault, ..shown::shown("volume", volume, there, slice) });
+                    }
+                    found.faults.push(Fault::new(format!("{what}: the volume is another")));
+                }
                 sums = [sums[0] + 1, sums[1] + usize::from(!is_same)];
             }
         }

@@ -5,11 +5,12 @@ mod ramps;
 mod shadows;
 
 use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
-use super::{Bench, Check, Found, drawn};
+use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::{GpuError, Options, Renderer};
 use crate::passes::{MISS, Slot, Texels, is_hit};
+use crate::picture::Picture;
 use crate::probe::{Axis, Geometry, Grid, Probe};
-use crate::report::verify::{Fault, Figure, Level, Unit, Worst};
+use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::scene::Scene;
 use glam::DVec3;
 
@@ -43,6 +44,21 @@ fn fault(input: String, what: &str, output: &str, at: [usize; 3], [expected, got
     Fault { pass: None, input, worst: Some(worst), ..Fault::new(what) }
 }
 
+/// One channel of what was got, beside the same with what is known in its places: pictures of the last fault.
+fn show(
+    found: &mut Found,
+    what: &str,
+    got: &Texels,
+    channel: usize,
+    known: impl IntoIterator<Item = ([usize; 3], f64)>,
+) {
+    let got = Texels::from_fn(got.size, 1, |at, _| got.get(at)[channel]);
+    let mut expected = got.clone();
+    known.into_iter().for_each(|(at, value)| expected.set(at, &[value]));
+    let fault = found.faults.len().checked_sub(1);
+    found.pictures.push(Shown { fault, ..shown::shown(what, &expected, &got, 0) });
+}
+
 /// Opacity over a path of constant medium is 1 - (1 - a)^(voxels), whatever the step (Beer and Lambert).
 fn constant_medium(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut largest) = (Found::default(), 0.0f64);
@@ -70,6 +86,7 @@ fn constant_medium(bench: &mut Bench) -> Result<Found, GpuError> {
                         [4, 4, 0],
                         [share * expected, got],
                     ));
+                    show(&mut found, "picture", &picture, channel, [([4, 4, 0], share * expected)]);
                 }
             }
         }
@@ -88,7 +105,8 @@ fn thin_samples(bench: &mut Bench) -> Result<Found, GpuError> {
              [volume]\ntransfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = {opacity} }}]"
         );
         let scene = made(block(0.5, [4, 40, 4]), &toml)?;
-        let got = drawn::slot(&bench.context, &scene, &frames(&scene, |_| 1.0), Slot::Picture)?.get([1, 1, 0])[3];
+        let picture = drawn::slot(&bench.context, &scene, &frames(&scene, |_| 1.0), Slot::Picture)?;
+        let got = picture.get([1, 1, 0])[3];
         let expected = -(40.0 * (-opacity).ln_1p()).exp_m1();
         // 4e-6 is below R16F's normal numbers, which are 6e-8 apart there.
         let error = (got - expected).abs() / (tolerance * expected + 6e-8);
@@ -96,6 +114,7 @@ fn thin_samples(bench: &mut Bench) -> Result<Found, GpuError> {
         if error.is_nan() || error > 1.0 {
             let input = format!("opacity {opacity} a voxel, steps of {step} mm");
             found.faults.push(fault(input, "digits are lost on the way", "picture", [1, 1, 0], [expected, got]));
+            show(&mut found, "picture", &picture, 3, [([1, 1, 0], expected)]);
         }
     }
     found.figures.push(Figure::error("share of the tolerance", largest, 1.0, Unit::Share));
@@ -105,9 +124,11 @@ fn thin_samples(bench: &mut Bench) -> Result<Found, GpuError> {
 /// Distances of an output against what they are by formula; `None` where a ray cannot be judged.
 fn distances(found: &mut Found, got: &Texels, formula: impl Fn(usize, usize) -> Option<f64>, allowed: f64) {
     let (mut rays, mut holes, mut beyond, mut worst) = (0, 0, 0, (0.0f64, [0; 3], [0.0; 2]));
+    let mut known = Vec::new();
     for (x, y) in (0..got.size[1]).flat_map(|y| (0..got.size[0]).map(move |x| (x, y))) {
         let Some(expected) = formula(x, y) else { continue };
         let distance = got.one(x, y, 0);
+        known.push(([x, y, 0], expected));
         rays += 1;
         holes += usize::from(!is_hit(distance));
         let error = (distance - expected).abs();
@@ -122,6 +143,9 @@ fn distances(found: &mut Found, got: &Texels, formula: impl Fn(usize, usize) -> 
         let mut fault = fault(String::new(), "the surface is somewhere else", "distance_map", worst.1, worst.2);
         fault.worst.iter_mut().for_each(|w| (w.beyond, w.texels) = (beyond, rays));
         found.faults.push(fault);
+    }
+    if !found.faults.is_empty() {
+        show(found, "distance_map", got, 0, known);
     }
     found.figures.push(Figure::error("largest error", worst.0, allowed, Unit::Millimetres));
 }
@@ -199,6 +223,9 @@ fn levels(bench: &mut Bench) -> Result<Found, GpuError> {
                 let at = [i % 16, i / 16, 0];
                 let input = if floats { "a picture of floats, then of 8 bits" } else { "a picture straight of 8 bits" };
                 found.faults.push(fault(input.into(), "another level", "screen", at, [i as f64, f64::from(texel[0])]));
+                let expected = Picture { rgba: (0..=255).flat_map(|v| [v, v, v, 255]).collect(), ..picture.clone() };
+                let fault = found.faults.len().checked_sub(1);
+                found.pictures.push(Shown { fault, ..shown::pictures(input, &expected, &picture) });
             }
         }
     }
@@ -213,13 +240,15 @@ fn largest(bench: &mut Bench) -> Result<Found, GpuError> {
         let toml = "mode = 'mip'\npicture = { size = [12, 12] }\nray = { step = 0.5, sampling = 'exact' }\ncamera = { field_of_view = 0 }\npost = { floats = true }";
         let scene = made(block(0.5, [12, 24, 12]), toml)?;
         let frames = frames(&scene, |[_, y, _]| if y == depth { 0.8 } else { 0.2 });
-        let got = drawn::slot(&bench.context, &scene, &frames, Slot::Picture)?.get([6, 6, 0])[0];
+        let picture = drawn::slot(&bench.context, &scene, &frames, Slot::Picture)?;
+        let got = picture.get([6, 6, 0])[0];
         // Steps as long as voxels meet each between its middle and half a voxel beside it.
         let (low, high) = (0.5 - 0.002, 0.8 + 0.002);
         off = off.max(if (low..=high).contains(&got) { 0.0 } else { 1.0 });
         if !(low..=high).contains(&got) {
             let input = format!("a bright layer {depth} voxels deep");
             found.faults.push(fault(input, "the brightest sample is not seen", "picture", [6, 6, 0], [0.8, got]));
+            show(&mut found, "picture", &picture, 0, [([6, 6, 0], 0.8)]);
         }
     }
     found.figures.push(Figure::error("layers that are not seen", off, 0.0, Unit::Count));
@@ -242,10 +271,14 @@ fn turns(bench: &mut Bench) -> Result<Found, GpuError> {
     }
     for image in [1usize, 0, 2] {
         renderer.show(image as u32)?;
-        let (got, expected) = (renderer.picture()?.rgba[0], levels[image]);
+        let picture = renderer.picture()?;
+        let (got, expected) = (picture.rgba[0], levels[image]);
         if got != expected {
             let at = [f64::from(expected), f64::from(got)];
             found.faults.push(fault(format!("image {image}"), "another volume is shown", "screen", [0; 3], at));
+            let flat = [expected, expected, expected, 255].repeat(picture.rgba.len() / 4);
+            let (fault, flat) = (found.faults.len().checked_sub(1), Picture { rgba: flat, ..picture.clone() });
+            found.pictures.push(Shown { fault, ..shown::pictures(&format!("image {image}"), &flat, &picture) });
         }
     }
     Ok(found)

@@ -3,13 +3,13 @@
 
 use super::aside::Aside;
 use super::repeats::{counted, same};
-use super::{Bench, Check, Found, drawn};
+use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::faults::Poison;
 use crate::gpu::{Context, GpuError, Options};
 use crate::passes::slots::Filled;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
-use crate::report::verify::{Fault, Figure, Level, Unit, Worst};
+use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -111,6 +111,9 @@ fn look(
         sums.left += apart.left;
         if let Some(worst) = apart.worst {
             let what = format!("'{}' depends on what memory held before", slot.name());
+            let (fault, slice) = (Some(found.faults.len()), worst.at[2]);
+            let pictures = shown::shown(slot.name(), texels, &poisoned[0].slots[i].1, slice);
+            found.pictures.push(Shown { fault, ..pictures });
             let worst = Some(Worst { beyond: apart.depend, ..worst });
             found.faults.push(Fault { input: name.into(), worst, ..Fault::new(what) });
         }

@@ -153,6 +153,30 @@ fn two_volumes_in_one_image_are_seen() {
     assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
 }
 
+/// What is planted here is seen by the known answers; each that fails has pictures of one size that differ.
+#[test]
+fn a_known_answer_that_is_another_is_shown() {
+    let sound = bench();
+    for planted in verify::self_test::faults().filter(|p| ["stale slice", "shifted half pixel"].contains(&p.name)) {
+        let mut bench = sound.planted(planted.change).expect("bench");
+        let checks = verify::checks(Level::Quick).into_iter().filter(|check| check.group == "known answers");
+        let outcomes: Vec<Outcome> = checks.map(|check| check.run(&mut bench)).collect();
+        let failed: Vec<_> = outcomes.iter().filter(|o| o.verdict == Verdict::Failed).collect();
+        assert!(!failed.is_empty(), "{} is not noticed", planted.name);
+        for outcome in failed {
+            let shown = outcome.pictures.iter().find(|shown| shown.fault.is_some()).expect("pictures");
+            let size = (shown.actual.width, shown.actual.height);
+            assert_eq!(size, (shown.expected.width, shown.expected.height));
+            let fault = &outcome.faults[shown.fault.expect("its fault")];
+            assert!(fault.worst.is_some() || fault.what.contains("miss a surface"), "{fault:?}");
+            // A millionth is in the numbers, and in no picture of 8 bits.
+            let is_large = fault.worst.as_ref().is_none_or(|w| (w.expected - w.got).abs() > 1e-3);
+            let is_shown = shown.difference.rgba.chunks_exact(4).any(|texel| texel[0] > 0);
+            assert!(is_shown || !is_large, "{}: {fault:?}", outcome.name);
+        }
+    }
+}
+
 /// A tile of a picture is less than one in a hundred of its values: of all of them 2 may be far off, of a tile's half.
 #[test]
 fn one_lost_workgroup_of_a_picture_is_seen() {

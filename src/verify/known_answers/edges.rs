@@ -1,8 +1,8 @@
 //! Edges just above and below what makes a surface.
 
-use super::{block, fault};
+use super::{block, fault, show};
 use crate::gpu::GpuError;
-use crate::passes::{Slot, is_hit};
+use crate::passes::{MISS, Slot, is_hit};
 use crate::report::verify::{Figure, Unit};
 use crate::verify::built_in::{FLOATS, frames, scene};
 use crate::verify::{Bench, Found, drawn};
@@ -28,20 +28,25 @@ pub(super) fn contrast(bench: &mut Bench) -> Result<Found, GpuError> {
             let fits = |voxel: &usize| before(*voxel).floor() == before(voxel + 1).floor();
             let Some(dark) = (40..70).find(fits) else { continue };
             let frames = frames(&scene, |[_, y, _]| if y > dark { height * threshold } else { 0.0 });
-            let got = drawn::slot(&bench.context, &scene, &frames, Slot::Distance)?.one(4, 4, 0);
+            let map = drawn::slot(&bench.context, &scene, &frames, Slot::Distance)?;
+            let got = map.one(4, 4, 0);
             let input = || format!("{height} times a threshold of {threshold}, {place}");
+            let faults = found.faults.len();
+            let (origin, direction) = scene.rays.at(4.5, 4.5);
+            let expected = (scene.low.y + STEP * (before(dark).floor() + 1.0) - origin.y) / direction.y;
             if is_hit(got) != is_surface {
                 wrong += 1;
                 let what = if is_surface { "a surface is overlooked" } else { "something is taken for a surface" };
                 found.faults.push(fault(input(), what, "distance_map", [4, 4, 0], [height * threshold, got]));
             } else if is_surface && place == "peak" {
-                let (origin, direction) = scene.rays.at(4.5, 4.5);
-                let expected = (scene.low.y + STEP * (before(dark).floor() + 1.0) - origin.y) / direction.y;
                 aside = aside.max((got - expected).abs());
                 if (got - expected).abs() > 5e-4 {
                     let what = "the surface is somewhere else";
                     found.faults.push(fault(input(), what, "distance_map", [4, 4, 0], [expected, got]));
                 }
+            }
+            if found.faults.len() > faults {
+                show(&mut found, "distance_map", &map, 0, [([4, 4, 0], if is_surface { expected } else { MISS })]);
             }
         }
     }

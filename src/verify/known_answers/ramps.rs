@@ -1,6 +1,6 @@
 //! Ramps of space: where a texel lies is read off its value.
 
-use super::{fault, fine};
+use super::{fault, fine, show};
 use crate::gpu::GpuError;
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
@@ -73,6 +73,7 @@ fn along(bench: &mut Bench, axis: usize, view: &View, found: &mut Found) -> Resu
     let got = drawn::slot(&bench.context, &scene, &body_frames(&scene, level), Slot::Picture)?;
     let (sheet, mut largest, mut judged) = (scene.sheet(), 0.0f64, 0);
     let ([tile], Some(sweep)) = (&sheet.tiles[..], scene.probe()) else { return Ok(f64::NAN) };
+    let (faults, mut known) = (found.faults.len(), Vec::new());
     let from_middle = |at: usize, axis: usize| (at as f64 + 0.5 - f64::from(tile.size[axis]) / 2.0) * sheet.pixel;
     for (x, y) in (0..got.size[1]).flat_map(|y| (0..got.size[0]).map(move |x| (x, y))) {
         let p = tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1);
@@ -87,6 +88,7 @@ fn along(bench: &mut Bench, axis: usize, view: &View, found: &mut Found) -> Resu
             continue;
         }
         judged += 1;
+        known.push(([x, y, 0], expected));
         let seen = got.get([x, y, 0])[0];
         // A driver may store the value below or the one above.
         let rounding = Texels::spacing(Format::Rgba16f, expected);
@@ -98,6 +100,9 @@ fn along(bench: &mut Bench, axis: usize, view: &View, found: &mut Found) -> Resu
             let at = [x, y, 0];
             found.faults.push(fault(input, "what is there is somewhere else", "picture", at, [expected, seen]));
         }
+    }
+    if found.faults.len() > faults {
+        show(found, &format!("a ramp along {name}, plane {plane}"), &got, 0, known);
     }
     found.expect(judged > 200, || format!("only {judged} texels of a ramp along {name} can be judged"));
     Ok(largest)

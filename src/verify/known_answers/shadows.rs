@@ -4,7 +4,7 @@ use crate::gpu::GpuError;
 use crate::gpu::renderer::size_of;
 use crate::passes::shade::shadow;
 use crate::passes::{Arrays, Slot, Texels, Turn};
-use crate::report::verify::{Fault, Figure, Unit};
+use crate::report::verify::{Fault, Figure, Shown, Unit};
 use crate::verify::built_in::{BYTES, scene, wobbler};
 use crate::verify::passes::POISON;
 use crate::verify::shown::shown;
@@ -34,7 +34,8 @@ pub(super) fn of_a_hill(bench: &mut Bench) -> Result<Found, GpuError> {
     let edge = expected.get("shadow").values.iter().filter(|v| (0.02..0.98).contains(*v)).count();
     found.expect(edge > 150, || format!("only {edge} texels are an edge of the shadow"));
     if let Some(worst) = compared.worst {
-        found.pictures.push(shown("shadow", expected.get("shadow"), got.get("shadow"), 0));
+        let fault = Some(found.faults.len());
+        found.pictures.push(Shown { fault, ..shown("shadow", expected.get("shadow"), got.get("shadow"), 0) });
         found.faults.push(Fault { worst: Some(worst), ..Fault::new("the edge of a shadow is another") });
     }
     let allowed = shadow::PASS.tolerance.outliers;
