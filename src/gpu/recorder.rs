@@ -126,7 +126,8 @@ impl Recorder {
         if self.context.shows.is_none() || !self.context.candidate.is_software() {
             return;
         }
-        flush(&self.context.device, self.commands);
+        // Of no memory: what the derivation leaves out is still seen to be missing.
+        flush(&self.context.device, self.commands, vk::AccessFlags2::NONE);
     }
 
     /// Adds the times of the last submission, once, when it is done.
@@ -205,7 +206,7 @@ impl Recorder {
             for n in 0..self.context.faults.times(pass.name) {
                 // One that is slow is so one after the other, also where there is room for several at once.
                 if n > 0 {
-                    flush(device, commands);
+                    flush(device, commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
                 }
                 // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
                 unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
@@ -252,13 +253,13 @@ impl Recorder {
     }
 }
 
-/// Everything before it is done, and seen by everything behind it.
-fn flush(device: &ash::Device, commands: vk::CommandBuffer) {
+/// Everything before it is done, and what was written is there for `memory` behind it.
+fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFlags2) {
     let barrier = [vk::MemoryBarrier2::default()
         .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-        .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+        .src_access_mask(memory & vk::AccessFlags2::MEMORY_WRITE)
         .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-        .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)];
+        .dst_access_mask(memory)];
     let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
     // SAFETY: the command buffer is being recorded, outside any render pass.
     unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
