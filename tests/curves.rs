@@ -1,11 +1,11 @@
 //! Error against run time without a device: the measures, the front, the choice, the file, the plot.
 
+use echolume::error_report::choose::{cheapest_under, most_accurate_under};
+use echolume::error_report::metrics::{distances, normals, pictures};
+use echolume::error_report::orders::{Range, fit};
+use echolume::error_report::pareto_front::{front, of_report};
+use echolume::error_report::{Dial, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, plot};
 use echolume::passes::{MISS, Texels};
-use echolume::report::curves::choose::{cheapest_under, most_accurate_under};
-use echolume::report::curves::front::{front, of_report};
-use echolume::report::curves::metrics::{distances, normals, pictures};
-use echolume::report::curves::orders::{Range, fit};
-use echolume::report::curves::{Dial, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, plot};
 use proptest::prelude::*;
 use std::path::Path;
 

@@ -288,7 +288,7 @@ fn no_unusable_frame_changes_the_volume_or_goes_uncounted() {
     let counts = Counts { refused: 13, ..Counts::default() };
     assert_eq!(compounder.counts(), counts);
     assert!(volume(&mut compounder).iter().all(|v| *v == 0.0));
-    // Beside the volume, and back in it with pixels that are no numbers.
+    // AsyncPipelineCompiler the volume, and back in it with pixels that are no numbers.
     let away = with(&|p| p.translation.z += 100.0);
     assert_eq!(compounder.push(&frame(away, [4, 4], StoredType::U8, &[9; 16])), Ok(0));
     let bytes = floats(&[1.0, f32::NAN, f32::INFINITY, -1e31]);

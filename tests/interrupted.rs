@@ -6,9 +6,9 @@ use echolume::probe::motor::simulate::{Options, Simulator};
 use echolume::probe::motor::tmcl::command;
 use echolume::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
 use echolume::source::live::Event;
+use echolume::source::motor_tracking::{self, Clock, FreeRunning, Swept};
 use echolume::source::phantom;
 use echolume::source::recorder::Replay;
-use echolume::source::swept::{self, Clock, FreeRunning, Swept};
 use rustix::process::{Signal, getpid, kill_process};
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
     let options = phantom::Options { volumes: 2, lines: 16, samples: 16, ..phantom::Options::default() };
     let phantom = FreeRunning::phantom(options, motor.speed()).expect("a phantom");
     let source = FreeRunning::new(phantom, motor.watch().clone());
-    let options = swept::Options { clock: Clock::Arrival { delay: 0.0 }, holds: false };
+    let options = motor_tracking::Options { clock: Clock::Arrival { delay: 0.0 }, holds: false };
     let feed = Feed::new(Box::new(Swept::new(Box::new(source), motor, options)), Some(&file)).expect("a thread");
 
     let (begun, mut frames) = (Instant::now(), 0);

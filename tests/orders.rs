@@ -1,8 +1,8 @@
 //! Orders of the compositing rules in f64, and what spoils them.
 
+use echolume::error_report::analytic::{Field, Flaw, NONE, errors, steps};
+use echolume::error_report::orders::{Fit, Range, fit};
 use echolume::passes::raycast::composite::Rule;
-use echolume::report::curves::analytic::{Field, Flaw, NONE, errors, steps};
-use echolume::report::curves::orders::{Fit, Range, fit};
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];
 const RAYS: usize = 256;

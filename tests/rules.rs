@@ -1,7 +1,7 @@
 //! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
 //! Needs no GPU.
 
-use echolume::passes::{PASSES, Pass, Turn, contract, measure};
+use echolume::passes::{DispatchArgs, PASSES, Pass, interface_check, measure};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene};
 use echolume::shader_source;
@@ -48,19 +48,22 @@ fn layers_hold() {
         ("src/scene", &["crate::gpu", "crate::passes", "crate::plan", "crate::barriers", "ash::vk"]),
         ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
-        ("src/plan.rs", &["crate::gpu", "ash::vk"]),
+        ("src/plan", &["crate::gpu", "ash::vk"]),
         ("src/barriers", &["crate::gpu", "ash::vk"]),
         ("src/queues.rs", &["crate::gpu", "ash::vk"]),
         ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),
         ("src/files", &["crate::", "ash::vk"]),
-        ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::report", "ash::vk"]),
-        ("src/report", &["crate::gpu", "crate::measuring", "crate::verify", "ash::vk"]),
-        ("src/gpu", &["crate::report", "crate::measuring", "crate::verify"]),
+        ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::profile", "crate::verify", "ash::vk"]),
+        ("src/verify/report", &["crate::gpu", "ash::vk"]),
+        ("src/gpu", &["crate::profile", "crate::error_report", "crate::thesis_tables", "crate::verify"]),
         ("src/verify", &["ash::", "crate::live", "crate::ui", "crate::kiosk"]),
-        ("src/measuring", &["ash::vk"]),
-        ("src/live", &["crate::report", "crate::measuring", "ash::vk"]),
-        ("src/kiosk", &["crate::gpu", "crate::report", "crate::measuring", "ash::", "winit::", "egui::"]),
+        ("src/profile", &["crate::verify", "crate::error_report", "ash::vk"]),
+        ("src/error_report", &["crate::verify", "ash::vk"]),
+        ("src/thesis_tables", &["crate::verify", "ash::vk"]),
+        ("src/reference", &["crate::gpu", "ash::vk"]),
+        ("src/live", &["crate::profile", "crate::error_report", "crate::verify", "ash::vk"]),
+        ("src/kiosk", &["crate::gpu", "crate::profile", "crate::verify", "ash::", "winit::", "egui::"]),
         ("src/cli", &["ash::vk", "use ash"]),
     ];
     let all = sources("src");
@@ -247,17 +250,17 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
     for scene in scenes() {
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             for iteration in 0..(pass.repeat)(&scene) {
-                let turn = Turn { iteration, ..Turn::default() };
-                let shader = (pass.shader)(&scene, &turn);
+                let args = DispatchArgs { iteration, ..DispatchArgs::default() };
+                let shader = (pass.shader)(&scene, &args);
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
                 // As it is compiled, and with its textures as storage images.
-                let words = contract::for_scene(pass, &scene, &turn, &spirv::words(bytes)).expect("the scene's");
-                let stored = contract::for_cpu(pass, &scene, &turn, &words, |_| true);
+                let words = interface_check::for_scene(pass, &scene, &args, &spirv::words(bytes)).expect("the scene's");
+                let stored = interface_check::for_cpu(pass, &scene, &args, &words, |_| true);
                 let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
                 for words in [&words, &stored] {
                     let module = spirv::reflect(words).expect("reflection");
-                    let agreed = contract::check(pass, &scene, &turn, &module);
+                    let agreed = interface_check::check(pass, &scene, &args, &module);
                     agreed.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
                 }
                 let left = spirv::reflect(&stored).expect("reflection").bindings;
@@ -269,9 +272,9 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
     }
     let scene = measure::scene(8, 8).expect("scene");
     for pass in measure::MEASURES {
-        let shader = (pass.shader)(&scene, &Turn::default());
+        let shader = (pass.shader)(&scene, &DispatchArgs::default());
         let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
-        contract::check(pass, &scene, &Turn::default(), &module).expect("agreement");
+        interface_check::check(pass, &scene, &DispatchArgs::default(), &module).expect("agreement");
         used.push(shader);
     }
     for (name, _) in spirv::EMBEDDED {
@@ -287,7 +290,7 @@ fn a_disagreement_names_both_sides() {
     let changed = |change: fn(&mut Pass)| {
         let mut pass = Pass { ..*tone };
         change(&mut pass);
-        contract::check(&pass, &scene, &Turn::default(), &module).unwrap_err()
+        interface_check::check(&pass, &scene, &DispatchArgs::default(), &module).unwrap_err()
     };
     let error = changed(|p| p.reads = |_, _| vec![echolume::passes::whole("pictur", echolume::passes::Slot::Picture)]);
     assert!(error.contains("pictur") && error.contains("reads"), "{error}");

@@ -24,8 +24,8 @@ mod turns;
 mod verify;
 mod view;
 
+use crate::kiosk::rotating::{self, Rotating};
 use clap::{Parser, Subcommand};
-use echolume::kiosk::rotating::{self, Rotating};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use super::common::*;
-use echolume::report::verify::{Verdict, json};
+use echolume::verify::report::{Verdict, json};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};

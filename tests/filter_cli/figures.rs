@@ -90,7 +90,7 @@ fn reference(
     let toml = format!("mode = 'plane'\npicture = {{ size = [1, 1] }}\nslices = {{ format = 'r32f', {slices} }}");
     let scene = echolume::scene::Scene::new(grid, input, toml::from_str(&toml).expect("settings")).expect("scene");
     let frame = echolume::passes::Texels { size, channels: 1, values: grey.shares() };
-    echolume::report::whole::render(&scene, &[frame])
+    echolume::reference::render(&scene, &[frame])
 }
 
 /// The rows of a growth table: sigma, window, largest, and shares.

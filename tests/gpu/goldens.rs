@@ -4,7 +4,7 @@ use crate::common::*;
 use echolume::passes::{Slot, Texels};
 use echolume::picture::Picture;
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::report::whole;
+use echolume::reference;
 use echolume::scene::Scene;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -61,7 +61,7 @@ fn file(name: &str) -> PathBuf {
 fn pictures_match_the_stored_ones_that_the_reference_made() {
     let device = Device::new();
     for (name, scene, frames) in goldens() {
-        let expected = as_picture(&whole::render(&scene, &frames)[&Slot::Screen]);
+        let expected = as_picture(&reference::render(&scene, &frames)[&Slot::Screen]);
         if std::env::var_os("ECHOLUME_MAKE_GOLDENS").is_some() {
             std::fs::create_dir_all(file(name).parent().expect("folder")).expect("folder");
             expected.save(&file(name)).expect("saved");

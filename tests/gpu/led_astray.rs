@@ -2,10 +2,10 @@
 
 use crate::common::*;
 use crate::detector::{STEP, columns, depths, ramp};
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
-use echolume::gpu::single::Single;
-use echolume::passes::slots::Filled;
-use echolume::passes::{Arrays, Slot, Texels, Turn, is_hit};
+use echolume::passes::slots::Initializer;
+use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
 
 /// What noise does to a wall: the spread of the places, and shares of all rays.
@@ -287,7 +287,7 @@ fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
 #[test]
 fn every_detector_follows_its_reference_through_noise() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let pass = echolume::passes::by_name("raycast_surface").expect("pass");
     let geometries = [
         ("box", Geometry::Cartesian(Grid { size: [40, 96, 24], spacing: [1.0, STEP, 1.0], origin: [0.0; 3] })),
@@ -310,7 +310,7 @@ fn every_detector_follows_its_reference_through_noise() {
                 [0.5, 1.5, 2.5][n % 3]
             );
             let scene = scene(geometry.clone(), FLOATS, &toml);
-            let turn = Turn::default();
+            let args = DispatchArgs::default();
             let mut noise = Noise(n as u64);
             let [width, height, slices] = scene.volume_size().map(|n| n as usize);
             // Layers along the rays, rough and smooth by turns.
@@ -318,26 +318,26 @@ fn every_detector_follows_its_reference_through_noise() {
             let blob = |y: usize| 0.5 + 0.5 * (y as f64 * 0.35).sin();
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
             let mut inputs = Arrays::default();
-            for bind in (pass.reads)(&scene, &turn) {
+            for bind in (pass.reads)(&scene, &args) {
                 let size = size_of(bind.slot.shape(&scene));
                 let mut texels = Texels::from_fn(size, bind.slot.format(&scene).channels(), |at, _| match bind.slot {
                     Slot::Volume => f64::from(value(at) as f32),
                     _ => 0.0,
                 });
-                if let Filled::ByScene(make) = bind.slot.filled() {
+                if let Initializer::ByScene(make) = bind.slot.filled() {
                     texels.values = make(&scene).into_iter().map(f64::from).collect();
                 }
                 inputs.insert(bind.name, texels);
             }
             assert_eq!(inputs.get("volume").size, [width, height, slices]);
             let mut expected = Arrays::default();
-            for bind in (pass.writes)(&scene, &turn) {
+            for bind in (pass.writes)(&scene, &args) {
                 let channels = bind.slot.format(&scene).channels();
                 expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(&scene)), channels));
             }
             let mut mistaken = expected.clone();
-            (pass.reference)(&scene, &turn, &inputs, &mut expected);
-            let got = single.run(&scene, pass, &turn, &inputs, 0.5).expect("dispatch");
+            (pass.reference)(&scene, &args, &inputs, &mut expected);
+            let got = single.run(&scene, pass, &args, &inputs, 0.5).expect("dispatch");
             let (expected, got) = (expected.get("distance_map"), got.get("distance_map"));
             let differ = |wanted: &Texels| {
                 let pairs = wanted.values.iter().zip(&got.values);
@@ -347,7 +347,7 @@ fn every_detector_follows_its_reference_through_noise() {
             // Told of a quarter more noise, the reference must go another way.
             let mut wrong = scene.clone();
             wrong.settings.surface.noise *= 1.25;
-            (pass.reference)(&wrong, &turn, &inputs, &mut mistaken);
+            (pass.reference)(&wrong, &args, &inputs, &mut mistaken);
             noticed += differ(mistaken.get("distance_map"));
             let hits = expected.values.iter().filter(|e| is_hit(**e)).count();
             let share = off as f64 / expected.values.len() as f64;

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use echolume::gpu::{Options, Renderer};
-use echolume::passes::tables::scan_index;
+use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Probe};
 use echolume::scene::{Input, Scene, Settings, SliceGrid};

@@ -4,10 +4,10 @@
 use crate::common::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::chain::rectangle;
-use echolume::passes::{Slot, Texels, Turn};
+use echolume::passes::{DispatchArgs, Slot, Texels};
 use echolume::plan::Rerun;
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Mode, RING, Scene, Seen};
+use echolume::scene::{Mode, RING, Scene, VisibleBounds};
 use glam::DVec3;
 
 fn moved(probe: Probe) -> Probe {
@@ -45,10 +45,10 @@ fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
 }
 
 /// The texels that the device's filter mixes at these indices.
-fn mixed(scene: &Scene, at: [f64; 3]) -> Seen {
+fn mixed(scene: &Scene, at: [f64; 3]) -> VisibleBounds {
     let last = scene.volume_size().map(|n| f64::from(n - 1));
     let clamped = |v: f64, axis: usize| v.clamp(0.0, last[axis]) as u32;
-    Seen {
+    VisibleBounds {
         low: std::array::from_fn(|a| clamped(at[a].floor(), a)),
         high: std::array::from_fn(|a| clamped(at[a].floor() + 1.0, a) + 1),
     }
@@ -119,7 +119,7 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
         let (mut shares, mut cases) = (0.0, 0);
         for _ in 0..60 {
             let scene = random_scene(&geometry, &mut noise);
-            let mut found: Option<Seen> = None;
+            let mut found: Option<VisibleBounds> = None;
             for _ in 0..4000 {
                 let Some(at) = sampled(&scene, &mut noise).and_then(|place| texel(&scene, place)) else { continue };
                 let mixed = mixed(&scene, at);
@@ -130,7 +130,7 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
                     toml::to_string(&scene.settings).unwrap()
                 );
                 let old = found.unwrap_or(mixed);
-                found = Some(Seen {
+                found = Some(VisibleBounds {
                     low: std::array::from_fn(|a| old.low[a].min(mixed.low[a])),
                     high: std::array::from_fn(|a| old.high[a].max(mixed.high[a])),
                 });
@@ -158,7 +158,7 @@ fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
     let all =
         |toml: &str| scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\nslices.pixels = 200\n{toml}"));
     let whole = all("").seen;
-    assert_eq!(whole, Seen::all(all("").volume_size()));
+    assert_eq!(whole, VisibleBounds::all(all("").volume_size()));
     let cuts = |toml: &str| {
         let seen = all(toml).seen;
         let sides = (0..3).flat_map(|a| [seen.low[a] > whole.low[a] + 1, seen.high[a] + 1 < whole.high[a]]);
@@ -172,7 +172,11 @@ fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
     assert!(cuts("region.depth = [-9, 20]").contains(&3), "the far side");
     assert_eq!(cuts("volume.start_depth = 30"), cuts("region.depth = [30, 90]"));
     assert_eq!(cuts("clip = [{ at = [5, 0, 0], normal = [2, 0, 0] }]"), [1]);
-    assert_eq!(all("clip = [{ at = [500, 0, 0], normal = [-1, 0, 0] }]").seen, Seen::default(), "all is cut away");
+    assert_eq!(
+        all("clip = [{ at = [500, 0, 0], normal = [-1, 0, 0] }]").seen,
+        VisibleBounds::default(),
+        "all is cut away"
+    );
     assert_eq!(cuts("region.lateral = [-5, 5]\nslices.everything = true"), [0; 0]);
 }
 
@@ -274,7 +278,7 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
         .expect("recorded");
     assert_eq!(renderer.skipped(), 9 - frames.len() as u64);
     for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
-        let made = rectangle(&scene, name, &Turn::default()).expect("a pass over slices");
+        let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
         // Some passes make four texels an invocation.
         let run = |axis: usize| {
@@ -289,7 +293,7 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
     for (slot, pass, slices) in
         [(Slot::SharpVolume, "gaussian_lateral", frames), (Slot::Volume, "gaussian_elevation", scene.seen.slices())]
     {
-        let made = rectangle(&scene, pass, &Turn::default()).expect("a pass over slices");
+        let made = rectangle(&scene, pass, &DispatchArgs::default()).expect("a pass over slices");
         let volume = renderer.read(slot).expect("read").expect("there");
         let [width, height, depth] = volume.size;
         let mut written = 0;

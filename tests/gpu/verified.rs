@@ -6,7 +6,7 @@ use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
 use echolume::passes::Span;
 use echolume::picture::Picture;
 use echolume::probe::Geometry;
-use echolume::report::verify::{Level, Outcome, Verdict};
+use echolume::verify::report::{Level, Outcome, Verdict};
 use echolume::verify::{self, Bench, Check, Found, built_in};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;

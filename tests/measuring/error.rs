@@ -1,9 +1,9 @@
 //! `echolume report error` on a device: what it measures is what it says, and what it advises holds where it has not looked.
 
 use crate::scenes::*;
-use echolume::measuring::dials::dial;
-use echolume::measuring::error::{Asked, Held};
-use echolume::report::curves::{Measure, Reference, Report, choose};
+use echolume::error_report::dials::dial;
+use echolume::error_report::measure::{Asked, Held};
+use echolume::error_report::{Measure, Reference, Report, choose};
 use echolume::scene::Scene;
 use echolume::scene::load::Layers;
 

@@ -1,10 +1,10 @@
 //! The profile's numbers on a device: an injected slow pass is found, and runs that are alike are not called different.
 
 use crate::scenes::*;
-use echolume::measuring::profile::{Asked, Run, run};
-use echolume::passes::{Turn, by_name};
-use echolume::report::profile::compare::{Options, Verdict, compare};
-use echolume::report::profile::{formats, trace};
+use echolume::passes::{DispatchArgs, by_name};
+use echolume::profile::compare::{Options, Verdict, compare};
+use echolume::profile::measure::{Asked, Run, run};
+use echolume::profile::{formats, trace};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }
@@ -99,7 +99,7 @@ fn a_profile_adds_up_and_survives_being_written() {
     assert_eq!((of("scan_convert").runs_per_picture, of("light").runs_per_picture), (15, 1));
     // Invocations of the sigma filter, in groups of 8 x 8; each reads what the windows of four pixels hold.
     let sigma = by_name("sigma_slice").expect("pass");
-    let [width, height, _] = sigma.invocations(&scene(SETTINGS), &Turn::default()).map(u64::from);
+    let [width, height, _] = sigma.invocations(&scene(SETTINGS), &DispatchArgs::default()).map(u64::from);
     assert_eq!(of("sigma_slice").invocations, Some(15 * width.next_multiple_of(8) * height.next_multiple_of(8)));
     assert_eq!(of("sigma_slice").fetches, Some(15 * width * height * 3 * 6));
     assert_eq!(of("tone").bytes_written, 96 * 96 * 4);

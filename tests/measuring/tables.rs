@@ -3,15 +3,15 @@
 use crate::scenes::alone;
 use crate::scenes::device;
 use echolume::gpu::{Options, Renderer};
-use echolume::measuring::tables::sweep::{BALL_RADIUS, frames, surface_depth};
-use echolume::measuring::tables::{Asked, growth, growth_settings, run, scene};
-use echolume::passes::{Slot, Stage, Texels, Turn, is_hit};
+use echolume::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
 use echolume::picture::grey::Grey;
 use echolume::plan::Plan;
-use echolume::report::growth::{Growth, SIGMAS, WINDOWS};
-use echolume::report::tables::{Conditions, Filter3d, markdown, tables};
-use echolume::report::whole;
+use echolume::reference;
 use echolume::scene::{MAX_WINDOW, Scene};
+use echolume::thesis_tables::measure::{Asked, growth, growth_settings, run, scene};
+use echolume::thesis_tables::sweep::{BALL_RADIUS, frames, surface_depth};
+use echolume::thesis_tables::window_growth::{Growth, SIGMAS, WINDOWS};
+use echolume::thesis_tables::{Conditions, Filter3d, markdown, tables};
 
 fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
     let steps = plan.steps.iter().filter(|s| (s.pass.stage == Stage::Preprocess) == first);
@@ -21,7 +21,7 @@ fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
 /// What a pass of the plan was specialized by.
 fn constant(plan: &Plan, scene: &Scene, pass: &str, name: &str) -> i32 {
     let step = plan.steps.iter().find(|s| s.pass.name == pass).expect("pass");
-    let constants = (step.pass.constants)(scene, &Turn::default());
+    let constants = (step.pass.constants)(scene, &DispatchArgs::default());
     constants.iter().find(|c| c.0 == name).expect("constant").1
 }
 
@@ -139,8 +139,9 @@ fn growth_is_the_reference_s() {
     assert!(WINDOWS.iter().flatten().all(|w| *w <= MAX_WINDOW));
     let frame = Texels { size: [40, 32, 1], channels: 1, values: grey.shares() };
     for row in &grown.rows {
-        let scene = echolume::measuring::growth::scene(&grey, growth_settings(row.sigma, row.windows)).expect("scene");
-        let slots = whole::render(&scene, std::slice::from_ref(&frame));
+        let scene = echolume::thesis_tables::measure_growth::scene(&grey, growth_settings(row.sigma, row.windows))
+            .expect("scene");
+        let slots = reference::render(&scene, std::slice::from_ref(&frame));
         let reference = Growth::new(row.sigma, row.windows, &slots[&Slot::Growth].values);
         // A pixel whose count is decided by rounding may stop a ring earlier or later.
         let moved: u64 = row.counts.iter().zip(&reference.counts).map(|(a, b)| a.abs_diff(*b)).sum();

@@ -2,16 +2,16 @@
 
 use super::{FILTERED, cartesian, scene};
 use echolume::barriers::{Access, Resource, Worker, Workers, accesses};
-use echolume::passes::{Slot, Turn, by_name};
+use echolume::passes::{DispatchArgs, Slot, by_name};
 use std::ops::Range;
 
 /// Slot, volume image, and parts.
 type Touched = Vec<(Slot, u32, Range<u32>)>;
 
 /// What it reads and what it writes.
-fn touched(name: &str, turn: Turn) -> (Touched, Touched) {
+fn touched(name: &str, args: DispatchArgs) -> (Touched, Touched) {
     let scene = scene(cartesian([6, 8, 5]), FILTERED);
-    let all = accesses(&scene, by_name(name).expect("pass"), &turn);
+    let all = accesses(&scene, by_name(name).expect("pass"), &args);
     let of = |write| {
         let part = |a: &Access| match a.resource {
             Resource::Slot(slot, image) => (slot, image, a.parts.clone()),
@@ -25,11 +25,11 @@ fn touched(name: &str, turn: Turn) -> (Touched, Touched) {
 
 #[test]
 fn a_pass_over_frames_touches_its_layer_and_one_over_slices_its_slice() {
-    let turn = Turn { layer: 2, slice: 3, image: 1, ..Turn::default() };
-    let (reads, writes) = touched("load_slice", turn);
+    let args = DispatchArgs { layer: 2, slice: 3, image: 1, ..DispatchArgs::default() };
+    let (reads, writes) = touched("load_slice", args);
     assert_eq!(reads, [(Slot::Frames, 0, 2..3)]);
     assert_eq!(writes, [(Slot::SliceA, 0, 0..1)]);
-    let (reads, writes) = touched("aos_slice", Turn { iteration: 7, ..turn });
+    let (reads, writes) = touched("aos_slice", DispatchArgs { iteration: 7, ..args });
     let whole = |slot| (slot, 0, 0..1);
     assert_eq!(reads, [whole(Slot::SliceShares), whole(Slot::SliceForward), whole(Slot::SliceRows)]);
     assert_eq!(writes, [(Slot::SharpVolume, 1, 3..4)]);
@@ -37,11 +37,13 @@ fn a_pass_over_frames_touches_its_layer_and_one_over_slices_its_slice() {
 
 #[test]
 fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
-    let around = |slice, slices| touched("gaussian_elevation", Turn { slice, slices, image: 1, ..Turn::default() });
+    let around = |slice, slices| {
+        touched("gaussian_elevation", DispatchArgs { slice, slices, image: 1, ..DispatchArgs::default() })
+    };
     assert_eq!(around(0, 1), (vec![(Slot::SharpVolume, 1, 0..4)], vec![(Slot::Volume, 1, 0..1)]));
     assert_eq!(around(4, 1), (vec![(Slot::SharpVolume, 1, 1..5)], vec![(Slot::Volume, 1, 4..5)]));
     assert_eq!(around(1, 2), (vec![(Slot::SharpVolume, 1, 0..5)], vec![(Slot::Volume, 1, 1..3)]));
-    let (reads, writes) = touched("raycast_projection", Turn { image: 1, ..Turn::default() });
+    let (reads, writes) = touched("raycast_projection", DispatchArgs { image: 1, ..DispatchArgs::default() });
     assert_eq!((&reads[0], &writes[0]), (&(Slot::Volume, 1, 0..5), &(Slot::Picture, 0, 0..1)));
 }
 

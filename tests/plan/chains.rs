@@ -4,20 +4,20 @@ use super::{cartesian, fan, scene};
 use echolume::passes::chain::{
     copied, distance_end, distance_link, picture_end, picture_link, rectangle, rendered, slice_link,
 };
-use echolume::passes::{Slot, Turn};
+use echolume::passes::{DispatchArgs, Slot};
 use echolume::probe::Advance;
-use echolume::scene::{Input, Scene, Seen};
+use echolume::scene::{Input, Scene, VisibleBounds};
 use echolume::source::StoredType;
 
-fn turn(iteration: u32) -> Turn {
-    Turn { iteration, ..Turn::default() }
+fn args(iteration: u32) -> DispatchArgs {
+    DispatchArgs { iteration, ..DispatchArgs::default() }
 }
 
 #[test]
 fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() {
     let filters = "slices = { median = true, sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }";
     let frames = scene(cartesian([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
-    let link = |name: &str, iteration| slice_link(&frames, name, &turn(iteration));
+    let link = |name: &str, iteration| slice_link(&frames, name, &args(iteration));
     assert_eq!(link("load_slice", 0), (Slot::Frames, Slot::SliceA));
     assert_eq!(link("median_slice", 0), (Slot::SliceA, Slot::SliceB));
     assert_eq!(link("sigma_slice", 0), (Slot::SliceB, Slot::SliceA));
@@ -27,7 +27,7 @@ fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() 
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
     }
     let smoothed = scene(cartesian([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
-    assert_eq!(slice_link(&smoothed, "median_slice", &turn(0)), (Slot::SliceA, Slot::SharpVolume));
+    assert_eq!(slice_link(&smoothed, "median_slice", &args(0)), (Slot::SliceA, Slot::SharpVolume));
 }
 
 #[test]
@@ -38,11 +38,11 @@ fn a_chain_of_no_filter_ends_where_it_begins() {
         cartesian([8, 8, 5]),
         "distance = { median = 3, perona_malik = { repeat = 3 } }\npost = { sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }",
     );
-    assert_eq!(distance_link(&filtered, "median_distance", &turn(0)), (Slot::Distance, Slot::DistanceA));
-    assert_eq!(distance_link(&filtered, "perona_malik_distance", &turn(1)), (Slot::DistanceB, Slot::DistanceA));
+    assert_eq!(distance_link(&filtered, "median_distance", &args(0)), (Slot::Distance, Slot::DistanceA));
+    assert_eq!(distance_link(&filtered, "perona_malik_distance", &args(1)), (Slot::DistanceB, Slot::DistanceA));
     assert_eq!(distance_end(&filtered), Slot::DistanceB);
-    assert_eq!(picture_link(&filtered, "sigma_picture", &turn(0)), (Slot::Picture, Slot::SmoothPicture));
-    assert_eq!(picture_link(&filtered, "aos_picture", &turn(5)), (Slot::SmoothPictureB, Slot::SmoothPicture));
+    assert_eq!(picture_link(&filtered, "sigma_picture", &args(0)), (Slot::Picture, Slot::SmoothPicture));
+    assert_eq!(picture_link(&filtered, "aos_picture", &args(5)), (Slot::SmoothPictureB, Slot::SmoothPicture));
     assert_eq!(picture_end(&filtered), Slot::SmoothPicture);
 }
 
@@ -80,7 +80,7 @@ fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
 /// A slice of 400 x 400 of which columns and rows from `low` up to `high` are seen.
 fn seen(filters: &str, low: u32, high: u32) -> Scene {
     let scene = scene(cartesian([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
-    Scene { seen: Seen { low: [low, low, 0], high: [high, high, 3] }, ..scene }
+    Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..scene }
 }
 
 /// How many columns and rows around what is seen a pass makes, by when it takes whole workgroups of 32 more: to the left and right, above
@@ -88,8 +88,8 @@ fn seen(filters: &str, low: u32, high: u32) -> Scene {
 fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
     let whole = seen(filters, 192, 224);
     let of = |low, high| {
-        let scene = Scene { seen: Seen { low: [low, low, 0], high: [high, high, 3] }, ..whole.clone() };
-        rectangle(&scene, pass, &turn(iteration)).expect("a rectangle")
+        let scene = Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..whole.clone() };
+        rectangle(&scene, pass, &args(iteration)).expect("a rectangle")
     };
     let before = |axis: usize| (192..224).filter(|low| of(*low, 230).first[axis] == 160).count() as u32;
     let behind = |axis: usize| {
@@ -129,7 +129,7 @@ fn each_filter_makes_as_much_more_as_those_behind_it_look_at() {
 #[test]
 fn rectangles_end_with_whole_workgroups_or_at_the_border() {
     let of =
-        |low, high, pass: &str| rectangle(&seen("median = true, sigma = { window = 5 }", low, high), pass, &turn(0));
+        |low, high, pass: &str| rectangle(&seen("median = true, sigma = { window = 5 }", low, high), pass, &args(0));
     let told = |low, high, pass: &str| of(low, high, pass).map(|r| (r.first, r.size));
     assert_eq!(told(200, 210, "sigma_slice"), Some(([192; 2], [32; 2])));
     assert_eq!(told(200, 230, "sigma_slice"), Some(([192; 2], [64; 2])));
@@ -143,7 +143,7 @@ fn rectangles_end_with_whole_workgroups_or_at_the_border() {
 fn rows_and_columns_of_elimination_are_whole() {
     let filters = "median = true, perona_malik = { scheme = 'aos', repeat = 1 }, smooth = { lateral = 1.0 }";
     let of =
-        |pass: &str, iteration| rectangle(&seen(filters, 200, 210), pass, &turn(iteration)).map(|r| (r.first, r.size));
+        |pass: &str, iteration| rectangle(&seen(filters, 200, 210), pass, &args(iteration)).map(|r| (r.first, r.size));
     assert_eq!(of("aos_slice", 0), None);
     assert_eq!(of("median_slice", 0), Some(([0; 2], [400; 2])), "all of it is eliminated behind");
     assert_eq!(of("gaussian_lateral", 0), Some(([192; 2], [32; 2])));

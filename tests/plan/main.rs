@@ -5,7 +5,7 @@ mod accesses;
 mod chains;
 mod reruns;
 
-use echolume::passes::{Slot, When};
+use echolume::passes::{Frequency, Slot};
 use echolume::plan::{Plan, Step, affected};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::{Input, Scene};
@@ -48,13 +48,13 @@ const FILTERED: &str = "mode = 'mip'
 fn steps_are_told_apart_by_what_makes_them_run() {
     let plan = Plan::new(&scene(cartesian([6, 8, 5]), FILTERED));
     let names = |when| plan.steps_of(when).map(|(i, s)| (i, s.pass.name, s.iteration)).collect::<Vec<_>>();
-    let frame = names(When::Frame);
+    let frame = names(Frequency::Frame);
     assert_eq!(frame[..2], [(0, "load_slice", 0), (1, "median_slice", 0)]);
     assert_eq!(frame[2..], std::array::from_fn::<_, 8, _>(|n| (2 + n, "aos_slice", n as u32)));
-    assert_eq!(names(When::Volume), [(10, "gaussian_elevation", 0)]);
-    assert_eq!(names(When::Picture), [(11, "raycast_projection", 0), (12, "tone", 0)]);
+    assert_eq!(names(Frequency::Volume), [(10, "gaussian_elevation", 0)]);
+    assert_eq!(names(Frequency::Picture), [(11, "raycast_projection", 0), (12, "tone", 0)]);
     assert_eq!(plan.steps[9].id(), ("aos_slice", 7));
-    assert_eq!(plan.steps[9].turn().iteration, 7);
+    assert_eq!(plan.steps[9].args().iteration, 7);
 }
 
 #[test]

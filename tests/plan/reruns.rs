@@ -168,7 +168,7 @@ fn a_filter_whose_input_was_overwritten_takes_those_before_it_along() {
     };
     // As a picture leaves them.
     let mut contents = Contents::new();
-    for step in plan.steps.iter().filter(|s| s.pass.when != echolume::passes::When::Frame) {
+    for step in plan.steps.iter().filter(|s| s.pass.frequency != echolume::passes::Frequency::Frame) {
         contents.extend(step.writes(&scene).into_iter().map(|slot| (slot, step.id())));
     }
     let bilateral = |n| ("bilateral_distance", n);

@@ -1,8 +1,8 @@
 //! Comparisons of simulated runs: how often identical ones are called different, and whether differences are found.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::report::profile::compare::{CompareError, Comparison, Kind, Line, Options, Verdict, compare};
-use echolume::report::profile::{Profile, table};
+use echolume::profile::compare::{CompareError, Comparison, Kind, Line, Options, Verdict, compare};
+use echolume::profile::{Profile, table};
 
 const PAIRS: u32 = 400;
 

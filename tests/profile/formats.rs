@@ -1,8 +1,8 @@
 //! Tables, CSV and JSON of a profile.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::report::profile::formats::{csv, csv_samples, from_json, to_json};
-use echolume::report::profile::{Profile, settings_hash, table};
+use echolume::profile::formats::{csv, csv_samples, from_json, to_json};
+use echolume::profile::{Profile, settings_hash, table};
 
 fn measured() -> Profile {
     let mut profile = run(&mut Random(81), 4, 30, Noise { spread: 0.03, ..Noise::default() });

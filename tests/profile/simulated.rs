@@ -1,8 +1,6 @@
 //! Runs whose truth is known.
 
-use echolume::report::profile::{
-    Acquisition, Ceiling, Ceilings, Device, FORMAT, PassProfile, Profile, Sizes, settings_hash,
-};
+use echolume::profile::{Acquisition, Ceiling, Ceilings, Device, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 
 /// Vigna's splitmix64: the same numbers everywhere.
 pub struct Random(pub u64);

@@ -1,7 +1,7 @@
 //! Expected numbers: scipy 1.17.1 and numpy, in the calls named beside them.
 
-use echolume::report::profile::ranks::{hodges_lehmann, holm, least_p, mann_whitney, normal_tail};
-use echolume::report::profile::statistics::{Sample, SampleError, block_medians, drift};
+use echolume::profile::ranks::{hodges_lehmann, holm, least_p, mann_whitney, normal_tail};
+use echolume::profile::statistics::{Sample, SampleError, block_medians, drift};
 
 fn close(got: f64, expected: f64, relative: f64) {
     assert!((got - expected).abs() <= relative * expected.abs(), "{got}, expected {expected}");

@@ -1,8 +1,8 @@
 //! Traces by the rules of the Trace Event Format.
 
 use super::simulated::{Random, pass, profile};
-use echolume::report::profile::Profile;
-use echolume::report::profile::trace::{Span, Track, chrome};
+use echolume::profile::Profile;
+use echolume::profile::trace::{Span, Track, chrome};
 use serde_json::Value;
 use std::collections::BTreeMap;
 

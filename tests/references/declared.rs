@@ -6,12 +6,12 @@ use echolume::passes::{Slot, Value};
 
 /// A dispatch in words: shader, slots read and written, invocations.
 fn told(scene: &Scene, name: &str, iteration: u32) -> String {
-    let (pass, turn) = (pass(name), Turn { iteration, slice: 1, slices: 2, ..Turn::default() });
+    let (pass, args) = (pass(name), DispatchArgs { iteration, slice: 1, slices: 2, ..DispatchArgs::default() });
     assert_eq!(pass.name, name);
     assert!(pass.is_needed(scene), "{name}: {:?}", (pass.needed)(scene));
     let slots = |binds: Vec<echolume::passes::Bind>| binds.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ");
-    let (reads, writes) = (slots((pass.reads)(scene, &turn)), slots((pass.writes)(scene, &turn)));
-    format!("{}: {reads} -> {writes} {:?}", (pass.shader)(scene, &turn), (pass.extent)(scene, &turn))
+    let (reads, writes) = (slots((pass.reads)(scene, &args)), slots((pass.writes)(scene, &args)));
+    format!("{}: {reads} -> {writes} {:?}", (pass.shader)(scene, &args), (pass.extent)(scene, &args))
 }
 
 fn numbers(scene: &Scene, name: &str) -> Vec<(&'static str, f64)> {
@@ -20,12 +20,12 @@ fn numbers(scene: &Scene, name: &str) -> Vec<(&'static str, f64)> {
         Value::I32(v) => f64::from(*v),
         other => panic!("{other:?}"),
     };
-    let turn = Turn { slice: 1, slices: 2, ..Turn::default() };
-    (pass(name).params)(scene, &turn).0.iter().map(|(name, value)| (*name, of(value))).collect()
+    let args = DispatchArgs { slice: 1, slices: 2, ..DispatchArgs::default() };
+    (pass(name).params)(scene, &args).0.iter().map(|(name, value)| (*name, of(value))).collect()
 }
 
 fn constants(scene: &Scene, name: &str, iteration: u32) -> Vec<(&'static str, i32)> {
-    (pass(name).constants)(scene, &Turn { iteration, ..Turn::default() })
+    (pass(name).constants)(scene, &DispatchArgs { iteration, ..DispatchArgs::default() })
 }
 
 const ALL: &str =
@@ -98,7 +98,8 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
     }
     assert_eq!(constants(&scene, "aos_picture", 0), [("AXIS", 0), ("CONDUCTANCE", 1)]);
     assert_eq!(numbers(&scene, "aos_picture"), [("edge", 0.5), ("tau", 4.0)]);
-    let back = (pass("aos_picture").params)(&scene, &Turn { iteration: 1, slice: 2, ..Turn::default() });
+    let back =
+        (pass("aos_picture").params)(&scene, &DispatchArgs { iteration: 1, slice: 2, ..DispatchArgs::default() });
     assert_eq!(back.0, [("slice", Value::I32(2))]);
 }
 

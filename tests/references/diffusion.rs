@@ -92,13 +92,13 @@ fn aos(scene: &Scene, name: &str, source: &Texels) -> (Texels, Texels) {
     let mut held = Arrays::default();
     held.insert("source", source.clone());
     for iteration in 0..4 {
-        let turn = Turn { iteration, ..Turn::default() };
+        let args = DispatchArgs { iteration, ..DispatchArgs::default() };
         let mut writes = Arrays::default();
-        for bind in (pass(name).writes)(scene, &turn) {
+        for bind in (pass(name).writes)(scene, &args) {
             let channels = if bind.name == "shares" { 1 } else { source.channels };
             writes.insert(bind.name, Texels::untouched(source.size, channels));
         }
-        (pass(name).reference)(scene, &turn, &held, &mut writes);
+        (pass(name).reference)(scene, &args, &held, &mut writes);
         for (written, texels) in writes.iter() {
             assert!(texels.values.iter().all(|v| v.is_finite()), "{written} has holes");
             held.insert(if iteration == 1 && written == "target" { "rows" } else { written }, texels.clone());
@@ -171,7 +171,12 @@ fn the_last_sweep_of_a_slice_goes_where_it_belongs() {
     for (depth, z) in [(3, 2), (1, 0)] {
         let mut writes = Arrays::default();
         writes.insert("target", Texels::untouched([3, 2, depth], 1));
-        (pass("aos_slice").reference)(&scene, &Turn { iteration: 3, slice: 2, ..Turn::default() }, &reads, &mut writes);
+        (pass("aos_slice").reference)(
+            &scene,
+            &DispatchArgs { iteration: 3, slice: 2, ..DispatchArgs::default() },
+            &reads,
+            &mut writes,
+        );
         let target = writes.get("target");
         for (x, y) in window([3, 2, 1], 0, 0, 3) {
             assert_eq!(target.one(x, y, z), (x + y) as f64 / 2.0);

@@ -114,7 +114,7 @@ fn a_difference_that_f32_cannot_divide_by_is_none() {
     use echolume::passes::Value;
     let edge = |edge: &str| {
         let scene = slices([4, 4], &format!("estimator = 'perona-malik', estimator_edge = {edge}"));
-        let params = (pass("estimator_slice").params)(&scene, &Turn { slice: 3, ..Turn::default() });
+        let params = (pass("estimator_slice").params)(&scene, &DispatchArgs { slice: 3, ..DispatchArgs::default() });
         let [("edge", Value::F32(edge)), ("least", Value::F32(least)), ("slice", Value::I32(3))] = params.0[..] else {
             panic!("{params:?}")
         };

@@ -7,7 +7,7 @@ mod estimators;
 mod growing;
 mod smoothing;
 
-use echolume::passes::{Arrays, MISS, Pass, Texels, Turn, by_name};
+use echolume::passes::{Arrays, DispatchArgs, MISS, Pass, Texels, by_name};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::{Input, Scene};
 use echolume::source::StoredType;
@@ -39,17 +39,17 @@ fn pass(name: &str) -> &'static Pass {
 }
 
 /// What one dispatch makes of `source` in a target of so many slices; what it leaves alone is NaN.
-fn dispatched(scene: &Scene, name: &str, source: &Texels, turn: Turn, depth: usize) -> Texels {
+fn dispatched(scene: &Scene, name: &str, source: &Texels, args: DispatchArgs, depth: usize) -> Texels {
     let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
     reads.insert("source", source.clone());
     writes.insert("target", Texels::untouched([source.size[0], source.size[1], depth], source.channels));
-    (pass(name).reference)(scene, &turn, &reads, &mut writes);
+    (pass(name).reference)(scene, &args, &reads, &mut writes);
     writes.get("target").clone()
 }
 
 /// The first dispatch of a pass, in a plane.
 fn filtered(scene: &Scene, name: &str, source: &Texels) -> Texels {
-    dispatched(scene, name, source, Turn::default(), 1)
+    dispatched(scene, name, source, DispatchArgs::default(), 1)
 }
 
 fn plane(size: [usize; 2], f: impl Fn(usize, usize) -> f64) -> Texels {
@@ -129,11 +129,11 @@ fn a_filtered_slice_goes_where_it_belongs() {
         ("gaussian_depth", "smooth = { depth = 1.0 }"),
     ] {
         let scene = slices([6, 5], filter);
-        let turn = Turn { slice: 2, ..Turn::default() };
-        let flat = dispatched(&scene, name, &source, turn, 1);
+        let args = DispatchArgs { slice: 2, ..DispatchArgs::default() };
+        let flat = dispatched(&scene, name, &source, args, 1);
         assert!(flat.values.iter().all(|v| v.is_finite()), "{name}");
         assert!(flat.values.iter().zip(&source.values).any(|(a, b)| a != b), "{name} changes something");
-        let volume = dispatched(&scene, name, &source, turn, 3);
+        let volume = dispatched(&scene, name, &source, args, 3);
         for (x, y) in window(source.size, 0, 0, 9) {
             assert_eq!(volume.one(x, y, 2), flat.one(x, y, 0), "{name}");
             assert!(volume.one(x, y, 0).is_nan() && volume.one(x, y, 1).is_nan(), "{name}");

@@ -3,8 +3,8 @@
 use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
-use echolume::report::verify::baseline::{Class, Compared, Options, compare};
-use echolume::report::verify::{Figure, Level, Run, Unit, Verdict, words};
+use echolume::verify::report::baseline::{Class, Compared, Options, compare};
+use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, words};
 use proptest::prelude::*;
 
 fn compared(old: &Run, new: &Run) -> Compared {

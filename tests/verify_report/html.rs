@@ -1,9 +1,9 @@
 //! The page, read back as a browser would.
 
 use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
-use echolume::report::verify::baseline::{Options, compare};
-use echolume::report::verify::html::html;
-use echolume::report::verify::{Fault, Figure, Run, Unit, Verdict, numbers};
+use echolume::verify::report::baseline::{Options, compare};
+use echolume::verify::report::html::html;
+use echolume::verify::report::{Fault, Figure, Run, Unit, Verdict, numbers};
 use proptest::prelude::*;
 use scraper::{ElementRef, Html, Selector};
 
@@ -38,7 +38,7 @@ fn checked(page: &str) -> Html {
     }
     assert!(all(&document, "#injected, b, script").is_empty());
     for word in ["http:", "https:", "@import", "url("] {
-        assert!(!include_str!("../../src/report/verify/html/style.css").contains(word), "{word}");
+        assert!(!include_str!("../../src/verify/report/html/style.css").contains(word), "{word}");
     }
     document
 }

@@ -1,8 +1,8 @@
 //! Runs as JSON.
 
 use super::simulated::{any_run, check, empty, fail, run};
-use echolume::report::verify::json::{MOST_OUTCOMES, MOST_SAMPLES, from_json, to_json};
-use echolume::report::verify::{Figure, Run, Unit};
+use echolume::verify::report::json::{MOST_OUTCOMES, MOST_SAMPLES, from_json, to_json};
+use echolume::verify::report::{Figure, Run, Unit};
 use proptest::prelude::*;
 
 /// The numbers that JSON knows no numbers for make runs unequal to themselves: equal by their text.

@@ -3,7 +3,7 @@
 use super::profile;
 use super::profile::{Noise, Random};
 use echolume::picture::Picture;
-use echolume::report::verify::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Unit, Verdict, Worst};
+use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Unit, Verdict, Worst};
 use proptest::prelude::*;
 
 /// Passes that are timed and checked.

@@ -1,10 +1,10 @@
 //! Text for the terminal, and the numbers in it.
 
 use super::simulated::{any_run, check, empty, fail, outcome, run};
-use echolume::report::verify::numbers::{
+use echolume::verify::report::numbers::{
     amount, change, expected_and_got, number, of_allowed, percent, plain, seconds,
 };
-use echolume::report::verify::{Figure, Outcome, Unit, Verdict, words};
+use echolume::verify::report::{Figure, Outcome, Unit, Verdict, words};
 use proptest::prelude::*;
 
 #[test]

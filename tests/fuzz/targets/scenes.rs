@@ -1,7 +1,7 @@
 //! Settings from files and the command line. What is accepted must make a scene or be refused, and a scene a plan.
 
 use super::{told, written};
-use echolume::passes::Turn;
+use echolume::passes::DispatchArgs;
 use echolume::plan::Plan;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::load::Layers;
@@ -43,9 +43,9 @@ fn planned(settings: &Settings) -> String {
             assert!(!plan.steps.is_empty() && plan.bytes(&scene) > 0);
             assert!(!plan.explain(&scene).is_empty());
             for step in &plan.steps {
-                let (pass, turn) = (step.pass, Turn { iteration: step.iteration, ..Turn::default() });
-                pass.invocations(&scene, &turn);
-                let _ = ((pass.shader)(&scene, &turn), (pass.constants)(&scene, &turn));
+                let (pass, args) = (step.pass, DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() });
+                pass.invocations(&scene, &args);
+                let _ = ((pass.shader)(&scene, &args), (pass.constants)(&scene, &args));
             }
             let _ = (Plan::new(&usual).rerun(&usual, &scene), plan.rerun(&scene, &usual), plan.rerun(&scene, &scene));
             outcome += &format!("{:?}", scene.settings.mode);

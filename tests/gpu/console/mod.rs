@@ -18,8 +18,8 @@ use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
 use echolume::ui::console::{Console, ConsoleError, Next, Options};
 use echolume::ui::input::{Button, Input, Key, Modifiers};
-use echolume::ui::ladder;
-use echolume::ui::supply::Open;
+use echolume::ui::quality_ladder;
+use echolume::ui::source_supervisor::Open;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -42,7 +42,7 @@ pub fn options() -> Options {
         queues: None,
         cine: ROOM,
         budget: None,
-        rungs: ladder::built_in(),
+        rungs: quality_ladder::built_in(),
         retry: None,
         record: None,
         folder: std::env::temp_dir(),

@@ -50,7 +50,7 @@ fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() 
     let mut desk = Desk::new(&device, Options { settings, budget, ..options() });
     desk.begin();
     desk.live(0);
-    let last = ladder::built_in().len() - 1;
+    let last = quality_ladder::built_in().len() - 1;
     let mut coarse = 0;
     desk.console.input(&Input::Moved([40.0, 36.0]));
     desk.console.input(&Input::Button { button: Button::Left, pressed: true });
