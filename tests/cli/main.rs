@@ -3,6 +3,7 @@
 mod budget;
 mod common;
 mod direct;
+mod filter;
 mod frames;
 mod inputs;
 mod outputs;

@@ -130,7 +130,7 @@ fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
     let folder = Folder::new("motor");
     let tape = folder.path("exam.frames");
     let simulator = Simulator::start(Options::default()).expect("a pseudo-terminal");
-    let probe = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/motor/probe.toml");
+    let probe = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/motor/probe.toml");
     // What a shell starts in the background has SIGINT ignored, and so have the tests then.
     let mut child = Command::new("env")
         .args(["--default-signal=INT", PROGRAM])

@@ -67,7 +67,7 @@ pub const TARGETS: &[Target] = &[
         memory: 64 * MIB,
         rounds: 80_000,
         also: &[
-            "tests/motor/probe.toml",
+            "tests/data/motor/probe.toml",
             "tests/data/wobbler-4dc7/probe.toml",
             "tests/data/ultrasonix-curvilinear/probe.toml",
         ],

@@ -1,13 +1,13 @@
 //! The console without a screen: what hands do on one side, pictures on the other, and whatever goes wrong in between.
 
-mod amiss;
-mod hands;
+mod failures;
+mod gestures;
+mod idle;
 mod monkey;
-mod rest;
 
 use crate::common::*;
 use crate::live::header;
-use crate::live_kept::{BOUND, Fed, ROOM};
+use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
 use echolume::live::Update;
 use echolume::live::views::Views;
