@@ -1,6 +1,6 @@
 //! What leads the surface detectors astray: noise, speckle, specks in the fluid; and the shader against its reference there.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::detector::{STEP, columns, depths, ramp};
 use echolume::gpu::renderer::size_of;
 use echolume::gpu::single::Single;

@@ -1,6 +1,6 @@
 //! Rays that leap over bricks make the same picture bit for bit as rays that take every sample; and do leap.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::Renderer;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Advance, Geometry, Probe};

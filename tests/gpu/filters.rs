@@ -1,6 +1,6 @@
 //! The sigma filters: known answers, extremes, misses, what is refused; plans of every filter in a row.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::renderer::size_of;
 use echolume::gpu::single::Single;
 use echolume::passes::{Arrays, MISS, Pass, Slot, Texels, Turn, When, by_name, is_hit};

@@ -1,6 +1,6 @@
 //! Half the rays along each edge while a view moves: the same view, near enough, and back to all of it.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::Renderer;
 use echolume::passes::{PASSES, Stage};
 use echolume::plan::Rerun;

@@ -1,6 +1,6 @@
 //! Streams in which something goes wrong or changes half-way: what is shown stays whole, and the rest is said.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::live::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::live::{self, Step};

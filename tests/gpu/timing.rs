@@ -1,6 +1,6 @@
 //! Passes that are timed alone. Time stamps of whole pictures are looked at by `echolume verify`.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::single::{Single, Timed};
 use echolume::passes::{Arrays, Slot, Texels, Turn, by_name};
 use echolume::probe::Geometry;

@@ -1,7 +1,7 @@
 //! The groups of `echolume verify` that look at the whole program: each notices what it is there to notice. That all of
 //! them pass is `cli`'s to say.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
 use echolume::passes::Span;
 use echolume::picture::Picture;
@@ -61,8 +61,7 @@ fn other_bits_of_another_number_of_threads_are_seen() {
         return;
     }
     let check = || named(verify::repeats::checks(Level::Quick), "any number of threads");
-    let folder = std::env::temp_dir().join(format!("echolume-threads-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = Folder::new("threads");
     let program = |name: &str, text: &str| -> PathBuf {
         let file = folder.join(name);
         std::fs::write(&file, format!("#!/bin/sh\n{text}\n")).expect("written");
@@ -83,7 +82,6 @@ fn other_bits_of_another_number_of_threads_are_seen() {
     assert_eq!(failures(&mut bench, &check()).len(), 2);
     bench.program = Some(folder.join("none"));
     assert_eq!(check()[0].run(&mut bench).verdict, Verdict::LeftOut);
-    let _ = std::fs::remove_dir_all(&folder);
 }
 
 #[test]

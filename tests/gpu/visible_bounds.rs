@@ -1,7 +1,7 @@
 //! Only what can be seen is converted and filtered: no sample of stage 2 lies outside of it, the picture is the same bit for
 //! bit, and frames are asked for anew only when more is to be seen.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::chain::rectangle;
 use echolume::passes::{Slot, Texels, Turn};

@@ -1,6 +1,6 @@
 //! How the volume is stored for the rays: frames that are slices already are copied, and quads of neighbours are what eight texels are.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, chain, is_hit};

@@ -1,23 +1,22 @@
 //! Sweeps as Cartesian volumes: right where the sector is, nothing where it is not, and read back as they were written.
 
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
+use crate::common::files::{Folder, SWEEP};
+use crate::common::probes::wobbler;
+use crate::common::program;
+use echolume::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
 use echolume::source::convert::{Volume, VolumeFile, lattice};
 use echolume::source::{Frame, Recording, SampleType, StoredType};
 use glam::DVec3;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 fn probe() -> Probe {
     Probe {
-        array: Array::Curved { radius: 20.0 },
         lines: Axis::centred(0.02, 60),
-        start_depth: 2.0,
         sample_pitch: 0.4,
         samples: 128,
-        motion: Motion::Fan { wobble_radius: 12.0 },
         slices: Axis::centred(0.02, 27),
         advance: Advance::Same(0.008),
-        sound_speed: 1540.0,
+        ..wobbler()
     }
 }
 
@@ -37,12 +36,6 @@ fn filled(probe: &Probe) -> Volume {
         volume.take(Frame { volume: 0, number: k as u32, slice: k, backward: false, time: None, bytes });
     }
     volume
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("echolume-convert-{}-{name}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    folder
 }
 
 #[test]
@@ -79,7 +72,7 @@ fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
 
 #[test]
 fn what_is_written_is_read_back_voxel_by_voxel() {
-    let folder = folder("round");
+    let folder = Folder::new("round");
     let volume = filled(&probe());
     let grid = lattice(&Geometry::Sweep(probe()), 1.7).expect("a lattice");
     for (sample, shift) in [(SampleType::U16, 0.0), (SampleType::I16, 32768.0)] {
@@ -120,7 +113,6 @@ fn what_is_written_is_read_back_voxel_by_voxel() {
         assert!(header.lines().any(|l| l == line), "{header}");
     }
     assert_eq!(bytes.len() - end, x * y * z * 2);
-    std::fs::remove_dir_all(folder).expect("gone");
 }
 
 #[test]
@@ -138,32 +130,26 @@ fn no_lattice_is_too_large_to_be_refused() {
 
 #[test]
 fn the_command_writes_a_volume_or_one_line_and_nothing() {
-    let folder = folder("command");
-    let sweep = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
+    let folder = Folder::new("command");
     let out = folder.join("volume.mha");
-    let run = |arguments: &[&str]| {
-        let done = Command::new(env!("CARGO_BIN_EXE_echolume")).arg("convert").args(arguments).output().expect("run");
-        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
-    };
+    let run = |arguments: &[&str]| program::run(&[&["convert"], arguments].concat());
     let to = out.to_str().expect("a plain name");
-    assert_eq!(run(&[sweep, to, "--spacing", "2"]).0, Some(0));
+    assert_eq!(run(&[SWEEP, to, "--spacing", "2"]).0, Some(0));
     let before = std::fs::read(&out).expect("written");
     for (arguments, named) in [
-        (vec![sweep, to, "--spacing", "0"], "--spacing 0 mm"),
-        (vec![sweep, to, "--spacing", "-3"], "--spacing -3 mm"),
-        (vec![sweep, to, "--spacing", "1e-5"], "voxels"),
-        (vec![sweep, to, "--volume", "9"], "--volume 9"),
-        (vec![sweep, "/dev/null/volume.mha"], "/dev/null/volume.mha"),
-        (vec![sweep, "volume.png"], "must end in .mha or .nrrd"),
+        (vec![SWEEP, to, "--spacing", "0"], "--spacing 0 mm"),
+        (vec![SWEEP, to, "--spacing", "-3"], "--spacing -3 mm"),
+        (vec![SWEEP, to, "--spacing", "1e-5"], "voxels"),
+        (vec![SWEEP, to, "--volume", "9"], "--volume 9"),
+        (vec![SWEEP, "/dev/null/volume.mha"], "/dev/null/volume.mha"),
+        (vec![SWEEP, "volume.png"], "must end in .mha or .nrrd"),
         (vec!["nothing.mha", to], "nothing.mha"),
         (vec![to, to], "would replace an input"),
     ] {
-        let (code, said) = run(&arguments);
+        let (code, _, said) = run(&arguments);
         assert!(matches!(code, Some(1 | 2)), "{arguments:?}: {code:?} {said}");
         assert!(said.contains(named) && said.trim().lines().count() == 1, "{arguments:?}: {said}");
     }
     assert_eq!(std::fs::read(&out).expect("still there"), before);
-    let left: Vec<_> = std::fs::read_dir(&folder).expect("listed").map(|e| e.expect("entry").file_name()).collect();
-    assert_eq!(left, ["volume.mha"], "no part of a file is left");
-    std::fs::remove_dir_all(folder).expect("gone");
+    assert!(folder.names().iter().eq(["volume.mha"]), "a part of a file is left: {:?}", folder.names());
 }

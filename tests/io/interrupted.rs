@@ -1,10 +1,11 @@
 //! A signal to a program that renders what a motor sweeps. It runs in a process of its own: the signal is for the whole process.
 #![cfg(target_os = "linux")]
 
+use crate::common::files::Folder;
+use crate::common::motor::{settings, simulated, stopped_at_last, table};
+use crate::common::own_process;
 use echolume::live::Feed;
-use echolume::probe::motor::simulate::{Options, Simulator};
-use echolume::probe::motor::tmcl::command;
-use echolume::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
+use echolume::probe::motor::{Drive, Sweep, Turning};
 use echolume::source::live::Event;
 use echolume::source::phantom;
 use echolume::source::recorder::Replay;
@@ -14,21 +15,15 @@ use std::time::{Duration, Instant};
 
 #[test]
 fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
-    if std::env::var_os("INTERRUPTED_ALONE").is_none() {
-        let mut child = std::process::Command::new(std::env::current_exe().expect("this program"));
-        child.args(["interrupted::a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording", "--exact"]);
-        let output = child.env("INTERRUPTED_ALONE", "1").output().expect("it runs");
-        let out = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && out.contains("1 passed"), "{out}");
+    if !own_process::is_child() {
+        let test = "interrupted::a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording";
+        own_process::passes(&mut own_process::command(test));
         return;
     }
-    let folder = std::env::temp_dir().join(format!("echolume-interrupted-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = Folder::new("interrupted");
     let file = folder.join("exam.frames");
-    let simulator = Simulator::start(Options::default()).expect("a pseudo-terminal");
-    let settings =
-        Settings { timeout: Duration::from_secs(2), ..Settings::new(simulator.path().to_str().expect("a plain name")) };
-    let drive = Drive::open(&settings, &MotorTable::default()).expect("opened");
+    let simulator = simulated(None);
+    let drive = Drive::open(&settings(&simulator, 2000), &table()).expect("opened");
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
     let motor = Turning::start(drive, sweep, false).expect("a sweep that it can do");
     let options = phantom::Options { volumes: 2, lines: 16, samples: 16, ..phantom::Options::default() };
@@ -52,11 +47,8 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
         }
     };
     assert_eq!(end, None, "nothing has failed");
-    let received = simulator.received();
-    let last = |what: &dyn Fn(u8) -> bool| received.iter().rposition(|r| what(r.command));
-    assert!(last(&|c| c == command::STOP) > last(&|c| c == command::MOVE_TO), "the motor was told to stop");
+    assert!(stopped_at_last(&simulator.received()), "the motor was told to stop");
     drop(feed);
     let replay = Replay::open(&file).expect("a recording");
     assert!(!replay.rebuilt() && replay.frames() >= 20, "{} frames", replay.frames());
-    let _ = std::fs::remove_dir_all(folder);
 }

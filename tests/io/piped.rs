@@ -1,5 +1,6 @@
 //! Raw frames through a pipe: each with its place, time and bytes, whatever the pieces; and any bytes come to an end. Needs no GPU.
 
+use crate::common::files::{data, repository};
 use echolume::probe::{Advance, Geometry};
 use echolume::source::live::{Event, Live};
 use echolume::source::piped::Piped;
@@ -161,7 +162,7 @@ fn a_cartesian_stream_needs_no_probe() {
 
 #[test]
 fn the_probe_file_that_is_given_goes_before_the_stream() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/wobbler-4dc7/probe.toml");
+    let file = data("wobbler-4dc7/probe.toml");
     for keys in [keys(), changed(json!({"probe": null}))] {
         let (events, _) = all(Piped::new(Cursor::new(stream(&keys, &[])), Some(&file)).unwrap());
         let Geometry::Sweep(probe) = &header(&events).forward else { panic!("a sweep") };
@@ -284,8 +285,8 @@ fn what_is_not_taken_does_not_pile_up() {
 
 #[test]
 fn the_example_program_is_understood() {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/pipe_frames.py");
-    let started = Command::new("python3").args([script, "2000", "70"]).stdout(Stdio::piped()).spawn();
+    let script = repository("tools/pipe_frames.py");
+    let started = Command::new("python3").arg(script).args(["2000", "70"]).stdout(Stdio::piped()).spawn();
     let Ok(mut child) = started else {
         println!("python3 is missing: not run (tools/test installs it)");
         return;

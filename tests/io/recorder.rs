@@ -1,43 +1,22 @@
 //! Frames in a file: every byte back, whatever interrupted the writing and whatever happened to the file since.
 
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use crate::common::files::{Folder, SWEEP};
+use crate::common::probes::wobbler;
+use crate::common::program::run;
+use echolume::probe::{Advance, Axis, Geometry, Grid, Probe};
 use echolume::source::recorder::{Header, Replay, Writer};
 use echolume::source::{Frame, Source, StoredType};
 use proptest::prelude::*;
-use std::path::{Path, PathBuf};
-
-/// A folder of one test, gone at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let folder = std::env::temp_dir().join(format!("echolume-recorder-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        Folder(folder)
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use std::path::Path;
 
 fn probe(advance: f64) -> Probe {
     Probe {
-        array: Array::Curved { radius: 20.0 },
         lines: Axis::from_table((0..6).map(|n| 0.05 * n as f64 + 0.003 * (n as f64).sin()).collect()),
-        start_depth: 2.0,
         sample_pitch: 0.4,
         samples: 16,
-        motion: Motion::Fan { wobble_radius: 12.0 },
         slices: Axis::centred(0.02, 5),
         advance: Advance::Same(advance),
-        sound_speed: 1540.0,
+        ..wobbler()
     }
 }
 
@@ -87,7 +66,7 @@ fn all(replay: &mut Replay) -> Vec<(Frame, f64)> {
 fn every_frame_comes_back_byte_for_byte_with_an_index_and_without() {
     let folder = Folder::new("back");
     for finished in [true, false] {
-        let path = folder.file(&format!("{finished}.frames"));
+        let path = folder.join(&format!("{finished}.frames"));
         written(&path, finished);
         let mut replay = Replay::open(&path).expect("opened");
         assert_eq!((replay.rebuilt(), replay.damaged(), replay.lost()), (!finished, 0, 0));
@@ -109,35 +88,30 @@ fn every_frame_comes_back_byte_for_byte_with_an_index_and_without() {
 #[test]
 fn a_recording_and_its_frames_give_the_same_picture() {
     let folder = Folder::new("program");
-    let sweep = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
-    let run = |arguments: &[&str]| {
-        let done = std::process::Command::new(env!("CARGO_BIN_EXE_echolume")).args(arguments).output().expect("run");
-        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
-    };
-    let [path, a, b] = ["sweep.frames", "a.png", "b.png"].map(|n| folder.file(n).to_str().expect("plain").to_string());
-    assert_eq!(run(&["convert", sweep, &path]).0, Some(0));
-    let (code, said) = run(&["convert", sweep, &path]);
+    let [path, a, b] = ["sweep.frames", "a.png", "b.png"].map(|n| folder.path(n));
+    assert_eq!(run(&["convert", SWEEP, &path]).0, Some(0));
+    let (code, _, said) = run(&["convert", SWEEP, &path]);
     assert!(code == Some(1) && said.contains("sweep.frames") && said.trim().lines().count() == 1, "{said}");
-    for (from, to) in [(sweep, &a), (path.as_str(), &b)] {
-        let (code, said) = run(&["render", from, "--mode", "mip", "--size", "96x96", "-o", to]);
+    for (from, to) in [(SWEEP, &a), (path.as_str(), &b)] {
+        let (code, _, said) = run(&["render", from, "--mode", "mip", "--size", "96x96", "-o", to]);
         assert_eq!(code, Some(0), "{said}");
     }
     assert!(std::fs::read(&a).expect("a picture") == std::fs::read(&b).expect("a picture"));
     std::fs::write(&path, b"ECHOFRMS then nothing").expect("written");
-    let (code, said) = run(&["render", &path, "-o", &a]);
+    let (code, _, said) = run(&["render", &path, "-o", &a]);
     assert!(code == Some(2) && said.trim().lines().count() == 1 && said.contains("version"), "{said}");
 }
 
 #[test]
 fn wherever_the_writing_stops_every_whole_frame_is_there() {
     let folder = Folder::new("cut");
-    let path = folder.file("whole.frames");
+    let path = folder.join("whole.frames");
     written(&path, true);
     let whole = std::fs::read(&path).expect("read");
     let record = 40 + 16 * 6 * 2 + 4;
     let index = 8 + 12 * 15 + 16;
     let first = whole.len() - index - 15 * record;
-    let cut = folder.file("cut.frames");
+    let cut = folder.join("cut.frames");
     for length in (0..whole.len()).step_by(7).chain([first, first + record - 1, first + record, whole.len() - 1]) {
         std::fs::write(&cut, &whole[..length]).expect("written");
         match Replay::open(&cut) {
@@ -157,7 +131,7 @@ fn wherever_the_writing_stops_every_whole_frame_is_there() {
 #[test]
 fn a_damaged_frame_hides_no_other() {
     let folder = Folder::new("damaged");
-    let path = folder.file("sweep.frames");
+    let path = folder.join("sweep.frames");
     for finished in [true, false] {
         let _ = std::fs::remove_file(&path);
         written(&path, finished);
@@ -177,7 +151,7 @@ fn a_damaged_frame_hides_no_other() {
 #[test]
 fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
     let folder = Folder::new("refused");
-    let path = folder.file("sweep.frames");
+    let path = folder.join("sweep.frames");
     let mut writer = Writer::create(&path, header()).expect("made");
     let (frame, _) = frames().remove(6);
     writer.frame(&frame, 0.0).expect("written");
@@ -206,7 +180,7 @@ fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
         ),
         (Header { forward: Geometry::Sweep(Probe { sample_pitch: -1.0, ..probe(0.0) }), ..header() }, "sample_pitch"),
     ] {
-        let path = folder.file("never.frames");
+        let path = folder.join("never.frames");
         let error = Writer::create(&path, header).err().expect("refused");
         assert!(error.field().contains(field) || field == "sample_pitch", "{error}");
         assert!(!path.exists());
@@ -223,7 +197,7 @@ proptest! {
     #[test]
     fn no_bytes_are_met_with_a_panic(changes in prop::collection::vec((0usize..5000, any::<u8>()), 0..12), cut in 0usize..5000) {
         let folder = Folder::new(&format!("any-{:?}", std::thread::current().id()));
-        let path = folder.file("any.frames");
+        let path = folder.join("any.frames");
         let _ = std::fs::remove_file(&path);
         written(&path, true);
         let mut bytes = std::fs::read(&path).expect("read");

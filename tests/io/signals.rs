@@ -1,13 +1,15 @@
 //! Who holds the signals of the process: each case in a process of its own, which sends them to itself.
 #![cfg(target_os = "linux")]
 
+use crate::common::files::Folder;
+use crate::common::own_process;
 use echolume::files::Unfinished;
 use echolume::files::signals::{Held, Writing};
 use rustix::process::{Signal, getpid, kill_process};
 use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
-use std::path::PathBuf;
-use std::process::{Command, ExitStatus};
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
 use std::time::Duration;
 
 const SURVIVED: i32 = 42;
@@ -118,9 +120,12 @@ const CASES: &[Case] = &[
     ),
 ];
 
+/// Runs one case, in the process that `run` starts.
 #[test]
-#[ignore = "run by the test below"]
-fn alone() {
+fn child() {
+    if !own_process::is_child() {
+        return;
+    }
     let name = std::env::var("SIGNALS_CASE").expect("a case");
     let (_, run, ends) = CASES.iter().find(|case| case.0 == name).expect("a known case");
     run();
@@ -130,19 +135,16 @@ fn alone() {
     std::process::exit(SURVIVED);
 }
 
-fn run(name: &str, file: &PathBuf) -> ExitStatus {
-    // Whoever runs the tests may have had a signal ignored, as `nohup` does.
-    let mut child = Command::new("env");
-    child.arg("--default-signal=INT,TERM,HUP").arg(std::env::current_exe().expect("this program"));
-    child.args(["signals::alone", "--exact", "--ignored"]).env("SIGNALS_CASE", name).env("SIGNALS_FILE", file);
-    child.output().expect("it runs").status
+fn run(name: &str, file: &Path) -> ExitStatus {
+    let mut child = own_process::command("signals::child");
+    child.env("SIGNALS_CASE", name).env("SIGNALS_FILE", file).output().expect("it runs").status
 }
 
 #[test]
 fn whoever_holds_a_signal_is_told_and_nobody_else_stops_it() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = Folder::new("signals");
     for (name, _, ends) in CASES {
-        let file = folder.path().join("file");
+        let file = folder.join("file");
         std::fs::write(&file, "old").expect("written");
         let status = run(name, &file);
         match ends {
@@ -151,6 +153,6 @@ fn whoever_holds_a_signal_is_told_and_nobody_else_stops_it() {
         }
         let expected = if name.starts_with("written") { "new" } else { "old" };
         assert_eq!(std::fs::read_to_string(&file).expect("read"), expected, "{name}");
-        assert_eq!(std::fs::read_dir(folder.path()).expect("listed").count(), 1, "{name} left something");
+        assert_eq!(folder.names().len(), 1, "{name} left something");
     }
 }

@@ -1,49 +1,26 @@
 //! `echolume profile` and `echolume report error` as a user meets them.
 
+use crate::common::program::*;
 use crate::scenes::alone;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
-const BONE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bone-l14/bone.mha");
 /// Small and quick.
 const SMALL: [&str; 6] = [BONE, "--preset", "bone", "--size", "48x32", "--set=distance.median=3"];
 
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("echolume-measuring-{}-{name}", std::process::id()));
-    fs::create_dir_all(&folder).expect("folder");
-    folder
-}
-
-fn run(arguments: &[&str]) -> (i32, String, String) {
-    let ran = Command::new(env!("CARGO_BIN_EXE_echolume")).args(arguments).output().expect("start the program");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (ran.status.code().unwrap_or(-1), text(&ran.stdout), text(&ran.stderr))
-}
-
-fn done(arguments: &[&str]) -> String {
-    let (code, out, err) = run(arguments);
-    assert_eq!(code, 0, "{arguments:?}: {out}{err}");
-    out
-}
-
+/// Refused with this code, and a last line of at most two that names the fault.
 fn refused(arguments: &[&str], code: i32, named: &[&str]) {
     let (got, _, err) = run(arguments);
-    assert_eq!(got, code, "{arguments:?}: {err}");
+    assert_eq!(got, Some(code), "{arguments:?}: {err}");
     let last = err.lines().last().unwrap_or_default();
     assert!(err.lines().count() <= 2, "{arguments:?}: {err}");
     named.iter().for_each(|word| assert!(last.contains(word), "{arguments:?} does not name {word}: {err}"));
 }
 
-fn at(folder: &Path, name: &str) -> String {
-    folder.join(name).to_str().expect("plain name").to_string()
-}
-
 #[test]
 fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     let _alone = alone();
-    let folder = folder("profile");
-    let (json, csv, trace) = (at(&folder, "a.json"), at(&folder, "a.csv"), at(&folder, "trace.json"));
+    let folder = Folder::new("profile");
+    let (json, csv, trace) = (folder.path("a.json"), folder.path("a.csv"), folder.path("trace.json"));
     let files = ["--json", &json, "--csv", &csv, "--trace", &trace];
     let out =
         done(&[&["profile"], &SMALL[..], &["--repeat", "8", "--warm-up", "1", "--no-ceilings"], &files[..]].concat());
@@ -57,7 +34,7 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     assert!(traced["traceEvents"].as_array().is_some_and(|e| e.len() > 50));
 
     // Another scene is other work; a slower copy is a regression.
-    let other = at(&folder, "b.json");
+    let other = folder.path("b.json");
     let ask = ["--repeat", "8", "--no-ceilings", "--set=distance.median=5", "--json", &other];
     done(&[&["profile"], &SMALL[..], &ask[..]].concat());
     refused(&["profile", "--compare", &json, &other], 2, &["distance.median"]);
@@ -67,23 +44,22 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
         let times = pass["samples_ns"].as_array_mut().expect("times");
         times.iter_mut().for_each(|t| *t = serde_json::json!(t.as_f64().expect("number") * factor));
     }
-    let slow = at(&folder, "slow.json");
+    let slow = folder.path("slow.json");
     fs::write(&slow, slower.to_string()).expect("written");
     refused(&["profile", "--compare", &json, &slow], 1, &["median_distance"]);
 
     fs::write(&other, "{").expect("written");
     refused(&["profile", "--compare", &json, &other], 2, &["b.json"]);
-    refused(&["profile", "--compare", &json, &at(&folder, "none.json")], 2, &["none.json", "cannot be read"]);
+    refused(&["profile", "--compare", &json, &folder.path("none.json")], 2, &["none.json", "cannot be read"]);
     refused(&["profile", "--compare", &json, &json, "--threshold", "0.5"], 2, &["0.5"]);
     refused(&[&["profile"], &SMALL[..], &["--json", "/no/such/folder/a.json"]].concat(), 1, &["/no/such/folder"]);
-    fs::remove_dir_all(&folder).expect("gone");
 }
 
 #[test]
 fn a_report_is_written_plotted_and_advises() {
     let _alone = alone();
-    let folder = folder("report");
-    let (dir, json) = (at(&folder, "out"), at(&folder, "out/error.json"));
+    let folder = Folder::new("report");
+    let (dir, json) = (folder.path("out"), folder.path("out/error.json"));
     let dials = ["--dial", "step", "--dial", "format", "--repeat", "2", "--mode", "vr", "--set=ray.step=0.5"];
     let out = done(&[&["report", "error"], &SMALL[..], &dials[..], &["-o", &dir, "--under-error", "0.05"]].concat());
     for word in ["f64 reference", "r16f", "floor", "* the scene as it is", "takes"] {
@@ -104,5 +80,4 @@ fn a_report_is_written_plotted_and_advises() {
         &["compositing", "composites nothing"],
     );
     refused(&["report", "error", "--from", BONE], 2, &["bone.mha"]);
-    fs::remove_dir_all(&folder).expect("gone");
 }

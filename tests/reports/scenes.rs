@@ -1,10 +1,12 @@
 //! A small sweep of a wall, as a recording would give it.
 
-use echolume::gpu::{Choice, Context, ContextOptions};
-use echolume::probe::{Advance, Array, Axis, Geometry, Indices, Motion, Probe};
-use echolume::scene::{Input, Scene, Settings};
-use echolume::source::{Frame, StoredType};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use crate::common::gpu::Device;
+use crate::common::probes::wobbler;
+use crate::common::scenes::FLOATS;
+use echolume::probe::{Axis, Geometry, Indices, Probe};
+use echolume::scene::{Scene, Settings};
+use echolume::source::Frame;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What is timed here shares the machine with nothing else of this binary: every test holds this while it runs.
 pub fn alone() -> MutexGuard<'static, ()> {
@@ -12,21 +14,17 @@ pub fn alone() -> MutexGuard<'static, ()> {
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-pub fn device() -> Arc<Context> {
-    Context::new(&ContextOptions { device: Choice::Best, validation: false }).expect("a device")
+pub fn device() -> Device {
+    Device::watched(false)
 }
 
 pub fn probe() -> Probe {
     Probe {
-        array: Array::Curved { radius: 20.0 },
         lines: Axis::centred(0.02, 60),
-        start_depth: 2.0,
         sample_pitch: 0.4,
         samples: 128,
-        motion: Motion::Fan { wobble_radius: 12.0 },
         slices: Axis::centred(0.04, 15),
-        advance: Advance::None,
-        sound_speed: 1540.0,
+        ..wobbler()
     }
 }
 
@@ -35,8 +33,7 @@ pub fn scene(toml: &str) -> Scene {
 }
 
 pub fn scene_of(settings: Settings) -> Scene {
-    let input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
-    Scene::new(Geometry::Sweep(probe()), input, settings).expect("scene")
+    Scene::new(Geometry::Sweep(probe()), FLOATS, settings).expect("scene")
 }
 
 /// A bumpy wall behind fluid.

@@ -1,9 +1,10 @@
 //! Bricks in space against the geometry itself: what a place looks at of the texture lies within its brick's reach, and a brick
 //! is inside or outside of the sector only where all of its places are.
 
+use crate::common::probes::wobbler;
+use crate::common::scenes::{self, BYTES};
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::{Input, Scene, Settings, Side, TILE};
-use echolume::source::StoredType;
+use echolume::scene::{Scene, Side, TILE};
 use glam::DVec3;
 use proptest::prelude::*;
 
@@ -11,8 +12,7 @@ fn scene(geometry: Geometry, brick: u32, pixels: u32) -> Scene {
     let toml = format!(
         "mode = 'vr'\npicture = {{ size = [8, 8] }}\nslices = {{ pixels = {pixels} }}\nray = {{ brick = {brick} }}"
     );
-    let settings: Settings = toml::from_str(&toml).expect("settings");
-    Scene::new(geometry, Input { stored: StoredType::U8, range: [0.0, 255.0] }, settings).expect("scene")
+    scenes::scene(geometry, BYTES, &toml)
 }
 
 fn probes() -> impl Strategy<Value = Probe> {
@@ -44,17 +44,7 @@ fn probes() -> impl Strategy<Value = Probe> {
             2 => Advance::Each((0..count).map(|k| 0.3 * share * pitch * if k % 2 == 0 { 1.0 } else { -1.0 }).collect()),
             _ => Advance::Same(0.0),
         };
-        Probe {
-            array,
-            lines,
-            start_depth,
-            sample_pitch: 0.7,
-            samples: 60,
-            motion,
-            slices,
-            advance,
-            sound_speed: 1540.0,
-        }
+        Probe { array, lines, start_depth, sample_pitch: 0.7, samples: 60, motion, slices, advance, ..wobbler() }
     })
 }
 
@@ -135,13 +125,11 @@ fn bricks_of_a_wobbler_and_of_a_cartesian_volume_are_tight() {
     let probe = Probe {
         array: Array::Curved { radius: 40.0 },
         lines: Axis::centred(0.01, 128),
-        start_depth: 2.0,
         sample_pitch: 0.25,
         samples: 400,
         motion: Motion::Fan { wobble_radius: 27.0 },
         slices: Axis::centred(0.0255, 31),
-        advance: Advance::None,
-        sound_speed: 1540.0,
+        ..wobbler()
     };
     let sweep = scene(Geometry::Sweep(probe), 8, 400);
     check(&sweep, &shares);

@@ -1,5 +1,6 @@
 //! Error against run time without a device: the measures, the front, the choice, the file, the plot.
 
+use crate::common::files::data;
 use echolume::passes::{MISS, Texels};
 use echolume::report::curves::choose::{cheapest_under, most_accurate_under};
 use echolume::report::curves::front::{front, of_report};
@@ -7,7 +8,6 @@ use echolume::report::curves::metrics::{distances, normals, pictures};
 use echolume::report::curves::orders::{Range, fit};
 use echolume::report::curves::{Dial, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, plot};
 use proptest::prelude::*;
-use std::path::Path;
 
 fn texels(width: usize, channels: usize, values: &[f64]) -> Texels {
     let height = values.len() / channels / width;
@@ -65,7 +65,7 @@ fn structural_similarity_is_that_of_scikit_image() {
         a: Vec<f64>,
         b: Vec<f64>,
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ssim/pairs.json");
+    let file = data("ssim/pairs.json");
     let pairs: Vec<Pair> = serde_json::from_slice(&std::fs::read(file).expect("pairs.json")).expect("pairs");
     assert_eq!(pairs.len(), 4);
     for p in pairs {
@@ -313,7 +313,7 @@ fn crowded() -> Report {
 
 #[test]
 fn plots_show_every_dial_and_the_letters_are_drawn() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     for (name, shown) in [("small", small()), ("crowded", crowded())] {
         let svg = plot::svg(&shown, Measure::Rmse, [1200, 800]).expect("a plot");
         std::fs::write(folder.join(format!("{name}.svg")), &svg).expect("write the plot");

@@ -1,11 +1,11 @@
 //! The phantom: its bodies are where their formulas say, its speckle has the right statistics, and the same options give
 //! the same bytes.
 
+use crate::common::files::Folder;
 use echolume::probe::{Advance, Geometry, Indices, Probe};
 use echolume::source::phantom::{Body, DYNAMIC_RANGE, Options, Phantom, Truth};
 use echolume::source::{Frame, Recording};
 use std::fs;
-use std::path::PathBuf;
 
 /// A small sweep: the tests need no more.
 fn small(body: Body) -> Options {
@@ -158,30 +158,6 @@ fn the_head_is_bright_in_dark_fluid_and_moves() {
     assert!(between(0, 5) > 2000, "{} samples differ", between(0, 5));
 }
 
-/// A folder of this test's own; gone when dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-phantom-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(&self.0).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
 fn read_back(recording: &mut Recording) -> Vec<Frame> {
     std::iter::from_fn(|| recording.next_frame().unwrap_or_else(|e| panic!("{e}"))).collect()
 }
@@ -189,10 +165,10 @@ fn read_back(recording: &mut Recording) -> Vec<Frame> {
 #[test]
 fn a_written_sweep_reads_back_as_it_was_made() {
     let folder = Folder::new("both-ways");
-    let path = folder.0.join("sweep.mha");
+    let path = folder.join("sweep.mha");
     let made = phantom(Options { volumes: 3, both_ways: true, speed_ratio: 0.5, ..small(Body::Head) });
     made.write(&path).unwrap();
-    assert_eq!(folder.names(), ["sweep.mha", "sweep.probe.toml"]);
+    assert!(folder.names().iter().eq(["sweep.mha", "sweep.probe.toml"]));
 
     let mut recording = Recording::open(&path, None).unwrap();
     assert_eq!((recording.format(), recording.volumes()), ("PLUS sequence", 3));
@@ -212,12 +188,12 @@ fn a_written_sweep_reads_back_as_it_was_made() {
 #[test]
 fn a_single_volume_stands_alone() {
     let folder = Folder::new("alone");
-    let path = folder.0.join("sweep.mha");
+    let path = folder.join("sweep.mha");
     let made = phantom(small(Body::Sphere));
     made.write(&path).unwrap();
     // Over itself, as a second run would.
     made.write(&path).unwrap();
-    fs::remove_file(folder.0.join("sweep.probe.toml")).unwrap();
+    fs::remove_file(folder.join("sweep.probe.toml")).unwrap();
     let mut recording = Recording::open(&path, None).unwrap();
     assert!(read_back(&mut recording).iter().zip(&made.volume(0)).all(|(a, b)| a.bytes == b.bytes));
     let (Geometry::Sweep(read), made) = (recording.geometry(0), made.probe(0)) else { panic!("is a sweep") };
@@ -270,13 +246,13 @@ fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
     }
 
     let folder = Folder::new("refused");
-    fs::create_dir(folder.0.join("folder.mha")).unwrap();
+    fs::create_dir(folder.join("folder.mha")).unwrap();
     let made = phantom(ok.clone());
     for name in ["sweep.vol", "sweep", "folder.mha", "nowhere/sweep.mha"] {
-        let error = made.write(&folder.0.join(name)).unwrap_err().to_string();
+        let error = made.write(&folder.join(name)).unwrap_err().to_string();
         assert!(error.lines().count() == 1 && error.contains(name), "{error}");
     }
     let long = phantom(Options { volumes: 10_000, ..ok });
-    assert!(long.write(&folder.0.join("long.mha")).unwrap_err().to_string().contains("volumes"));
-    assert_eq!(folder.names(), ["folder.mha"], "nothing half done is left");
+    assert!(long.write(&folder.join("long.mha")).unwrap_err().to_string().contains("volumes"));
+    assert!(folder.names().iter().eq(["folder.mha"]), "something half done is left: {:?}", folder.names());
 }

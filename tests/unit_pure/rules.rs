@@ -1,11 +1,13 @@
 //! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
 //! Needs no GPU.
 
+use crate::common::files::repository;
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{BYTES, scene};
 use echolume::passes::{PASSES, Pass, Turn, contract, measure};
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::{Input, Scene};
+use echolume::probe::{Advance, Axis, Geometry, Motion, Probe};
+use echolume::scene::Scene;
 use echolume::shader_source;
-use echolume::source::StoredType;
 use echolume::spirv;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -13,10 +15,6 @@ use std::path::{Path, PathBuf};
 
 /// Not as it stands: this file is looked at, too.
 const UNSAFE: &str = concat!("unsafe", " {");
-
-fn top() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
 
 /// Every Rust file below a folder, with its path from the top.
 fn sources(folder: &str) -> Vec<(String, String)> {
@@ -30,9 +28,9 @@ fn sources(folder: &str) -> Vec<(String, String)> {
         }
     }
     let mut found = Vec::new();
-    walk(&top().join(folder), &mut found);
+    walk(&repository(folder), &mut found);
     found.sort();
-    let name = |p: &PathBuf| p.strip_prefix(top()).expect("below the top").to_string_lossy().into_owned();
+    let name = |p: &PathBuf| p.strip_prefix(repository("")).expect("below the top").to_string_lossy().into_owned();
     found.iter().map(|p| (name(p), std::fs::read_to_string(p).expect("source"))).collect()
 }
 
@@ -104,7 +102,7 @@ fn layers_hold() {
 /// The compiler holds what these two lines of walls say; here is that they stay: a module without its `forbid`, a lint that is allowed.
 #[test]
 fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() {
-    let read = |name: &str| std::fs::read_to_string(top().join(name)).expect(name);
+    let read = |name: &str| std::fs::read_to_string(repository(name)).expect(name);
     let lib = read("src/lib.rs");
     let lines: Vec<&str> = lib.lines().collect();
     let modules = lines.iter().enumerate().filter(|(_, l)| l.ends_with(';') && code(l).contains("mod "));
@@ -130,7 +128,7 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
 /// What `tools/mutants` makes a crate of is a crate: nothing in it names a module that it leaves behind.
 #[test]
 fn what_mutants_are_planted_in_stands_alone() {
-    let tool = std::fs::read_to_string(top().join("tools/mutants")).expect("tools/mutants");
+    let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");
     let list = tool.split("\npure=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its list");
     let copied: Vec<String> = list.split_whitespace().map(|path| format!("src/{path}")).collect();
     let stands = |name: &str| copied.iter().any(|path| name == path || name.starts_with(&format!("{path}/")));
@@ -152,9 +150,9 @@ fn what_mutants_are_planted_in_stands_alone() {
 
 #[test]
 fn the_embedded_shaders_are_what_their_sources_say() {
-    let text = std::fs::read_to_string(top().join("spirv/SOURCES")).expect("spirv/SOURCES");
+    let text = std::fs::read_to_string(repository("spirv/SOURCES")).expect("spirv/SOURCES");
     let known: BTreeMap<&str, &str> = text.lines().filter_map(|l| l.split_once("  ")).map(|(h, n)| (n, h)).collect();
-    let sources = shader_source::sources(&top().join("glsl")).expect("glsl");
+    let sources = shader_source::sources(&repository("glsl")).expect("glsl");
     for source in &sources {
         let hash: String = Sha256::digest(source.fingerprint()).iter().map(|b| format!("{b:02x}")).collect();
         assert_eq!(known.get(source.name.as_str()), Some(&hash.as_str()), "{}: run tools/shaders", source.name);
@@ -165,27 +163,16 @@ fn the_embedded_shaders_are_what_their_sources_say() {
 }
 
 fn scenes() -> Vec<Scene> {
-    let fan = Probe {
-        array: Array::Curved { radius: 30.0 },
-        lines: Axis::centred(0.05, 16),
-        start_depth: 0.0,
-        sample_pitch: 0.5,
-        samples: 64,
-        motion: Motion::Fan { wobble_radius: 15.0 },
-        slices: Axis::centred(0.05, 8),
-        advance: Advance::None,
-        sound_speed: 1540.0,
-    };
+    let fan = Probe { lines: Axis::centred(0.05, 16), slices: Axis::centred(0.05, 8), ..wobbler() };
     let uneven = Axis::from_table((0..8).map(|k| 0.05 * k as f64 + 0.01 * (k as f64).sin()).collect());
     let advance = Advance::Same(0.02);
-    let grid = Grid { size: [8, 8, 8], spacing: [1.0; 3], origin: [0.0; 3] };
     let geometries = [
         Geometry::Sweep(fan.clone()),
         Geometry::Sweep(Probe { advance: advance.clone(), ..fan.clone() }),
         Geometry::Sweep(Probe { slices: uneven.clone(), ..fan.clone() }),
         Geometry::Sweep(Probe { slices: uneven, advance, ..fan.clone() }),
         Geometry::Sweep(Probe { motion: Motion::Still { thickness: 1.0 }, slices: Axis::centred(1.0, 1), ..fan }),
-        Geometry::Cartesian(grid),
+        voxels([8, 8, 8]),
     ];
     let filters = [
         "",
@@ -208,7 +195,6 @@ fn scenes() -> Vec<Scene> {
         "ray = { rays = 2 }",
         "ray = { sampling = 'quads' }",
     ];
-    let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let mut scenes = Vec::new();
     for geometry in &geometries {
         for filters in filters {
@@ -223,8 +209,7 @@ fn scenes() -> Vec<Scene> {
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
             ] {
-                let settings = toml::from_str(&format!("mode = {mode}\n{filters}")).expect("settings");
-                scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
+                scenes.push(scene(geometry.clone(), BYTES, &format!("mode = {mode}\n{filters}")));
             }
         }
         for sections in [
@@ -234,8 +219,7 @@ fn scenes() -> Vec<Scene> {
             "mode = 'tomography'\nplanes = { lines = false, thickness = 3, slab = 'max' }",
             "mode = 'cube'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
         ] {
-            let settings = toml::from_str(sections).expect("settings");
-            scenes.push(Scene::new(geometry.clone(), input, settings).expect("scene"));
+            scenes.push(scene(geometry.clone(), BYTES, sections));
         }
     }
     scenes

@@ -1,10 +1,10 @@
 //! Where the crates that are built in come from, and under which licences: what deny.toml says, held without cargo-deny. Known faults
 //! are looked for by tools/deny, where there is a network.
 
+use crate::common::files::repository;
 use serde::Deserialize;
 use spdx::{Expression, LicenseReq, ParseMode};
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::process::Command;
 
 const CRATES_IO: &str = "registry+https://github.com/rust-lang/crates.io-index";
@@ -34,8 +34,7 @@ struct Package {
 }
 
 fn toml<T: for<'de> Deserialize<'de>>(name: &str) -> T {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
-    toml::from_str(&std::fs::read_to_string(path).expect(name)).expect(name)
+    toml::from_str(&std::fs::read_to_string(repository(name)).expect(name)).expect(name)
 }
 
 fn words(value: &toml::Value) -> Vec<String> {
@@ -45,7 +44,7 @@ fn words(value: &toml::Value) -> Vec<String> {
 /// Of the crates that this machine builds: of others nothing is here.
 fn packages() -> Vec<Package> {
     let asked = |program: &str, arguments: &[&str]| {
-        let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output();
+        let output = Command::new(program).args(arguments).current_dir(repository("")).output();
         let output = output.expect("it can be started");
         assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stdout).expect("text")

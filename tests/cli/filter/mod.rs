@@ -4,68 +4,23 @@
 mod figures;
 mod refusals;
 
+use crate::common::program::{self, *};
 use echolume::picture::grey::Grey;
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
-
-/// A folder of one test, gone at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-filter-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).expect("make a folder for the test");
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("a plain name").to_string()
-    }
-
-    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        fs::write(self.0.join(name), bytes).expect("write a file of the test");
-        self.path(name)
-    }
-
-    fn files(&self) -> usize {
-        fs::read_dir(&self.0).expect("list the folder").count()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Exit code, standard output and standard error of `echolume filter`.
-fn run(arguments: &[&str], blind: bool) -> (Option<i32>, String, String) {
-    let mut command = Command::new(PROGRAM);
-    command.arg("filter").args(arguments).stdin(Stdio::null());
-    if blind {
-        command.env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent");
-        command.env_remove("VK_ADD_DRIVER_FILES");
-    }
-    let output = command.output().expect("start the program");
-    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    (output.status.code(), text(output.stdout), text(output.stderr))
+/// `echolume filter` with these arguments.
+fn run(arguments: &[&str]) -> Ran {
+    program::run(&[&["filter"], arguments].concat())
 }
 
 /// Runs with validation what has to work, and gives what it prints.
 fn done(arguments: &[&str]) -> String {
-    let (code, out, err) = run(&[arguments, &["--validate"]].concat(), false);
-    assert_eq!(code, Some(0), "{arguments:?}: {err}");
-    out
+    program::done(&[&["filter"], arguments, &["--validate"]].concat())
 }
 
-fn refused(arguments: &[&str], wanted: i32, named: &[&str]) {
-    let (code, _, err) = run(arguments, false);
-    let said = format!("{arguments:?} ended with {code:?} and said {err:?}, not {wanted} and {named:?}");
-    assert!(code == Some(wanted) && named.iter().all(|n| err.contains(n)), "{said}");
-    assert!(err.starts_with("echolume: ") && err.lines().count() == 1 && err.len() < 1000, "not one line: {said}");
+fn refused(arguments: &[&str], code: i32, named: &[&str]) {
+    refuses(arguments, &run(arguments), code, named);
 }
 
 /// PGM of 8 or 16 bits.

@@ -7,6 +7,10 @@ mod files;
 mod kiosk;
 mod motor;
 mod network;
+// Not the whole of `common`: tools/fuzz has this folder without the rest of the tests.
+#[allow(dead_code)]
+#[path = "../../common/probes.rs"]
+mod probes;
 mod reports;
 mod scenes;
 mod voxels;

@@ -5,7 +5,7 @@ mod gestures;
 mod idle;
 mod monkey;
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
@@ -20,7 +20,6 @@ use echolume::ui::console::{Console, ConsoleError, Next, Options};
 use echolume::ui::input::{Button, Input, Key, Modifiers};
 use echolume::ui::ladder;
 use echolume::ui::supply::Open;
-use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -56,14 +55,7 @@ pub fn options() -> Options {
     }
 }
 
-/// A folder of this test alone, gone with it.
-pub struct Folder(pub PathBuf);
-
 impl Folder {
-    pub fn new(name: &str) -> Folder {
-        Folder(std::env::temp_dir().join(format!("echolume-{name}-{}", std::process::id())))
-    }
-
     /// The first file with this ending, once it can be read.
     pub fn wait<T>(&self, ending: &str, mut read: impl FnMut(&std::path::Path) -> Option<T>) -> T {
         let begun = Instant::now();
@@ -75,12 +67,6 @@ impl Folder {
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 

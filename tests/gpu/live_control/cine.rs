@@ -9,7 +9,8 @@ use echolume::source::recorder::Replay;
 fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
-        let file = std::env::temp_dir().join(format!("echolume-frozen-{}-{update:?}.frames", std::process::id()));
+        let folder = Folder::new("frozen");
+        let file = folder.join("exam.frames");
         let mut bench = Bench::recorded(&device, "mode = 'mip'", kept(update), Some(&file));
         bench.begin(header(0.3));
         let before = bench.live(0);
@@ -33,7 +34,6 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
         drop(bench);
         let recording = Replay::open(&file).expect("recording");
         assert_eq!((recording.frames(), recording.rebuilt()), (5 * 9, false));
-        std::fs::remove_file(&file).expect("file");
     }
 }
 

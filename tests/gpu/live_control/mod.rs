@@ -4,7 +4,7 @@ mod async_compilation;
 mod cine;
 mod sources;
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::live::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::live::cine::Room;

@@ -2,7 +2,7 @@
 //!
 //! These properties are the harness of a fuzzer in small: `total` is the target that one would drive, from the same starts.
 
-use super::common::*;
+use super::messages::*;
 use proptest::collection::vec;
 
 #[test]

@@ -1,6 +1,6 @@
 //! The client against servers of these tests' own, on the loopback interface.
 
-use super::common::*;
+use super::messages::*;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc;

@@ -3,7 +3,7 @@
 
 mod broken;
 mod client;
-mod common;
+mod messages;
 mod network;
 mod pairing;
 mod round_trip;

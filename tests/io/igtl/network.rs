@@ -1,7 +1,7 @@
 //! OpenIGTLink as a live source: volumes and freehand frames with known values, and what is amiss.
 
 use super::client::*;
-use super::common::*;
+use super::messages::*;
 use echolume::probe::{Geometry, Grid};
 use echolume::source::freehand;
 use echolume::source::live::{Event, Live};

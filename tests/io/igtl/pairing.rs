@@ -1,6 +1,6 @@
 //! Poses for 2D frames.
 
-use super::common::*;
+use super::messages::*;
 use std::f64::consts::FRAC_PI_2;
 
 const TOLERANCE: f64 = 0.05;

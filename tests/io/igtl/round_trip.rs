@@ -1,6 +1,6 @@
 //! What is written is read again as it was.
 
-use super::common::*;
+use super::messages::*;
 use proptest::collection::vec;
 use proptest::num::f32::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
 

@@ -1,6 +1,6 @@
 //! The stored messages give what stands in their bytes; the numbers here were read from hex dumps.
 
-use super::common::*;
+use super::messages::*;
 
 /// 0x6553f100 seconds and 0x40000000 / 2^32.
 const TIME: f64 = 1_700_000_000.25;

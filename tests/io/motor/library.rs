@@ -1,6 +1,7 @@
 //! Home, sweep and stop over the simulated module, from Rust.
 
-use super::{eventually, settings, simulated, stopped_at_last, table};
+use crate::common::motor::{settings, simulated, stopped_at_last, table};
+use crate::common::wait::eventually;
 use echolume::probe::motor::simulate::{Options, Simulator};
 use echolume::probe::motor::table::{Home, Side, Units};
 use echolume::probe::motor::tmcl::{Request, axis, command};

@@ -1,6 +1,9 @@
 //! `echolume probe` over the simulated module: what it says and how it ends, fault by fault.
 
-use super::{PROBE, eventually, simulated, stopped_at_last};
+use crate::common::files::{Folder, MOTOR_PROBE, data};
+use crate::common::motor::{simulated, stopped_at_last};
+use crate::common::program::{PROGRAM, Ran, with_default_signals};
+use crate::common::wait::eventually;
 use echolume::probe::motor::simulate::Simulator;
 use echolume::probe::motor::tmcl::{Request, command};
 use rustix::process::{Pid, Signal, kill_process};
@@ -8,16 +11,9 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
-
-/// Exit code, standard output and standard error.
-type Ran = (Option<i32>, String, String);
-
 fn probe(simulator: &Simulator, action: &str, more: &[&str]) -> Command {
-    // Whoever runs the tests may have had a signal ignored, as `nohup` does.
-    let mut command = Command::new("env");
-    command.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
-    command.args(["probe", action, "--probe", PROBE, "--port"]).arg(simulator.path()).args(more);
+    let mut command = with_default_signals();
+    command.args(["probe", action, "--probe", MOTOR_PROBE, "--port"]).arg(simulator.path()).args(more);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -105,15 +101,14 @@ fn the_fault_matrix() {
 #[test]
 fn home_sweep_status_and_stop_do_what_they_say() {
     let simulator = simulated(None);
-    let csv = std::env::temp_dir().join(format!("echolume-motor-{}.csv", std::process::id()));
-    let file = csv.to_str().expect("a plain name");
+    let folder = Folder::new("positions");
+    let file = &folder.path("positions.csv");
     let (code, out, err) = run(&mut probe(&simulator, "home", &["--timeout", "2000"]));
     assert!(code == Some(0) && out.contains("home: found"), "{out}{err}");
     let sweep = ["--angle", "24", "--rate", "4", "--volumes", "3", "--homed", "--timeout", "2000", "--positions", file];
     let (code, out, err) = run(&mut probe(&simulator, "sweep", &sweep));
     assert!(code == Some(0) && out.contains("swept: 3 volumes"), "{out}{err}");
-    let text = std::fs::read_to_string(&csv).expect("the positions");
-    let _ = std::fs::remove_file(&csv);
+    let text = std::fs::read_to_string(file).expect("the positions");
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("time_s,angle_deg,direction"));
     let rows: Vec<(f64, f64, &str)> = lines
@@ -191,13 +186,14 @@ fn a_killed_sweep_is_stopped_by_the_watchdog_and_the_port_is_free_again() {
 #[test]
 fn wrong_input_is_refused_before_the_port_is_touched() {
     let simulator = simulated(None);
-    let plain = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/probe.toml");
+    let plain = data("wobbler-4dc7/probe.toml");
+    let plain = plain.to_str().expect("a plain name");
     let path = simulator.path().to_str().expect("a plain name");
     for (arguments, named) in [
         (&["probe", "sweep", "--port", path, "--angle", "24", "--rate", "1"][..], "--probe FILE is needed"),
         (&["probe", "home", "--port", path, "--probe", plain], "has no [motor] table"),
-        (&["probe", "sweep", "--port", path, "--probe", PROBE, "--angle", "99", "--rate", "1"], "--angle 99"),
-        (&["probe", "sweep", "--port", path, "--probe", PROBE, "--angle", "61", "--rate", "4.9"], "at most"),
+        (&["probe", "sweep", "--port", path, "--probe", MOTOR_PROBE, "--angle", "99", "--rate", "1"], "--angle 99"),
+        (&["probe", "sweep", "--port", path, "--probe", MOTOR_PROBE, "--angle", "61", "--rate", "4.9"], "at most"),
         (&["probe", "simulate", "--fault", "fire"], "fire"),
         (&["probe", "status"], "--port"),
         (&["probe", "status", "--port", path, "--baud", "3"], "--baud"),
@@ -205,8 +201,14 @@ fn wrong_input_is_refused_before_the_port_is_touched() {
         (&["stream", "--null", "--homed"], "--motor"),
         (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1"], "[motor] table"),
         (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "1", "--probe", plain], "[motor] table"),
-        (&["stream", "--null", "--motor", path, "--angle", "99", "--sweeps", "1", "--probe", PROBE], "--angle 99"),
-        (&["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "9", "--probe", PROBE], "--sweeps 9"),
+        (
+            &["stream", "--null", "--motor", path, "--angle", "99", "--sweeps", "1", "--probe", MOTOR_PROBE],
+            "--angle 99",
+        ),
+        (
+            &["stream", "--null", "--motor", path, "--angle", "24", "--sweeps", "9", "--probe", MOTOR_PROBE],
+            "--sweeps 9",
+        ),
     ] {
         let (code, _, err) = run(Command::new(PROGRAM).args(arguments).stdin(Stdio::null()).stderr(Stdio::piped()));
         assert!(code == Some(2) && err.contains(named), "{arguments:?}: {err}");
@@ -226,8 +228,8 @@ fn wrong_input_is_refused_before_the_port_is_touched() {
 
 #[test]
 fn the_simulator_runs_until_it_is_signalled() {
-    let mut child = Command::new("env")
-        .args(["--default-signal=INT", PROGRAM, "probe", "simulate"])
+    let mut child = with_default_signals()
+        .args(["probe", "simulate"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -1,6 +1,7 @@
 //! Units and the `[motor]` table, the speed of a pass, and positions over time.
 
-use super::{PROBE, table};
+use crate::common::files::{Folder, MOTOR_PROBE};
+use crate::common::motor::table;
 use echolume::probe::ProbeFile;
 use echolume::probe::motor::simulate::Injected;
 use echolume::probe::motor::table::Units;
@@ -39,9 +40,8 @@ fn a_degree_is_what_steps_and_gear_make_of_it() {
 
 #[test]
 fn every_wrong_table_is_refused_in_one_line_that_names_the_field() {
-    let text = std::fs::read_to_string(PROBE).expect("the example");
-    let folder = std::env::temp_dir().join(format!("echolume-motor-table-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let text = std::fs::read_to_string(MOTOR_PROBE).expect("the example");
+    let folder = Folder::new("motor-table");
     for (from, to, named) in [
         ("steps_per_turn = 200", "steps_per_turn = 0", "motor.steps_per_turn"),
         ("microsteps = 16", "microsteps = 17", "motor.microsteps"),
@@ -63,7 +63,6 @@ fn every_wrong_table_is_refused_in_one_line_that_names_the_field() {
         let error = ProbeFile::read(&file).expect_err(to).to_string();
         assert!(error.contains(named) && error.lines().count() == 1, "{to}: {error}");
     }
-    let _ = std::fs::remove_dir_all(folder);
 }
 
 #[test]

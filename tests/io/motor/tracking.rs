@@ -1,6 +1,8 @@
 //! Frames that come without a place, and get it from the simulated motor: each carries the angle that the array really had.
 
-use super::{eventually, settings, simulated, stopped_at_last, table};
+use crate::common::motor::{settings, simulated, stopped_at_last, table};
+use crate::common::probes::wobbler;
+use crate::common::wait::eventually;
 use echolume::probe::motor::simulate::Simulator;
 use echolume::probe::motor::{Drive, Sweep, Turning};
 use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -28,8 +30,7 @@ fn probe() -> Probe {
         samples: 4,
         motion: Motion::Fan { wobble_radius: 25.0 },
         slices: Axis::centred(PITCH.to_radians(), SLICES),
-        advance: Advance::None,
-        sound_speed: 1540.0,
+        ..wobbler()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Any bytes give frames or one line that names the fault.
 
-use super::common::*;
+use super::recordings::*;
 #[test]
 fn a_file_cut_off_anywhere_is_one_line_and_no_panic() {
     let folder = Folder::new("cut");
@@ -94,7 +94,7 @@ fn header_numbers_that_cannot_be_true_are_refused_by_name() {
     assert!(total(&folder.write("n.mha", endless)).unwrap_err().contains("ElementDataFile"));
     assert!(total(&folder.write("n.png", b"\x89PNG")).unwrap_err().contains("MetaImage"));
     assert!(total(&folder.0).unwrap_err().contains("regular file"));
-    assert!(total(&folder.0.join("absent.mha")).unwrap_err().contains("absent.mha"));
+    assert!(total(&folder.join("absent.mha")).unwrap_err().contains("absent.mha"));
 }
 
 /// Changes to a file: places and new bytes, and where to cut it.

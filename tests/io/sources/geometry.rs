@@ -1,6 +1,6 @@
 //! Sweeps both ways, and which geometry wins.
 
-use super::common::*;
+use super::recordings::*;
 const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\
                      frame_positions_mm = [0, 1, 3]\nframes_per_volume = 3\nboth_ways = true\nspeed_ratio = 0.5\n";
 
@@ -30,14 +30,14 @@ fn a_given_probe_file_wins_over_one_beside_and_that_over_the_header() {
     let sweep = folder.write("sweep.mha", fs::read(stored("wobbler-4dc7/sweep.mha")).unwrap());
     let text = fs::read_to_string(stored("wobbler-4dc7/probe.toml")).unwrap();
     let with_radius = |mm: &str| text.replace("radius_mm = 39.8 ", &format!("radius_mm = {mm} "));
-    let radius = |given| probe_of(&Recording::open(&sweep, given).unwrap()).array_radius();
+    let radius = |given| probe_of(&Recording::open(sweep.as_ref(), given).unwrap()).array_radius();
     assert_eq!(radius(None), 39.8);
     folder.write("probe.toml", with_radius("41"));
     assert_eq!(radius(None), 41.0);
     folder.write("sweep.probe.toml", with_radius("42"));
     assert_eq!(radius(None), 42.0);
     let given = folder.write("other.toml", with_radius("43"));
-    assert_eq!(radius(Some(&given)), 43.0);
+    assert_eq!(radius(Some(given.as_ref())), 43.0);
 }
 
 #[test]

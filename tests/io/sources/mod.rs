@@ -1,6 +1,6 @@
 //! Recorded files: the same frames and places whatever they are stored as, and one clear line for every fault.
 
 mod broken;
-mod common;
 mod geometry;
+mod recordings;
 mod values;

@@ -1,13 +1,13 @@
 //! Frames hold what the file holds, whatever its type, order and compression.
 
-use super::common::*;
+use super::recordings::*;
 #[test]
 fn both_forms_of_the_wobbler_sweep_are_one_sweep() {
     let folder = Folder::new("both-forms");
     // Away from the probe file, each must know its own geometry.
     let copies = ["sweep.mha", "sweep.vol"].map(|n| folder.write(n, fs::read(stored("wobbler-4dc7").join(n)).unwrap()));
-    let paths = [copies[0].clone(), copies[1].clone(), stored("wobbler-4dc7/sweep.mha")];
-    let mut recordings = paths.map(|p| open(&p));
+    let paths = [copies[0].as_ref(), copies[1].as_ref(), Path::new(SWEEP)];
+    let mut recordings = paths.map(|p| open(p));
     assert_eq!(
         recordings.each_ref().map(|r| r.format()),
         ["MetaImage pre-scan sweep", "Kretz volume", "MetaImage pre-scan sweep"]
@@ -64,7 +64,8 @@ fn the_ultrasonix_frames_are_polar_by_their_probe_file_and_pictures_are_not() {
 fn a_compressed_file_holds_the_same_frames_as_its_raw_bytes() {
     let folder = Folder::new("compressed");
     let probe = folder.write("probe.toml", fs::read(stored("ultrasonix-curvilinear/probe.toml")).unwrap());
-    let mut compressed = Recording::open(&stored("ultrasonix-curvilinear/brightness.mha"), Some(&probe)).unwrap();
+    let mut compressed =
+        Recording::open(&stored("ultrasonix-curvilinear/brightness.mha"), Some(probe.as_ref())).unwrap();
     let frames = all_frames(&mut compressed).unwrap();
     let data: Vec<u8> = frames.iter().flat_map(|f| f.bytes.clone()).collect();
     let raw = folder.write("raw.mha", image("3640 96                      5", "MET_UCHAR", "", &data));

@@ -1,6 +1,7 @@
 //! What a dispatch touches, by its pass, its turn and the part of each slot that it binds.
 
-use super::{FILTERED, cartesian, scene};
+use super::{FILTERED, scene};
+use crate::common::probes::voxels;
 use echolume::barriers::{Access, Resource, Worker, Workers, accesses};
 use echolume::passes::{Slot, Turn, by_name};
 use std::ops::Range;
@@ -10,7 +11,7 @@ type Touched = Vec<(Slot, u32, Range<u32>)>;
 
 /// What it reads and what it writes.
 fn touched(name: &str, turn: Turn) -> (Touched, Touched) {
-    let scene = scene(cartesian([6, 8, 5]), FILTERED);
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
     let all = accesses(&scene, by_name(name).expect("pass"), &turn);
     let of = |write| {
         let part = |a: &Access| match a.resource {

@@ -1,6 +1,7 @@
 //! Which slots the filters of a chain take turns with, and how much of a slice each of them makes.
 
-use super::{cartesian, fan, scene};
+use super::{fan, scene};
+use crate::common::probes::voxels;
 use echolume::passes::chain::{
     copied, distance_end, distance_link, picture_end, picture_link, rectangle, rendered, slice_link,
 };
@@ -16,7 +17,7 @@ fn turn(iteration: u32) -> Turn {
 #[test]
 fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() {
     let filters = "slices = { median = true, sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }";
-    let frames = scene(cartesian([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
+    let frames = scene(voxels([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
     let link = |name: &str, iteration| slice_link(&frames, name, &turn(iteration));
     assert_eq!(link("load_slice", 0), (Slot::Frames, Slot::SliceA));
     assert_eq!(link("median_slice", 0), (Slot::SliceA, Slot::SliceB));
@@ -26,16 +27,16 @@ fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() 
         assert_eq!(link("aos_slice", iteration), (Slot::SliceA, Slot::SliceB));
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
     }
-    let smoothed = scene(cartesian([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
+    let smoothed = scene(voxels([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
     assert_eq!(slice_link(&smoothed, "median_slice", &turn(0)), (Slot::SliceA, Slot::SharpVolume));
 }
 
 #[test]
 fn a_chain_of_no_filter_ends_where_it_begins() {
-    let plain = scene(cartesian([8, 8, 5]), "mode = 'sr'");
+    let plain = scene(voxels([8, 8, 5]), "mode = 'sr'");
     assert_eq!((distance_end(&plain), picture_end(&plain)), (Slot::Distance, Slot::Picture));
     let filtered = scene(
-        cartesian([8, 8, 5]),
+        voxels([8, 8, 5]),
         "distance = { median = 3, perona_malik = { repeat = 3 } }\npost = { sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }",
     );
     assert_eq!(distance_link(&filtered, "median_distance", &turn(0)), (Slot::Distance, Slot::DistanceA));
@@ -50,7 +51,7 @@ fn a_chain_of_no_filter_ends_where_it_begins() {
 fn frames_are_copied_where_the_volume_stores_what_they_hold() {
     let of = |stored, range, toml: &str| {
         let settings = toml::from_str(toml).expect("settings");
-        copied(&Scene::new(cartesian([8, 8, 5]), Input { stored, range }, settings).expect("scene"))
+        copied(&Scene::new(voxels([8, 8, 5]), Input { stored, range }, settings).expect("scene"))
     };
     let (bytes, words) = ([0.0, 255.0], [0.0, 65535.0]);
     let format = |format: &str| format!("slices = {{ format = '{format}' }}");
@@ -69,7 +70,7 @@ fn frames_are_copied_where_the_volume_stores_what_they_hold() {
 
 #[test]
 fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
-    let of = |toml: &str| rendered(&scene(cartesian([8, 8, 5]), toml));
+    let of = |toml: &str| rendered(&scene(voxels([8, 8, 5]), toml));
     assert_eq!(of("mode = 'vr'"), Slot::Picture);
     assert_eq!(of("mode = 'vr'\nray = { rays = 2 }"), Slot::Rendered);
     assert_eq!(of("mode = 'vr'\nray = { half = true }"), Slot::Rendered);
@@ -79,7 +80,7 @@ fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
 
 /// A slice of 400 x 400 of which columns and rows from `low` up to `high` are seen.
 fn seen(filters: &str, low: u32, high: u32) -> Scene {
-    let scene = scene(cartesian([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
+    let scene = scene(voxels([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
     Scene { seen: Seen { low: [low, low, 0], high: [high, high, 3] }, ..scene }
 }
 

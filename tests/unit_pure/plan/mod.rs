@@ -5,34 +5,19 @@ mod accesses;
 mod chains;
 mod reruns;
 
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{self, BYTES};
 use echolume::passes::{Slot, When};
 use echolume::plan::{Plan, Step, affected};
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::scene::{Input, Scene};
-use echolume::source::StoredType;
-
-const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+use echolume::probe::{Advance, Geometry, Probe};
+use echolume::scene::Scene;
 
 fn fan(advance: Advance) -> Geometry {
-    Geometry::Sweep(Probe {
-        array: Array::Curved { radius: 20.0 },
-        lines: Axis::centred(0.05, 24),
-        start_depth: 2.0,
-        sample_pitch: 0.8,
-        samples: 64,
-        motion: Motion::Fan { wobble_radius: 12.0 },
-        slices: Axis::centred(0.06, 9),
-        advance,
-        sound_speed: 1540.0,
-    })
-}
-
-fn cartesian(size: [usize; 3]) -> Geometry {
-    Geometry::Cartesian(Grid { size, spacing: [1.0; 3], origin: [0.0; 3] })
+    Geometry::Sweep(Probe { advance, ..wobbler() })
 }
 
 fn scene(geometry: Geometry, toml: &str) -> Scene {
-    Scene::new(geometry, BYTES, toml::from_str(toml).expect("settings")).expect("scene")
+    scenes::scene(geometry, BYTES, toml)
 }
 
 fn step<'a>(plan: &'a Plan, name: &str) -> &'a Step {
@@ -46,7 +31,7 @@ const FILTERED: &str = "mode = 'mip'
 
 #[test]
 fn steps_are_told_apart_by_what_makes_them_run() {
-    let plan = Plan::new(&scene(cartesian([6, 8, 5]), FILTERED));
+    let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
     let names = |when| plan.steps_of(when).map(|(i, s)| (i, s.pass.name, s.iteration)).collect::<Vec<_>>();
     let frame = names(When::Frame);
     assert_eq!(frame[..2], [(0, "load_slice", 0), (1, "median_slice", 0)]);
@@ -72,16 +57,16 @@ fn a_step_names_what_it_reads_and_what_it_writes() {
 
 #[test]
 fn a_step_reaches_as_many_slices_as_its_gaussian() {
-    let plan = Plan::new(&scene(cartesian([6, 8, 5]), FILTERED));
-    assert_eq!(step(&plan, "gaussian_elevation").reach(&scene(cartesian([6, 8, 5]), FILTERED)), 3);
-    assert_eq!(step(&plan, "median_slice").reach(&scene(cartesian([6, 8, 5]), FILTERED)), 0);
+    let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
+    assert_eq!(step(&plan, "gaussian_elevation").reach(&scene(voxels([6, 8, 5]), FILTERED)), 3);
+    assert_eq!(step(&plan, "median_slice").reach(&scene(voxels([6, 8, 5]), FILTERED)), 0);
 }
 
 /// Frames of 6x8 bytes, four on their way; two spare slices, the shares of an elimination and what it passes on, rows, all of f32; two
 /// volumes of 6x8x5 in R16F; a picture of 5x4 in RGBA16F and one of bytes; and what the pass over the volume looks up.
 #[test]
 fn a_plan_counts_the_bytes_of_its_slots() {
-    let scene = scene(cartesian([6, 8, 5]), FILTERED);
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
     let plan = Plan::new(&scene);
     let slots: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
     let expected =
@@ -93,7 +78,7 @@ fn a_plan_counts_the_bytes_of_its_slots() {
 
 #[test]
 fn a_plan_explains_itself() {
-    let scene = scene(cartesian([6, 8, 5]), FILTERED);
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
     let text = Plan::new(&scene).explain(&scene);
     let headings: Vec<_> = text.lines().filter(|l| l.starts_with("stage ")).collect();
     assert_eq!(headings, ["stage 1: preprocess", "stage 2: raycast", "stage 3: shade", "stage 4: postprocess"]);

@@ -1,6 +1,7 @@
 //! What runs again after a change: the least that makes the picture right, and what a filter's lost input takes with it.
 
-use super::{FILTERED, cartesian, fan, scene};
+use super::{FILTERED, fan, scene};
+use crate::common::probes::voxels;
 use echolume::plan::{Contents, Plan, Rerun};
 use echolume::probe::{Advance, Geometry};
 use echolume::scene::{Input, Scene};
@@ -75,12 +76,12 @@ fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
 
 #[test]
 fn stage_1_runs_again_where_its_own_numbers_change() {
-    let sharper = |settings: &str| scene(cartesian([6, 8, 5]), &FILTERED.replace("median = true", settings));
+    let sharper = |settings: &str| scene(voxels([6, 8, 5]), &FILTERED.replace("median = true", settings));
     let before = sharper("sigma = { sigma = 0.1 }");
     assert_eq!(rerun(&before, &sharper("sigma = { sigma = 0.2 }")), Rerun::Frames);
     // Across slices the volume before smoothing is still there.
-    let wider = scene(cartesian([6, 8, 5]), &FILTERED.replace("elevation = 1.0", "elevation = 1.2"));
-    let plain = scene(cartesian([6, 8, 5]), FILTERED);
+    let wider = scene(voxels([6, 8, 5]), &FILTERED.replace("elevation = 1.0", "elevation = 1.2"));
+    let plain = scene(voxels([6, 8, 5]), FILTERED);
     assert_eq!(passes(&plain, &wider), "gaussian_elevation raycast_projection tone");
     // The gain by depth is made anew, for the frames that come again.
     let gain = |gain: f64| with(&format!("conditioning = {{ tgc = [{{ depth = 5, gain = {gain} }}] }}"));
@@ -102,8 +103,7 @@ fn slots_of_another_shape_format_or_meaning_begin_anew() {
     let brighter = Scene::new(fan(Advance::None), input, with("").settings).expect("scene");
     assert_eq!(rerun(&with(""), &brighter), Rerun::Everything);
     // Frames that are copied as they are leave no pass behind that could tell.
-    let copied =
-        |format: &str| scene(cartesian([6, 8, 5]), &format!("mode = 'mip'\nslices = {{ format = '{format}' }}"));
+    let copied = |format: &str| scene(voxels([6, 8, 5]), &format!("mode = 'mip'\nslices = {{ format = '{format}' }}"));
     assert_eq!(rerun(&copied("r8"), &copied("r16f")), Rerun::Everything);
 }
 

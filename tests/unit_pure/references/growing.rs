@@ -2,7 +2,7 @@
 
 use super::*;
 use echolume::passes::filter::growth;
-use echolume::probe::{Advance, Array, Axis, Motion, Probe};
+use echolume::probe::{Axis, Motion, Probe};
 
 /// What the filter is to find at a pixel whose centre is known: the rings that its window grows by, and the mean.
 struct Expected {
@@ -182,21 +182,9 @@ fn shares_of_growth_count_what_a_line_passes_through_and_sum_to_one() {
     assert_eq!(growth::shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
     assert_eq!(growth::shares(&growing("window = 5, largest = 5"), &map), [1.0]);
     // Of a sector only what lies within it: outside every window would have grown by one.
-    let probe = Probe {
-        array: Array::Curved { radius: 20.0 },
-        lines: Axis::centred(0.05, 24),
-        start_depth: 2.0,
-        sample_pitch: 0.8,
-        samples: 64,
-        motion: Motion::Translated,
-        slices: Axis::centred(1.0, 3),
-        advance: Advance::None,
-        sound_speed: 1540.0,
-    };
-    let settings =
-        toml::from_str("slices = { pixels = 40, enhanced_sigma = { window = 3, largest = 7, growth = true } }")
-            .expect("settings");
-    let scene = Scene::new(Geometry::Sweep(probe), FLOATS, settings).expect("scene");
+    let probe = Probe { motion: Motion::Translated, slices: Axis::centred(1.0, 3), ..wobbler() };
+    let filters = "slices = { pixels = 40, enhanced_sigma = { window = 3, largest = 7, growth = true } }";
+    let scene = scenes::scene(Geometry::Sweep(probe), FLOATS, filters);
     let inside = |x: usize, y: usize| {
         let (x, y) = scene.grid.place(x as f64, y as f64);
         let (range, angle) = (x.hypot(y), (x / y).atan());

@@ -7,16 +7,14 @@ mod estimators;
 mod growing;
 mod smoothing;
 
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{self, FLOATS};
 use echolume::passes::{Arrays, MISS, Pass, Texels, Turn, by_name};
 use echolume::probe::{Geometry, Grid};
-use echolume::scene::{Input, Scene};
-use echolume::source::StoredType;
-
-const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
+use echolume::scene::Scene;
 
 fn scene(size: [usize; 3], toml: &str) -> Scene {
-    let geometry = Geometry::Cartesian(Grid { size, spacing: [1.0; 3], origin: [0.0; 3] });
-    Scene::new(geometry, FLOATS, toml::from_str(toml).expect("settings")).expect("scene")
+    scenes::scene(voxels(size), FLOATS, toml)
 }
 
 /// A scene whose slices go through these filters.

@@ -86,8 +86,7 @@ fn a_gaussian_spreads_a_point_by_its_weights_along_its_own_axis() {
 #[test]
 fn a_gaussian_is_as_wide_as_was_asked_for() {
     let grid = Grid { size: [41, 3, 1], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };
-    let settings = toml::from_str("slices = { smooth = { lateral = 1.0 } }").expect("settings");
-    let scene = Scene::new(Geometry::Cartesian(grid), FLOATS, settings).expect("scene");
+    let scene = scenes::scene(Geometry::Cartesian(grid), FLOATS, "slices = { smooth = { lateral = 1.0 } }");
     let got = filtered(&scene, "gaussian_lateral", &plane([41, 3], |x, _| f64::from(x == 20)));
     let variance: f64 = (0..41).map(|x| got.one(x, 1, 0) * (x as f64 - 20.0).powi(2)).sum();
     // Cut off at three deviations it is 1.2 % less than 4.

@@ -1,7 +1,7 @@
 //! A source that does whatever a source may do.
 
 use super::*;
-use crate::common::{Noise, linear};
+use crate::common::gpu::{Noise, linear};
 use echolume::probe::Geometry;
 use echolume::source::recorder::Header;
 use std::collections::VecDeque;

@@ -1,10 +1,13 @@
 //! A server, a program on it, and what can be seen and done there.
 
+pub use crate::common::files::*;
+pub use crate::common::program::PROGRAM;
+pub use crate::common::wait::*;
+
 use echolume::picture::Picture;
 use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
@@ -13,29 +16,12 @@ use x11rb::protocol::xproto::{
 use x11rb::protocol::xtest::ConnectionExt as _;
 use x11rb::rust_connection::RustConnection;
 
-pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
-pub const SWEEP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
-/// A software device on a busy machine needs seconds for a picture.
-const PATIENCE: Duration = Duration::from_secs(90);
-
 /// X keysyms of the keys that are pressed here; letters and digits are their own.
 pub const TAB: u32 = 0xff09;
 pub const ESCAPE: u32 = 0xff1b;
 pub const F1: u32 = 0xffbe;
 pub const CONTROL: u32 = 0xffe3;
 pub const ALT: u32 = 0xffe9;
-
-/// Looks until something is there, and gives up with a reason.
-pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let begun = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what} did not come within {PATIENCE:?}");
-        std::thread::sleep(Duration::from_millis(30));
-    }
-}
 
 /// A server of its own, so that tests run side by side, with a window manager where shapes of windows matter.
 pub struct Desk {
@@ -305,30 +291,6 @@ pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture
     };
     let rgba = (0..size[1]).flat_map(row).copied().collect();
     Some(Picture { width: size[0], height: size[1], rgba })
-}
-
-/// A folder of one test, gone at its end.
-pub struct Folder(pub PathBuf);
-
-impl Folder {
-    pub fn new(name: &str) -> Folder {
-        // Two tests may want one of the same name.
-        static MADE: AtomicU32 = AtomicU32::new(0);
-        let n = MADE.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("echolume-window-{}-{n}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("make a folder for the test");
-        Folder(path)
-    }
-
-    pub fn path(&self, name: &str) -> String {
-        self.0.join(name).to_string_lossy().into_owned()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// What `echolume render` makes of a recording.

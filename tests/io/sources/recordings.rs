@@ -1,42 +1,16 @@
-//! Recordings made on the spot, and folders that clean up after themselves.
+//! Recordings made on the spot.
 
+pub use crate::common::files::{Folder, SWEEP, data as stored};
 pub use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 pub use echolume::source::{Frame, InputError, Recording, SampleType, StoredType};
 pub use flate2::{Compression, write::ZlibEncoder};
 pub use proptest::prelude::*;
 pub use std::fs;
 pub use std::io::Write;
-pub use std::path::{Path, PathBuf};
+pub use std::path::Path;
 
-pub fn stored(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
-}
-
-/// A folder of this test's own, without a probe file; gone when dropped.
-pub struct Folder(pub PathBuf);
-
-impl Folder {
-    pub fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-sources-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Folder(path)
-    }
-
-    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.join(name);
-        fs::write(&path, bytes).unwrap();
-        path
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-pub fn open(path: &Path) -> Recording {
-    Recording::open(path, None).unwrap_or_else(|e| panic!("{e}"))
+pub fn open(path: impl AsRef<Path>) -> Recording {
+    Recording::open(path.as_ref(), None).unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub fn all_frames(recording: &mut Recording) -> Result<Vec<Frame>, InputError> {
@@ -47,14 +21,14 @@ pub fn all_frames(recording: &mut Recording) -> Result<Vec<Frame>, InputError> {
     Ok(frames)
 }
 
-pub fn all_bytes(path: &Path) -> Result<Vec<u8>, InputError> {
-    let mut recording = Recording::open(path, None)?;
+pub fn all_bytes(path: impl AsRef<Path>) -> Result<Vec<u8>, InputError> {
+    let mut recording = Recording::open(path.as_ref(), None)?;
     let _ = recording.facts();
     Ok(all_frames(&mut recording)?.into_iter().flat_map(|f| f.bytes).collect())
 }
 
 /// What any bytes must give: frames, or one line that fits on a screen.
-pub fn total(path: &Path) -> Result<Vec<u8>, String> {
+pub fn total(path: impl AsRef<Path>) -> Result<Vec<u8>, String> {
     all_bytes(path).map_err(|error| {
         let line = error.to_string();
         assert_eq!(line.lines().count(), 1, "{line}");

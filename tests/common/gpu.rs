@@ -4,16 +4,16 @@ use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
-use echolume::probe::Geometry;
-use echolume::scene::{Input, Scene};
+use echolume::scene::Scene;
 use echolume::verify::built_in;
 use std::ops::Deref;
-use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use super::files::*;
+pub use super::probes::wobbler;
+pub use super::scenes::*;
 pub use echolume::verify::built_in::{
-    ALL_FILTERS, BYTES, FLOATS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
-    wobbler,
+    ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
 };
 
 /// A context that fails its test if validation said anything.
@@ -60,15 +60,6 @@ impl Drop for Device {
             assert!(messages.is_empty(), "{} messages of validation, first: {}", messages.len(), messages[0]);
         }
     }
-}
-
-pub fn data(file: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
-}
-
-/// A scene from TOML.
-pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Scene {
-    built_in::scene(geometry, input, toml).expect("scene")
 }
 
 /// Scenes by name that among them need every pass.

@@ -1,40 +1,12 @@
-//! Runs of the program, and folders that go away.
+//! Running the program.
 
-use std::collections::BTreeSet;
+pub use super::files::*;
 use std::fs;
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
-pub const SWEEP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.mha");
-pub const KRETZ: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/wobbler-4dc7/sweep.vol");
-pub const BONE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bone-l14/bone.mha");
-
-/// A folder of one test, gone at its end.
-pub struct Folder(pub PathBuf);
 
 impl Folder {
-    pub fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("echolume-cli-{}-{name}", std::process::id()));
-        fs::create_dir_all(&path).expect("make a folder for the test");
-        Folder(path)
-    }
-
-    pub fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().expect("the temporary folder has a plain name").to_string()
-    }
-
-    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        let path = self.path(name);
-        fs::write(&path, bytes).expect("write a file of the test");
-        path
-    }
-
-    pub fn names(&self) -> BTreeSet<String> {
-        let entries = fs::read_dir(&self.0).expect("list the test's folder").map(|e| e.expect("read an entry"));
-        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
-    }
-
     /// A refused rendering leaves the picture that was there, and nothing beside it.
     pub fn refuses(&self, arguments: &[&str], named: &[&str]) {
         let old = self.write("old.png", "old");
@@ -45,10 +17,20 @@ impl Folder {
     }
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
+/// The program, with the default action of each signal: whoever runs the tests may ignore one, as `nohup` does, and a shell ignores
+/// SIGINT for what it starts in the background.
+pub fn with_default_signals() -> Command {
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
+    command
+}
+
+/// Hides every Vulkan device from a command.
+pub fn without_device(command: &mut Command) -> &mut Command {
+    command
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .env_remove("VK_ADD_DRIVER_FILES")
 }
 
 /// Exit code, standard output and standard error.

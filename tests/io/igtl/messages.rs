@@ -1,5 +1,6 @@
 //! Messages made on the spot.
 
+use crate::common::files::data;
 pub use echolume::source::igtl::*;
 pub use proptest::prelude::*;
 pub use std::time::{Duration, Instant};
@@ -8,8 +9,7 @@ pub const FILES: [&str; 5] =
     ["Image_Motor_v1.bin", "Image_v2_v2.bin", "ProbeToMotor_v1.bin", "Str_v1.bin", "TDATA_ref_cpp_v1.bin"];
 
 pub fn stored(name: &str) -> Vec<u8> {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/openigtlink").join(name);
-    std::fs::read(path).unwrap()
+    std::fs::read(data("openigtlink").join(name)).unwrap()
 }
 
 /// A message of any type and body, with the right size and checksum.
