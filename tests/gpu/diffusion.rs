@@ -1,6 +1,6 @@
 //! Perona-Malik: against another implementation's numbers, against dense solves, at and beyond its limits.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::filters::{by_reference, largest_difference, noise, on_device, plane, texels};
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Texels, by_name};

@@ -1,7 +1,7 @@
 //! Extreme geometries, cameras and pictures (a test a case): drawn as the f64 reference draws them, or refused in one line that
 //! names what is wrong.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::plan::Plan;

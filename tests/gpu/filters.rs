@@ -1,6 +1,6 @@
 //! The sigma filters: known answers, extremes, misses, what is refused; plans of every filter in a row.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
 use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};

@@ -1,6 +1,6 @@
 //! Few stored pictures, made by the f64 reference, so that no driver is the truth. `tools/goldens` makes them anew.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels};
 use echolume::picture::Picture;
 use echolume::probe::{Advance, Geometry, Probe};
@@ -54,7 +54,7 @@ fn goldens() -> Vec<(&'static str, Scene, Vec<Texels>)> {
 }
 
 fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(format!("{name}.png"))
+    repository("tests/goldens").join(format!("{name}.png"))
 }
 
 #[test]

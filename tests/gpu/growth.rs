@@ -1,6 +1,6 @@
 //! The estimators of the enhanced sigma filter by hand, and the growth of its windows against a count by brute force.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::{Options, Renderer};

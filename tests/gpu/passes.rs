@@ -1,7 +1,7 @@
 //! Every pass alone against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
 //! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
 use echolume::gpu::{ContextOptions, Fetch, Options, Renderer};

@@ -1,6 +1,6 @@
 //! Real and simulated recordings against what is known of them.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};

@@ -1,6 +1,6 @@
 //! Whether the self-test of `echolume verify` can fail. That what it plants is caught is `cli`'s to say.
 
-use crate::common::chosen;
+use crate::common::gpu::chosen;
 use echolume::gpu::ContextOptions;
 use echolume::passes::fault_injection::{Change, InjectedFault};
 use echolume::verify::report::Verdict;

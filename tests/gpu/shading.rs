@@ -1,7 +1,7 @@
 //! Stage 3 on distance maps whose look is known: shadows where geometry puts them, one colour on a plane whatever its holes,
 //! filters that invent no edges; and which surface of several is taken.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit};
 use echolume::probe::{Geometry, Grid};

@@ -1,7 +1,7 @@
 //! The filter that slides along the ray keeps sums of slices from sample to sample. Rays side by side on one unit enter the
 //! sector one after the other, and each sums anew what it lacks while the others wait.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name, is_hit};
 use echolume::probe::Geometry;
 use glam::DVec3;

@@ -1,6 +1,6 @@
 //! Passes that are timed alone. Time stamps of whole pictures are looked at by `echolume verify`.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::pass_runner::{PassRunner, Timed};
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name};
 use echolume::probe::Geometry;
