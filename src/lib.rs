@@ -54,6 +54,7 @@ pub mod shader_source;
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
+#[cfg(feature = "view")]
 #[forbid(unsafe_code)]
 pub mod ui;
 #[forbid(unsafe_code)]
