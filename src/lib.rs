@@ -60,6 +60,7 @@ pub mod shader_source;
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
+#[cfg(feature = "view")]
 #[forbid(unsafe_code)]
 pub mod thesis_tables;
 #[forbid(unsafe_code)]

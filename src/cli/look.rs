@@ -80,6 +80,7 @@ impl Look {
     }
 
     /// Whether the size of the picture was typed.
+    #[cfg(feature = "view")]
     pub fn has_size(&self) -> bool {
         self.size.is_some()
     }

@@ -21,7 +21,11 @@ pub mod select;
 pub mod slots;
 pub mod timeline;
 pub mod timing;
+#[cfg(feature = "view")]
 pub mod window;
+#[cfg(not(feature = "view"))]
+#[path = "no_window.rs"]
+mod window;
 
 pub use context::{Context, ContextOptions};
 pub use error::GpuError;

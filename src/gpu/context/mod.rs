@@ -30,6 +30,7 @@ pub struct ContextOptions {
 
 pub struct Context {
     /// Kept loaded as long as anything made from it lives.
+    #[cfg_attr(not(feature = "view"), expect(dead_code))]
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
     /// Of a context whose pictures are shown.
@@ -99,6 +100,7 @@ impl Context {
     ///
     /// # Errors
     /// As of [`Context::new`]; no device that can show anything there.
+    #[cfg(feature = "view")]
     pub fn showing(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
         Context::make(options, Some(target))
     }
@@ -183,8 +185,7 @@ impl Context {
             shows: target.map(|target| Shows {
                 surfaces: ash::khr::surface::Instance::new(&entry, instance),
                 swapchains: ash::khr::swapchain::Device::new(instance, &device),
-                displays: matches!(target, Target::Monitor(_))
-                    .then(|| ash::khr::display::Instance::new(&entry, instance)),
+                displays: target.is_monitor().then(|| ash::khr::display::Instance::new(&entry, instance)),
             }),
             instance: instance.clone(),
             entry,
@@ -313,6 +314,7 @@ impl Context {
     }
 
     /// What is done to the queue that renders by others than [`Context::submit`], one at a time.
+    #[cfg(feature = "view")]
     pub(super) fn on_queue<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> T {
         work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
     }

@@ -64,6 +64,11 @@ impl Renderer {
         Ok(rerun)
     }
 
+    /// Waits until what was shown last has been taken from the picture's image.
+    fn wait_presented(&self) -> Result<(), GpuError> {
+        self.timelines.of(0).wait(self.presented)
+    }
+
     fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
         let refilled = match rerun {
             Rerun::Steps { steps, slots } => {

@@ -5,6 +5,7 @@ mod change;
 mod draw;
 mod frames;
 mod inspect;
+#[cfg(feature = "view")]
 mod present;
 mod slab;
 

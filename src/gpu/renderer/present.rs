@@ -4,11 +4,6 @@ use super::*;
 use crate::gpu::window::{Panels, PresentOutcome, Screen};
 
 impl Renderer {
-    /// Waits until what was shown last has been taken from the picture's image.
-    pub(super) fn wait_presented(&self) -> Result<(), GpuError> {
-        self.timelines.of(0).wait(self.presented)
-    }
-
     /// Shows the last picture with its upper left corner `at` a pixel of the window, and panels over it. A picture that is on its way
     /// comes first: it is what is shown.
     ///

@@ -4,6 +4,7 @@ use super::{told, written};
 use echolume::error_report::{Measure, Report, choose, summary_table};
 use echolume::picture::grey::Grey;
 use echolume::profile::{compare, formats, table as passes};
+#[cfg(feature = "view")]
 use echolume::ui::quality_ladder;
 use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
 
@@ -20,6 +21,9 @@ pub fn error_report(bytes: &[u8]) -> String {
         outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
         outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
     }
+    #[cfg(not(feature = "view"))]
+    let rungs = 0;
+    #[cfg(feature = "view")]
     let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
     format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
 }
