@@ -6,7 +6,7 @@ use super::turns::Turns;
 use super::{Failure, failed, input, say, unheard};
 use crate::files::signals::Held;
 use crate::gpu::Context;
-use crate::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
+use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::picture;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -69,7 +69,7 @@ impl Stream {
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let (images, queues) = (self.turns.images, self.turns.queues());
-        let options = Options { update, images, queues, ..Options::default() };
+        let options = StreamOptions { update, images, queues, ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.go(&mut stream, update, &mut context);
         drop(stream);
@@ -106,7 +106,7 @@ impl Stream {
                     pictures += 1;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
-                Step::Went => {}
+                Step::Progress => {}
                 Step::End(why) => break why,
             }
             if told.elapsed() >= EVERY {
@@ -158,7 +158,7 @@ impl Stream {
         }
     }
 
-    fn keep(&self, shown: &Shown, update: Update, number: u64) -> Result<(), Failure> {
+    fn keep(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
         let name = match update {
             Update::Whole => format!("volume-{:06}.png", shown.volume),

@@ -9,7 +9,7 @@ use super::{Failure, failed, input, say};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
@@ -188,7 +188,7 @@ impl View {
         let options = Options {
             settings: self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
             update: self.turns.update()?,
-            cine: Room { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
+            cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,
             record: self.record.clone(),

@@ -81,7 +81,10 @@ fn the_keys_of_time_freeze_look_back_and_play() {
     ] {
         desk.press(key);
         desk.rest();
-        assert!(desk.console.stream().cine_place() == Some(place) && desk.picture() == seen[place], "{key:?}: {place}");
+        assert!(
+            desk.console.stream().cine_position() == Some(place) && desk.picture() == seen[place],
+            "{key:?}: {place}"
+        );
     }
     desk.press(Key::Enter);
     let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
@@ -90,7 +93,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
         let next = desk.tick(now);
         let stream = desk.console.stream();
         if stream.is_idle() {
-            places.extend(stream.cine_place().filter(|place| places.last() != Some(place)));
+            places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
             // The time at which it asks to be asked again comes at once.
             now = next.at.expect("a loop goes on").max(now);
         }
