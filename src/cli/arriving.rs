@@ -7,10 +7,10 @@ use crate::probe::Geometry;
 use crate::source::Source;
 use crate::source::freehand;
 use crate::source::igtl::{Network, NetworkOptions, Poses};
-use crate::source::live::{Live, Paced, Playback};
+use crate::source::live::{Live, Playback, PlaybackSource};
 use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, Phantom};
-use crate::source::phantom_source::Kept;
+use crate::source::phantom_source::CachedPhantom;
 use crate::source::piped::Piped;
 use clap::Parser;
 use std::path::{Path, PathBuf};
@@ -129,7 +129,7 @@ impl Arriving {
             let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
             // A free-running probe is as fast as sound lets it.
             let rate = self.rate.or(driving.as_ref().and_then(|_| fastest(&*recording)));
-            Box::new(Paced::new(recording, self.pace(rate)?, self.rounds))
+            Box::new(PlaybackSource::new(recording, self.pace(rate)?, self.rounds))
         };
         match driving {
             Some(driving) => {
@@ -153,11 +153,12 @@ impl Arriving {
 
     /// Volumes of the phantom in turns, or where a motor is driven what its array sees.
     fn phantom(&self, driving: Option<&Driving>) -> Result<Box<dyn Live>, Failure> {
-        let options = phantom::Options { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::Options::default() };
+        let options =
+            phantom::PhantomOptions { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::PhantomOptions::default() };
         let Some(driving) = driving else {
             let pace = self.pace(self.rate.or(Some(PHANTOM_RATE)))?;
             let phantom = Phantom::new(options).map_err(input)?;
-            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), pace, u32::MAX)));
+            return Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(phantom)), pace, u32::MAX)));
         };
         if self.rate.is_some() || self.real_time {
             return Err(input("--rate and --real-time: sound and the motor are the phantom's pace with --motor"));
@@ -181,7 +182,8 @@ impl Arriving {
         };
         let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
         let widest_hole = positive("--hole", self.hole, 0.0)?;
-        options.freehand = freehand::Options { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
+        options.freehand =
+            freehand::CompoundingOptions { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
         Ok(options)
     }
 

@@ -5,7 +5,7 @@ use super::{Failure, failed, input};
 use crate::probe::ProbeFile;
 use crate::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
 use crate::source::live::Live;
-use crate::source::motor_tracking::{Clock, Options, Swept};
+use crate::source::motor_tracking::{Clock, MotorTracked, MotorTrackingOptions};
 use std::path::Path;
 
 /// The motor's sweep, of what the frames lie over.
@@ -94,6 +94,6 @@ impl Driving<'_> {
             true => Clock::Stamp,
             false => Clock::Arrival { delay: self.arguments.delay * 1e-3 },
         };
-        Box::new(Swept::new(source, motor, Options { clock, holds }))
+        Box::new(MotorTracked::new(source, motor, MotorTrackingOptions { clock, holds }))
     }
 }

@@ -189,7 +189,7 @@ impl Recording {
     }
 
     /// What the file is, for people to read: title and value. Never a patient's name or number.
-    pub fn facts(&self) -> Vec<(String, String)> {
+    pub fn description(&self) -> Vec<(String, String)> {
         let mut facts: Vec<(String, String)> = Vec::new();
         let mut say = |title: &str, value: String| facts.push((title.into(), value));
         say("format", self.format().into());

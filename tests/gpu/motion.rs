@@ -219,7 +219,7 @@ fn a_ball_swept_both_ways_does_not_move() {
 /// The phantom's ball, swept forth and back with the motor moving: the two distance maps, in one view.
 #[test]
 fn the_phantom_stands_still_between_sweeps_forth_and_back() {
-    use echolume::source::phantom::{Body, Options as Made, Phantom, Truth};
+    use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Truth};
     let device = Device::new();
     let made =
         Made { body: Body::Sphere, volumes: 2, both_ways: true, speckle: false, speed_ratio: 0.9, ..Made::default() };

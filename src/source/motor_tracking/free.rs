@@ -2,8 +2,8 @@
 
 use crate::probe::motor::{Place, Watch};
 use crate::source::live::{Event, Live, header_of};
-use crate::source::phantom::{Options, Phantom};
-use crate::source::phantom_source::Played;
+use crate::source::phantom::{Phantom, PhantomOptions};
+use crate::source::phantom_source::PhantomSource;
 use crate::source::recorder::Header;
 use crate::source::{Frame, InputError};
 use std::time::{Duration, Instant};
@@ -35,18 +35,18 @@ impl FreeRunning {
     ///
     /// # Errors
     /// As of [`Phantom::new`].
-    pub fn phantom(options: Options, speed: f64) -> Result<Phantom, InputError> {
-        let options = Options { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
-        let ratio = |options: &Options| {
+    pub fn phantom(options: PhantomOptions, speed: f64) -> Result<Phantom, InputError> {
+        let options = PhantomOptions { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
+        let ratio = |options: &PhantomOptions| {
             let probe = Phantom::new(options.clone())?.probe(0);
             let frame_time = probe.acquisition_time() / probe.slices.len() as f64;
             Ok(speed.to_radians() * frame_time / probe.slices.pitch())
         };
         let share = (RATIO / ratio(&options)?).min(1.0);
         let lines = ((options.lines as f64 * share) as usize).max(FEWEST);
-        let options = Options { lines, ..options };
+        let options = PhantomOptions { lines, ..options };
         let speed_ratio = ratio(&options)?.min(1.0);
-        Phantom::new(Options { speed_ratio, ..options })
+        Phantom::new(PhantomOptions { speed_ratio, ..options })
     }
 
     /// Computes the phantom's volumes. `watch`: of the motor that turns the array.
@@ -55,7 +55,7 @@ impl FreeRunning {
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));
         let probe = phantom.probe(0);
         let period = probe.acquisition_time() / probe.slices.len() as f64;
-        let header = header_of(&Played::new(phantom));
+        let header = header_of(&PhantomSource::new(phantom));
         FreeRunning { header, watch, volumes, period, begun: false, next: None, count: 0 }
     }
 

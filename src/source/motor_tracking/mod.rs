@@ -15,7 +15,7 @@ mod counts;
 mod free;
 mod passes;
 
-pub use counts::Counts;
+pub use counts::TrackingCounts;
 pub use free::FreeRunning;
 
 use super::Frame;
@@ -46,7 +46,7 @@ pub enum Clock {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct MotorTrackingOptions {
     pub clock: Clock,
     /// The source is asked for frames only once the array sweeps, as a file can be. What runs by itself is listened to from the
     /// start: frames that waited would be taken for new ones.
@@ -56,10 +56,10 @@ pub struct Options {
 /// A free-running source whose frames the motor places.
 ///
 /// Memory: 32 frames that wait for a position, two that may be the nearest to their slice, and those that stand in for missing ones.
-pub struct Swept {
+pub struct MotorTracked {
     source: Box<dyn Live>,
     motor: Turning,
-    options: Options,
+    options: MotorTrackingOptions,
     now: Option<Now>,
     /// Frames that came, without place, and when: the time of the first line on the motor's clock, and until when they wait.
     waiting: VecDeque<(f64, Instant, Frame)>,
@@ -68,8 +68,8 @@ pub struct Swept {
     out: VecDeque<Event>,
     /// Why the source ended.
     ended: Option<Option<String>>,
-    counts: Counts,
-    told: Counts,
+    counts: TrackingCounts,
+    told: TrackingCounts,
     told_at: Instant,
     over: bool,
 }
@@ -82,9 +82,9 @@ struct Now {
     frame_bytes: usize,
 }
 
-impl Swept {
-    pub fn new(source: Box<dyn Live>, motor: Turning, options: Options) -> Swept {
-        Swept {
+impl MotorTracked {
+    pub fn new(source: Box<dyn Live>, motor: Turning, options: MotorTrackingOptions) -> MotorTracked {
+        MotorTracked {
             source,
             motor,
             options,
@@ -93,14 +93,14 @@ impl Swept {
             lines: None,
             out: VecDeque::new(),
             ended: None,
-            counts: Counts::default(),
-            told: Counts::default(),
+            counts: TrackingCounts::default(),
+            told: TrackingCounts::default(),
             told_at: Instant::now(),
             over: false,
         }
     }
 
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> TrackingCounts {
         self.counts
     }
 
@@ -219,7 +219,7 @@ impl Swept {
     }
 }
 
-impl Live for Swept {
+impl Live for MotorTracked {
     fn next(&mut self, patience: Duration) -> Event {
         let until = Instant::now() + patience;
         loop {

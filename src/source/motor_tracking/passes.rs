@@ -1,6 +1,6 @@
 //! Frames of known angle become the slices of a pass. Pure.
 
-use super::Counts;
+use super::TrackingCounts;
 use crate::probe::Axis;
 use crate::probe::motor::{Direction, Place};
 use crate::source::Frame;
@@ -52,7 +52,7 @@ impl Passes {
     }
 
     /// A frame and where the array was at its first line. What is thereby known goes `out`.
-    pub fn frame(&mut self, frame: Frame, place: Place, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    pub fn frame(&mut self, frame: Frame, place: Place, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let last = self.slices.len() as f64 - 1.0;
         match place {
             Place::Outside => counts.unknown += 1,
@@ -113,7 +113,7 @@ impl Passes {
     }
 
     /// The pass that goes on, if any, is over.
-    pub fn end(&mut self, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    pub fn end(&mut self, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let Some(mut now) = self.now.take() else { return };
         if let Some(nearest) = now.nearest.take() {
             self.give(&mut now, nearest, counts, out);
@@ -134,7 +134,7 @@ impl Passes {
     }
 
     /// Gives a frame, and before it those that stand in for missing slices: each that of the neighbour whose angle is nearer.
-    fn give(&self, now: &mut Pass, near: Near, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    fn give(&self, now: &mut Pass, near: Near, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let before = now.given.take();
         let missing = before.as_ref().map_or(0, |given| given.step + 1)..near.step;
         if missing.len() <= MOST_FILLED {
@@ -189,8 +189,8 @@ mod tests {
     }
 
     /// Passes of these angles, deg, every second one backwards; frames are tagged by their place in the list.
-    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, Counts) {
-        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, TrackingCounts) {
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let mut tag = 0;
         for (pass, angles) in passes.iter().enumerate() {
             let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn what_lies_half_a_pitch_beyond_the_sweep_or_at_a_turn_is_left_out_and_ends_the_pass() {
-        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let at = |angle, pass| Place::Pass { angle, direction: Direction::Forward, pass };
         for angle in [-9.0, -7.01, -6.9, -4.0, -2.0, 0.0, 2.0, 4.0, 6.9] {
             all.frame(frame(0), at(angle, 0), &mut counts, &mut out);
@@ -271,7 +271,7 @@ mod tests {
         fn no_order_of_places_gives_a_slice_twice(
             places in prop::collection::vec((-9.0..9.0_f64, 0..4_usize, 0..6_u8), 0..200),
         ) {
-            let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+            let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
             for (angle, pass, kind) in places {
                 let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
                 let place = match kind {

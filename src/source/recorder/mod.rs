@@ -18,7 +18,7 @@ mod facts;
 mod read;
 mod write;
 
-pub use read::Replay;
+pub use read::Reader;
 pub use write::Writer;
 
 use super::StoredType;

@@ -1,7 +1,7 @@
 //! Freezing, the cine loop, and settings that change while nothing comes.
 
 use super::*;
-use echolume::source::recorder::Replay;
+use echolume::source::recorder::Reader;
 
 /// Prevents a frozen picture that changes, work for frames that nobody sees, a recording with a gap, and a volume of which the first
 /// frames came while frozen from being shown as if it were whole.
@@ -32,7 +32,7 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
         let counts = bench.stream.statistics().expect("statistics").volumes;
         assert_eq!((counts.shown, counts.dropped, bench.faults.len()), (2, 0, 0), "{counts:?}");
         drop(bench);
-        let recording = Replay::open(&file).expect("recording");
+        let recording = Reader::open(&file).expect("recording");
         assert_eq!((recording.frames(), recording.rebuilt()), (5 * 9, false));
     }
 }
