@@ -3,7 +3,7 @@
 use super::serial::{Serial, fault, motor_of};
 use super::{Failure, failed, input};
 use crate::probe::ProbeFile;
-use crate::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
+use crate::probe::motor::{BackgroundSweep, Drive, MotorTable, PortSettings, Sweep};
 use crate::source::live::Live;
 use crate::source::motor_tracking::{Clock, MotorTracked, MotorTrackingOptions};
 use std::path::Path;
@@ -38,7 +38,7 @@ pub struct Driven {
 /// A sweep that the motor can do. Nothing has been touched yet.
 pub struct Driving<'a> {
     arguments: &'a Driven,
-    settings: Settings,
+    settings: PortSettings,
     table: MotorTable,
     sweep: Sweep,
     /// Degrees a second between the ramps.
@@ -64,7 +64,7 @@ impl Driven {
     ) -> Result<Option<Driving<'_>>, Failure> {
         let (Some(port), Some(rate)) = (&self.motor, self.sweeps) else { return Ok(None) };
         self.check()?;
-        let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::beside)) else {
+        let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::find_for)) else {
             return Err(input("--motor needs --probe FILE, whose [motor] table says how far to turn"));
         };
         let probe = ProbeFile::read(&file).map_err(input)?;
@@ -83,13 +83,13 @@ impl Driven {
 
 impl Driving<'_> {
     /// The motor begins to look for home.
-    pub fn start(&self) -> Result<Turning, Failure> {
+    pub fn start(&self) -> Result<BackgroundSweep, Failure> {
         let drive = Drive::open(&self.settings, &self.table).map_err(fault)?;
-        Turning::start(drive, self.sweep, self.arguments.homed).map_err(failed)
+        BackgroundSweep::start(drive, self.sweep, self.arguments.homed).map_err(failed)
     }
 
     /// `holds`: see [`Options::holds`].
-    pub fn place(&self, source: Box<dyn Live>, motor: Turning, holds: bool) -> Box<dyn Live> {
+    pub fn place(&self, source: Box<dyn Live>, motor: BackgroundSweep, holds: bool) -> Box<dyn Live> {
         let clock = match self.arguments.stamps {
             true => Clock::Stamp,
             false => Clock::Arrival { delay: self.arguments.delay * 1e-3 },

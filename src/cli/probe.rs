@@ -4,7 +4,7 @@ use super::serial::{Serial, fault, table};
 use super::{Failure, failed, input, say, targets};
 use crate::files::replace;
 use crate::files::signals::Held;
-use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
+use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, PortSettings, Position, Sweep, port};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
@@ -86,7 +86,7 @@ struct Simulate {
     /// What goes wrong: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS so long after
     /// the sweep's begin
     #[arg(long, value_name = "NAME[@SECONDS]")]
-    fault: Option<crate::probe::motor::simulate::Injected>,
+    fault: Option<crate::probe::motor::simulate::SimulatedFault>,
     /// A module without a watchdog
     #[arg(long)]
     no_watchdog: bool,
@@ -107,7 +107,7 @@ impl Probe {
 }
 
 impl Line {
-    fn settings(&self) -> Settings {
+    fn settings(&self) -> PortSettings {
         self.serial.settings(&self.port)
     }
 
@@ -222,9 +222,9 @@ fn csv(positions: &[Position]) -> String {
 #[cfg(target_os = "linux")]
 impl Simulate {
     fn run(&self) -> Result<(), Failure> {
-        use crate::probe::motor::simulate::{Options, Simulator};
+        use crate::probe::motor::simulate::{Simulator, SimulatorOptions};
         let held = Held::take();
-        let options = Options {
+        let options = SimulatorOptions {
             table: table(self.probe.as_ref())?.unwrap_or_default(),
             fault: self.fault,
             no_watchdog: self.no_watchdog,

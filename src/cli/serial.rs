@@ -2,7 +2,7 @@
 
 use super::{Failure, failed, input};
 use crate::probe::ProbeFile;
-use crate::probe::motor::{Fault, MotorError, MotorTable, Parity, Settings, StopBits};
+use crate::probe::motor::{Fault, MotorError, MotorTable, Parity, PortSettings, StopBits};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -31,8 +31,8 @@ enum ParityName {
 }
 
 impl Serial {
-    pub fn settings(&self, port: &str) -> Settings {
-        Settings {
+    pub fn settings(&self, port: &str) -> PortSettings {
+        PortSettings {
             path: port.into(),
             baud: self.baud,
             parity: match self.parity {

@@ -5,7 +5,7 @@ use crate::common::files::Folder;
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::own_process;
 use echolume::live::Feed;
-use echolume::probe::motor::{Drive, Sweep, Turning};
+use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
 use echolume::source::live::Event;
 use echolume::source::motor_tracking::{self, Clock, FreeRunning, MotorTracked};
 use echolume::source::phantom;
@@ -25,7 +25,7 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
     let simulator = simulated(None);
     let drive = Drive::open(&settings(&simulator, 2000), &table()).expect("opened");
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
-    let motor = Turning::start(drive, sweep, false).expect("a sweep that it can do");
+    let motor = BackgroundSweep::start(drive, sweep, false).expect("a sweep that it can do");
     let options = phantom::PhantomOptions { volumes: 2, lines: 16, samples: 16, ..phantom::PhantomOptions::default() };
     let phantom = FreeRunning::phantom(options, motor.speed()).expect("a phantom");
     let source = FreeRunning::new(phantom, motor.watch().clone());

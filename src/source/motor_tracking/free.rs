@@ -1,6 +1,6 @@
 //! The phantom as a free-running probe: frame after frame as fast as sound allows, each of where the array really is.
 
-use crate::probe::motor::{Place, Watch};
+use crate::probe::motor::{ArrayState, PositionLog};
 use crate::source::live::{Event, Live, header_of};
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::source::phantom_source::PhantomSource;
@@ -18,7 +18,7 @@ const FEWEST: usize = 16;
 /// Memory: the phantom's volumes, computed once.
 pub struct FreeRunning {
     header: Header,
-    watch: Watch,
+    watch: PositionLog,
     /// By volume and slice.
     volumes: Vec<Vec<Frame>>,
     /// Of a frame, s.
@@ -50,7 +50,7 @@ impl FreeRunning {
     }
 
     /// Computes the phantom's volumes. `watch`: of the motor that turns the array.
-    pub fn new(phantom: Phantom, watch: Watch) -> FreeRunning {
+    pub fn new(phantom: Phantom, watch: PositionLog) -> FreeRunning {
         let mut volumes: Vec<Vec<Frame>> = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));
         let probe = phantom.probe(0);
@@ -62,9 +62,9 @@ impl FreeRunning {
     /// What the array saw at a time: the frame of the nearest slice, swept the way that the array went.
     fn seen(&self, time: f64) -> Option<&Frame> {
         let (angle, pass) = match self.watch.at(time) {
-            Place::Pass { angle, pass, .. } => (angle, pass),
-            Place::Turning { angle } => (angle, 0),
-            Place::Outside => self.watch.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
+            ArrayState::Sweeping { angle, pass, .. } => (angle, pass),
+            ArrayState::Reversing { angle } => (angle, 0),
+            ArrayState::Unknown => self.watch.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
         };
         let volume = self.volumes.get(pass % self.volumes.len().max(1))?;
         let crate::probe::Geometry::Sweep(probe) = &self.header.forward else { return None };

@@ -21,7 +21,7 @@ pub use free::FreeRunning;
 use super::Frame;
 use super::live::{Event, Live};
 use super::recorder::Header;
-use crate::probe::motor::{Place, Turning};
+use crate::probe::motor::{ArrayState, BackgroundSweep};
 use crate::probe::{Advance, Axis, Geometry, Motion, Probe};
 use passes::{MOST_FILLED, Passes};
 use std::collections::VecDeque;
@@ -58,7 +58,7 @@ pub struct MotorTrackingOptions {
 /// Memory: 32 frames that wait for a position, two that may be the nearest to their slice, and those that stand in for missing ones.
 pub struct MotorTracked {
     source: Box<dyn Live>,
-    motor: Turning,
+    motor: BackgroundSweep,
     options: MotorTrackingOptions,
     now: Option<Now>,
     /// Frames that came, without place, and when: the time of the first line on the motor's clock, and until when they wait.
@@ -83,7 +83,7 @@ struct Now {
 }
 
 impl MotorTracked {
-    pub fn new(source: Box<dyn Live>, motor: Turning, options: MotorTrackingOptions) -> MotorTracked {
+    pub fn new(source: Box<dyn Live>, motor: BackgroundSweep, options: MotorTrackingOptions) -> MotorTracked {
         MotorTracked {
             source,
             motor,
@@ -181,14 +181,14 @@ impl MotorTracked {
             let place = self.motor.watch().at(time);
             let span = self.motor.watch().span();
             let not_yet = span.is_some_and(|(_, last)| time > last.time);
-            if place == Place::Outside && not_yet && !all && Instant::now() < until {
+            if place == ArrayState::Unknown && not_yet && !all && Instant::now() < until {
                 return;
             }
             let Some((_, _, mut frame)) = self.waiting.pop_front() else { return };
             frame.time = Some(time);
             match (place, span) {
-                (Place::Outside, None) => self.counts.early += 1,
-                (Place::Outside, Some((first, _))) if time < first.time => self.counts.early += 1,
+                (ArrayState::Unknown, None) => self.counts.early += 1,
+                (ArrayState::Unknown, Some((first, _))) if time < first.time => self.counts.early += 1,
                 _ => now.passes.frame(frame, place, &mut self.counts, &mut self.out),
             }
         }

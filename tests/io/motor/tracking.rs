@@ -4,7 +4,7 @@ use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::probes::wobbler;
 use crate::common::wait::eventually;
 use echolume::probe::motor::simulate::Simulator;
-use echolume::probe::motor::{Drive, Sweep, Turning};
+use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
 use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use echolume::source::live::{Event, Live};
 use echolume::source::motor_tracking::{Clock, FreeRunning, MotorTracked, MotorTrackingOptions};
@@ -91,9 +91,9 @@ impl Live for Free {
     }
 }
 
-fn turning(simulator: &Simulator, sweep: Sweep) -> Turning {
+fn turning(simulator: &Simulator, sweep: Sweep) -> BackgroundSweep {
     let drive = Drive::open(&settings(simulator, 2000), &table()).expect("opened");
-    Turning::start(drive, sweep, false).expect("a sweep that it can do")
+    BackgroundSweep::start(drive, sweep, false).expect("a sweep that it can do")
 }
 
 fn swept(simulator: &Arc<Simulator>, source: Free, clock: Clock) -> MotorTracked {
