@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub struct Info {
     /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
     file: PathBuf,
-    /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the file
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the file]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
 }
