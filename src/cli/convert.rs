@@ -89,7 +89,7 @@ impl Convert {
             return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
         }
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
-        let beside = sequence::beside(&self.output);
+        let beside = sequence::probe_file_path(&self.output);
         self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());

@@ -15,7 +15,7 @@ pub struct Info {
 
 impl Info {
     pub fn run(&self) -> Result<(), Failure> {
-        let facts = source::facts(&self.file, self.probe.as_deref()).map_err(input)?;
+        let facts = source::description(&self.file, self.probe.as_deref()).map_err(input)?;
         let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
         for (name, value) in facts {
             say!("{name:width$}  {value}");

@@ -1,7 +1,7 @@
 //! `echolume phantom`.
 
 use crate::picture::check_target;
-use crate::source::phantom::{Body, Options, Phantom};
+use crate::source::phantom::{Body, Phantom, PhantomOptions};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::PathBuf;
 
@@ -32,14 +32,14 @@ pub struct MakePhantom {
 
 impl MakePhantom {
     pub fn run(&self) -> Result<(), Failure> {
-        let options = Options {
+        let options = PhantomOptions {
             seed: self.seed,
             body: self.body.parse::<Body>().map_err(input)?,
             volumes: self.volumes,
             both_ways: self.both_ways,
             speckle: !self.no_speckle,
             speed_ratio: self.speed_ratio.unwrap_or(if self.both_ways { 0.5 } else { 0.0 }),
-            ..Options::default()
+            ..PhantomOptions::default()
         };
         let phantom = Phantom::new(options).map_err(input)?;
         check_target(&self.output).map_err(failed)?;

@@ -3,7 +3,7 @@
 use crate::args::{SerialArgs, check_outputs, motor_failure, motor_table};
 use crate::files::replace;
 use crate::files::signals::Held;
-use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
+use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, PortSettings, Position, Sweep, port};
 use crate::terminal::{Failure, failed, input, say};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -86,7 +86,7 @@ struct Simulate {
     /// Fault to inject: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS that long after
     /// the sweep began
     #[arg(long, value_name = "NAME[@SECONDS]")]
-    fault: Option<crate::probe::motor::simulate::Injected>,
+    fault: Option<crate::probe::motor::simulate::SimulatedFault>,
     /// Simulate a module without a watchdog
     #[arg(long)]
     no_watchdog: bool,
@@ -107,7 +107,7 @@ impl Probe {
 }
 
 impl Line {
-    fn settings(&self) -> Settings {
+    fn settings(&self) -> PortSettings {
         self.serial.settings(&self.port)
     }
 
@@ -222,9 +222,9 @@ fn csv(positions: &[Position]) -> String {
 #[cfg(target_os = "linux")]
 impl Simulate {
     fn run(&self) -> Result<(), Failure> {
-        use crate::probe::motor::simulate::{Options, Simulator};
+        use crate::probe::motor::simulate::{Simulator, SimulatorOptions};
         let held = Held::take();
-        let options = Options {
+        let options = SimulatorOptions {
             table: motor_table(self.probe.as_ref())?.unwrap_or_default(),
             fault: self.fault,
             no_watchdog: self.no_watchdog,

@@ -3,7 +3,7 @@
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::files::signals::Held;
 use crate::gpu::Context;
-use crate::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
+use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::picture;
 use crate::terminal::{Failure, failed, input, is_closed, say};
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ impl Stream {
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
         let (images, queues) = (self.stream.images, self.stream.queues());
-        let options = Options { update, images, queues, ..Options::default() };
+        let options = StreamOptions { update, images, queues, ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.run_stream(&mut stream, update, &mut context);
         drop(stream);
@@ -104,7 +104,7 @@ impl Stream {
                     pictures += 1;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
-                Step::Went => {}
+                Step::Progress => {}
                 Step::End(why) => break why,
             }
             if told.elapsed() >= INTERVAL {
@@ -157,7 +157,7 @@ impl Stream {
     }
 
     /// Writes a picture, if `--out` is given.
-    fn write_picture(&self, shown: &Shown, update: Update, number: u64) -> Result<(), Failure> {
+    fn write_picture(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
         let name = match update {
             Update::Whole => format!("volume-{:06}.png", shown.volume),

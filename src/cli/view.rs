@@ -6,7 +6,7 @@ use crate::error_report::command::{nanoseconds, read};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::quality_ladder::{self, Rung};
@@ -186,7 +186,7 @@ impl View {
         let options = Options {
             settings: self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
             update: self.stream.update()?,
-            cine: Room { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
+            cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,
             record: self.record.clone(),

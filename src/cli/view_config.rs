@@ -5,7 +5,7 @@ use crate::args::{SceneArgs, SourceArgs};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::source::live::Live;
 use crate::terminal::{Failure, input};
 use crate::ui::console::{Amiss, Console, Options};
@@ -106,7 +106,7 @@ impl ConsoleConfig {
         let options = Options {
             settings: scene.layers_over(layers, &[])?.finish().map_err(input)?,
             update: live.update,
-            cine: Room { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
+            cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
             budget: display.budget,
             rungs: rungs(display.report.as_deref())?,
             retry: Some(live.retry),
