@@ -13,7 +13,7 @@ use super::gestures::Gestures;
 use super::input::Input;
 use super::keys::Keys;
 use super::panels::{self, Note, Panels};
-use super::picture::Picture;
+use super::picking::Picture;
 use super::quality_ladder::Rung;
 use super::source_supervisor::{Open, SourceSupervisor};
 use super::times::Times;
