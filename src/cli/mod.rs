@@ -29,7 +29,7 @@ mod view;
 #[path = "no_view.rs"]
 mod view;
 
-use crate::kiosk::rotating::{self, Rotating};
+use crate::kiosk::log_rotation::{self, Rotating};
 use clap::{Parser, Subcommand};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -244,7 +244,7 @@ fn start_log(
             log.without_time().with_writer(std::io::stderr).finish().with(told).init();
         }
         Some(path) => {
-            let file = Rotating::open(path, rotating::USUAL_BYTES, rotating::USUAL_FILES);
+            let file = Rotating::open(path, log_rotation::USUAL_BYTES, log_rotation::USUAL_FILES);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }
