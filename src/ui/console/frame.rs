@@ -2,7 +2,7 @@
 
 use super::{Console, ConsoleError, Next};
 use crate::gpu::window::PresentOutcome;
-use crate::live::{Feed, Shown, Step, StreamError};
+use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use crate::ui::panels::{Banner, Facts};
 use crate::ui::source_supervisor::Condition;
 use crate::ui::times::Last;
@@ -30,7 +30,7 @@ impl Console {
             self.next.renews |= (amiss.is_mended)();
         }
         if let Some(feed) = self.supply.poll(now).filter(|_| self.amiss.is_none()) {
-            self.stream.listen_to(feed);
+            self.stream.replace_source(feed);
             (self.heard, self.stale) = (now, true);
         }
         while let Some(saved) = self.keep.poll() {
@@ -82,7 +82,7 @@ impl Console {
                     break;
                 }
                 Ok(Step::Fault(fault)) => self.say(&fault, true),
-                Ok(Step::Went) => {}
+                Ok(Step::Progress) => {}
                 Ok(Step::End(why)) => self.ended(why, now),
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
                 // One that fails whatever comes is as good as lost.
@@ -114,11 +114,11 @@ impl Console {
             tracing::warn!("source: {why}");
         }
         self.supply.ended(why, now);
-        self.stream.listen_to(Feed::none());
+        self.stream.replace_source(Feed::none());
         self.stale = true;
     }
 
-    fn drew(&mut self, shown: &Shown) {
+    fn drew(&mut self, shown: &FinishedPicture) {
         self.fresh = true;
         self.pace.took(self.rung, shown.took);
         self.times.pictures.add(shown.took);
@@ -266,7 +266,7 @@ impl Console {
             hud: self.hud,
             is_frozen: self.stream.is_frozen(),
             is_playing: self.playing.is_some(),
-            cine: (self.stream.cine().kept().len(), self.stream.cine_place()),
+            cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
             is_drawn,
             quality,
             budget: self.pace.budget(),
