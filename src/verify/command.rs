@@ -15,7 +15,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Longest baseline that is read, bytes.
-const LONGEST: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -299,6 +299,6 @@ fn file_name(title: &str) -> String {
 
 fn read(file: &Path) -> Result<Run, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("--baseline {}: {e}", file.display()));
-    let text = read_text(file, LONGEST, "--json of verify").map_err(|e| fault(&e))?;
+    let text = read_text(file, MAX_BYTES, "--json of verify").map_err(|e| fault(&e))?;
     json::from_json(&text).map_err(|e| fault(&e))
 }
