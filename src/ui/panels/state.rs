@@ -6,41 +6,41 @@ use crate::ui::times::Times;
 use egui::{Rect, pos2, vec2};
 use std::time::Duration;
 
-/// Points: of the buttons on the left, the sliders on the right, the cine loop below.
-pub const RAIL: f32 = 208.0;
-pub const COLUMN: f32 = 330.0;
-pub const BAR: f32 = 76.0;
-/// Below this the window shows the picture alone, whatever is asked for.
-const LEAST: [f32; 2] = [760.0, 420.0];
+/// Sizes of the panels, points: buttons on the left, sliders on the right, cine loop below.
+pub const MODES_WIDTH: f32 = 208.0;
+pub const SLIDERS_WIDTH: f32 = 330.0;
+pub const CINE_BAR_HEIGHT: f32 = 76.0;
+/// A smaller window shows the picture without panels, points.
+const MIN_WINDOW: [f32; 2] = [760.0, 420.0];
 
-/// What panels show.
-pub struct Facts<'a> {
+/// What the panels show.
+pub struct PanelState<'a> {
     pub controls: &'a Controls,
     pub scene: Option<&'a Scene>,
     pub times: &'a Times,
     /// Upper left corner and size of the picture, pixels.
     pub picture: ([u32; 2], [u32; 2]),
-    pub is_panelled: bool,
-    pub help: bool,
-    pub hud: bool,
+    pub shows_panels: bool,
+    pub shows_help: bool,
+    pub shows_times: bool,
     pub is_frozen: bool,
     pub is_playing: bool,
-    /// Volumes in the cine loop, and the place of the one that is shown.
+    /// Number of volumes in the cine loop, and the index of the one that is shown.
     pub cine: (usize, Option<usize>),
-    /// A picture has been drawn.
-    pub is_drawn: bool,
-    /// The dials that the view stands on, and its budget.
+    /// True after the first picture.
+    pub has_drawn: bool,
+    /// The current rung of the quality ladder, and the frame budget.
     pub quality: &'a str,
     pub budget: Option<Duration>,
     pub banner: Option<Banner>,
     pub notes: &'a [Note],
-    /// Keys that are said in the help besides those of the table.
+    /// The keys that end the program, for the help.
     pub exit_key: &'a str,
-    /// Where a pointer is drawn, pixels of the window: none where a windowing system has its own.
+    /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
     pub pointer: Option<[f64; 2]>,
 }
 
-/// Something that lasts.
+/// A message that lasts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Banner {
     pub title: String,
@@ -48,26 +48,26 @@ pub struct Banner {
     pub is_fault: bool,
 }
 
-/// Something that happened.
+/// A message about an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     pub text: String,
     pub is_fault: bool,
 }
 
-/// Where the picture lies on a window of this size: its upper left corner and its size, pixels.
-pub fn place(size: [u32; 2], scale: f32, is_panelled: bool) -> ([u32; 2], [u32; 2]) {
+/// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
+pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
     let points = size.map(|n| n as f32 / scale);
-    if !is_panelled || points[0] < LEAST[0] || points[1] < LEAST[1] {
+    if !shows_panels || points[0] < MIN_WINDOW[0] || points[1] < MIN_WINDOW[1] {
         return ([0, 0], size.map(|n| n.max(1)));
     }
-    let [left, right, below] = [RAIL, COLUMN, BAR].map(|edge| (edge * scale).round() as u32);
+    let [left, right, below] = [MODES_WIDTH, SLIDERS_WIDTH, CINE_BAR_HEIGHT].map(|edge| (edge * scale).round() as u32);
     ([left, 0], [(size[0] - left - right).max(1), (size[1] - below).max(1)])
 }
 
-/// The picture's place in points.
-pub fn rect(facts: &Facts, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = facts.picture;
+/// The area of the picture in points.
+pub fn picture_rect(state: &PanelState, scale: f32) -> Rect {
+    let ([x, y], [w, h]) = state.picture;
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))
 }
