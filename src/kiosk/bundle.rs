@@ -42,7 +42,7 @@ pub struct Bundle {
 
 struct Entry {
     name: String,
-    what: String,
+    description: String,
     text: String,
 }
 
@@ -79,14 +79,14 @@ impl Bundle {
     }
 
     /// Adds an entry with redacted text, cut at 1 MiB.
-    pub fn add(&mut self, name: &str, what: &str, text: &str) {
+    pub fn add(&mut self, name: &str, description: &str, text: &str) {
         let end = text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end);
-        self.add_whole(name, what, &text[..end]);
+        self.add_entry(name, description, &text[..end]);
     }
 
-    fn add_whole(&mut self, name: &str, what: &str, text: &str) {
+    fn add_entry(&mut self, name: &str, description: &str, text: &str) {
         let text = self.redactor.redact(text);
-        self.entries.push(Entry { name: name.into(), what: what.into(), text });
+        self.entries.push(Entry { name: name.into(), description: description.into(), text });
     }
 
     fn add_configuration(&mut self, path: &Path, text: Result<String, String>, table: Option<toml::Table>) {
@@ -129,8 +129,8 @@ impl Bundle {
             match tail(&file, left) {
                 Ok((bytes, cut)) => {
                     left -= left.min(bytes.len() as u64);
-                    let what = if cut { "the end of the log" } else { "the log" };
-                    self.add_whole(&name, what, &String::from_utf8_lossy(&bytes));
+                    let description = if cut { "the end of the log" } else { "the log" };
+                    self.add_entry(&name, description, &String::from_utf8_lossy(&bytes));
                 }
                 Err(error) => self.note(&format!("{name}: {} cannot be read: {error}", file.display())),
             }
@@ -152,14 +152,14 @@ impl Bundle {
     /// Writing the archive to memory failed.
     pub fn pack(self) -> io::Result<Vec<u8>> {
         let mut about = ABOUT.to_string();
-        for Entry { name, what, text } in &self.entries {
-            about += &format!("    {name:<32} {:>9} bytes  {what}\n", text.len());
+        for Entry { name, description, text } in &self.entries {
+            about += &format!("    {name:<32} {:>9} bytes  {description}\n", text.len());
         }
         if !self.notes.is_empty() {
             about += "\nMissing or wrong:\n\n";
             self.notes.iter().for_each(|note| about += &format!("    {note}\n"));
         }
-        let first = Entry { name: "README.txt".into(), what: String::new(), text: about };
+        let first = Entry { name: "README.txt".into(), description: String::new(), text: about };
         let mut archive = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::default()));
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         for Entry { name, text, .. } in [first].iter().chain(&self.entries) {
@@ -189,15 +189,15 @@ fn tail(path: &Path, most: u64) -> io::Result<(Vec<u8>, bool)> {
 
 /// The tables and keys of a text that is not valid TOML, with line numbers.
 fn keys(text: &str) -> String {
-    let mut text_out = String::from("# This is not valid TOML: only its keys are shown.\n");
+    let mut report = String::from("# This is not valid TOML: only its keys are shown.\n");
     for (number, line) in text.lines().enumerate() {
         let key = line.split(['=', '#']).next().unwrap_or("").trim();
         let plain = |c: char| c.is_ascii_alphanumeric() || "_-.[]".contains(c);
         if key.len() < 64 && !key.is_empty() && key.chars().all(plain) && (key.starts_with('[') || line.contains('=')) {
-            text_out += &format!("{}: {key}\n", number + 1);
+            report += &format!("{}: {key}\n", number + 1);
         }
     }
-    text_out
+    report
 }
 
 /// Largest part of a system file that is read, bytes. For a processor with many cores these are the first ones.
@@ -207,38 +207,38 @@ const VARIABLES: &[&str] = &["VK_", "LP_", "MESA_", "GALLIVM_"];
 
 /// Information about program, system, processor, memory and variables for Vulkan, one item a line. It does not name the machine.
 fn system_information() -> String {
-    let mut text_out = String::new();
-    let mut say = |what: &str, value: Option<String>| {
+    let mut report = String::new();
+    let mut item = |name: &str, value: Option<String>| {
         // Writing to a String does not fail.
-        let _ = writeln!(text_out, "{what}: {}", value.unwrap_or_else(|| "unknown".into()));
+        let _ = writeln!(report, "{name}: {}", value.unwrap_or_else(|| "unknown".into()));
     };
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
-    say("program", Some(format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))));
-    say("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
-    say("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
+    item("program", Some(format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))));
+    item("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
+    item("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
     let kernel = ["ostype", "osrelease", "version"].map(|name| text(&format!("/proc/sys/kernel/{name}")));
     let kernel = kernel.map(|part| part.unwrap_or_default().trim().to_string()).join(" ");
-    say("kernel", Some(kernel.trim().to_string()).filter(|kernel| !kernel.is_empty()));
-    say("system", text("/etc/os-release").and_then(|text| value(&text, "PRETTY_NAME", '=')));
-    say("processor", text("/proc/cpuinfo").and_then(|text| value(&text, "model name", ':')));
-    say("cores", std::thread::available_parallelism().ok().map(|cores| cores.to_string()));
+    item("kernel", Some(kernel.trim().to_string()).filter(|kernel| !kernel.is_empty()));
+    item("system", text("/etc/os-release").and_then(|text| value(&text, "PRETTY_NAME", '=')));
+    item("processor", text("/proc/cpuinfo").and_then(|text| value(&text, "model name", ':')));
+    item("cores", std::thread::available_parallelism().ok().map(|cores| cores.to_string()));
     let memory = text("/proc/meminfo").unwrap_or_default();
-    say("memory", value(&memory, "MemTotal", ':'));
-    say("memory available", value(&memory, "MemAvailable", ':'));
-    say("uptime", text("/proc/uptime").and_then(|up| Some(format!("{} s", up.split(' ').next()?))));
+    item("memory", value(&memory, "MemTotal", ':'));
+    item("memory available", value(&memory, "MemAvailable", ':'));
+    item("uptime", text("/proc/uptime").and_then(|up| Some(format!("{} s", up.split(' ').next()?))));
     let mut set: Vec<_> = std::env::vars_os()
         .map(|(name, value)| (name.to_string_lossy().into_owned(), value.to_string_lossy().into_owned()))
         .filter(|(name, _)| VARIABLES.iter().any(|start| name.starts_with(start)))
         .collect();
     set.sort();
-    let _ = writeln!(text_out, "variables with the prefix {}:", VARIABLES.join(", "));
+    let _ = writeln!(report, "variables with the prefix {}:", VARIABLES.join(", "));
     for (name, value) in &set {
-        let _ = writeln!(text_out, "    {name}={}", value.escape_debug());
+        let _ = writeln!(report, "    {name}={}", value.escape_debug());
     }
     if set.is_empty() {
-        text_out += "    none\n";
+        report += "    none\n";
     }
-    text_out
+    report
 }
 
 fn text(path: &str) -> Option<String> {
@@ -270,26 +270,25 @@ mod tests {
 
     #[test]
     fn only_the_keys_of_invalid_toml_are_kept() {
-        let text_out =
+        let report =
             keys("source = \"/data/Anna\n# Anna = 1\n[files]\nlog = 'x' # Anna\nAnna's note\nAnna Smith = 3\n");
         assert!(
-            ["1: source\n", "3: [files]\n", "4: log\n"].iter().all(|l| text_out.contains(l))
-                && !text_out.contains("Anna"),
-            "{text_out}"
+            ["1: source\n", "3: [files]\n", "4: log\n"].iter().all(|l| report.contains(l)) && !report.contains("Anna"),
+            "{report}"
         );
     }
 
     #[test]
     fn system_information_names_the_program_and_not_the_machine() {
-        let text_out = system_information();
-        assert!(text_out.starts_with(&format!("program: echolume {}", env!("CARGO_PKG_VERSION"))), "{text_out}");
+        let report = system_information();
+        assert!(report.starts_with(&format!("program: echolume {}", env!("CARGO_PKG_VERSION"))), "{report}");
         assert!(
-            ["kernel: ", "processor: ", "memory: ", "with the prefix VK_"].iter().all(|name| text_out.contains(name)),
-            "{text_out}"
+            ["kernel: ", "processor: ", "memory: ", "with the prefix VK_"].iter().all(|name| report.contains(name)),
+            "{report}"
         );
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-        assert!(host.trim().len() < 4 || !text_out.contains(host.trim()), "{text_out}");
-        assert!(!text_out.contains("PATH="));
+        assert!(host.trim().len() < 4 || !report.contains(host.trim()), "{report}");
+        assert!(!report.contains("PATH="));
     }
 
     #[test]

@@ -47,9 +47,9 @@ pub struct RotatingLog {
     /// False for devices and pipes, which cannot be renamed.
     rotates: bool,
     /// The start of a line that is written in parts; at most the size of a file.
-    begun: Vec<u8>,
-    /// Number of lines lost since the last one that was written.
-    lost: u64,
+    partial_line: Vec<u8>,
+    /// Number of lines that were lost since the last one that was written.
+    lost_lines: u64,
 }
 
 impl RotatingLog {
@@ -91,8 +91,8 @@ impl RotatingLog {
             size: 0,
             within_line: false,
             rotates,
-            begun: Vec::new(),
-            lost: 0,
+            partial_line: Vec::new(),
+            lost_lines: 0,
         };
         log.measure();
         Ok(log)
@@ -109,28 +109,30 @@ impl RotatingLog {
     /// Writes an event, or counts its lines as lost.
     fn write_or_count(&mut self, event: &[u8]) {
         match self.write_event(event) {
-            Ok(()) => self.lost = 0,
-            Err(_) => self.lost = self.lost.saturating_add(event.iter().filter(|b| **b == b'\n').count() as u64),
+            Ok(()) => self.lost_lines = 0,
+            Err(_) => {
+                self.lost_lines = self.lost_lines.saturating_add(event.iter().filter(|b| **b == b'\n').count() as u64)
+            }
         }
     }
 
     /// Writes a complete event, or returns an error and writes nothing.
     fn write_event(&mut self, event: &[u8]) -> io::Result<()> {
-        let mut whole = Vec::with_capacity(event.len() + 128);
-        if self.lost > 0 {
+        let mut text = Vec::with_capacity(event.len() + 128);
+        if self.lost_lines > 0 {
             let now = humantime::format_rfc3339_micros(SystemTime::now());
-            writeln!(whole, "{now}  WARN {} lines of the log could not be written", self.lost)?;
+            writeln!(text, "{now}  WARN {} lines of the log could not be written", self.lost_lines)?;
         }
-        whole.extend_from_slice(event);
+        text.extend_from_slice(event);
         // Reserves a byte to end an incomplete line before it.
-        if self.rotates && whole.len() as u64 >= self.bytes {
-            let mut room = self.bytes as usize - CUT_MARK.len() - 1;
+        if self.rotates && text.len() as u64 >= self.bytes {
+            let mut space = self.bytes as usize - CUT_MARK.len() - 1;
             // Does not cut inside of a character.
-            room -= (0..3).take_while(|back| whole[room - back] & 0xc0 == 0x80).count();
-            whole.truncate(room);
-            whole.extend_from_slice(CUT_MARK);
+            space -= (0..3).take_while(|back| text[space - back] & 0xc0 == 0x80).count();
+            text.truncate(space);
+            text.extend_from_slice(CUT_MARK);
         }
-        if self.rotates && self.size > 0 && self.size + whole.len() as u64 >= self.bytes {
+        if self.rotates && self.size > 0 && self.size + text.len() as u64 >= self.bytes {
             self.rotate()?;
         }
         if self.sink.is_none() {
@@ -138,13 +140,13 @@ impl RotatingLog {
             self.measure();
         }
         if self.within_line {
-            whole.insert(0, b'\n');
+            text.insert(0, b'\n');
         }
         let Some(sink) = &mut self.sink else { return Ok(()) };
-        let written = sink.write_all(&whole);
+        let written = sink.write_all(&text);
         match written {
             Ok(()) => {
-                self.size += whole.len() as u64;
+                self.size += text.len() as u64;
                 self.within_line = false;
             }
             Err(_) => {
@@ -162,16 +164,16 @@ impl RotatingLog {
     fn rotate(&mut self) -> io::Result<()> {
         // Closed first: not every system can rename an open file.
         self.sink = None;
-        let gone = |done: io::Result<()>| match done {
+        let ignore_missing = |done: io::Result<()>| match done {
             // The file was deleted by someone else.
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
             done => done,
         };
         if self.files == 1 {
-            gone(fs::remove_file(&self.path))?;
+            ignore_missing(fs::remove_file(&self.path))?;
         }
         for number in (1..self.files).rev() {
-            gone(fs::rename(rotated_name(&self.path, number - 1), rotated_name(&self.path, number)))?;
+            ignore_missing(fs::rename(rotated_name(&self.path, number - 1), rotated_name(&self.path, number)))?;
         }
         // Even if the new file cannot be created at once, there is nothing to rename any more.
         self.size = 0;
@@ -183,12 +185,12 @@ impl RotatingLog {
 impl Write for RotatingLog {
     /// Always accepts everything: a fault of the log must not stop the program.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.begun.is_empty() && bytes.last() == Some(&b'\n') {
+        if self.partial_line.is_empty() && bytes.last() == Some(&b'\n') {
             self.write_or_count(bytes);
-        } else if self.begun.len() + bytes.len() < self.bytes as usize && bytes.last() != Some(&b'\n') {
-            self.begun.extend_from_slice(bytes);
+        } else if self.partial_line.len() + bytes.len() < self.bytes as usize && bytes.last() != Some(&b'\n') {
+            self.partial_line.extend_from_slice(bytes);
         } else {
-            let mut event = std::mem::take(&mut self.begun);
+            let mut event = std::mem::take(&mut self.partial_line);
             event.extend_from_slice(bytes);
             if event.last() != Some(&b'\n') {
                 event.push(b'\n');
@@ -206,7 +208,7 @@ impl Write for RotatingLog {
 
 impl Drop for RotatingLog {
     fn drop(&mut self) {
-        if !self.begun.is_empty() {
+        if !self.partial_line.is_empty() {
             let _ = self.write(b"\n");
         }
     }
@@ -225,7 +227,7 @@ fn end_of(mut file: &File) -> io::Result<(u64, bool)> {
 }
 
 /// The name of the log file after so many rotations; 0 is the current one.
-pub fn rotated_name(path: &Path, number: u32) -> PathBuf {
+pub(super) fn rotated_name(path: &Path, number: u32) -> PathBuf {
     if number == 0 {
         return path.into();
     }
@@ -235,7 +237,7 @@ pub fn rotated_name(path: &Path, number: u32) -> PathBuf {
 }
 
 /// True for an empty file, and for one that starts with a time like our logs. Other files, such as recordings, are never written to.
-pub fn is_log_file(path: &Path) -> bool {
+pub(super) fn is_log_file(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|f| f.take(11).read_to_end(&mut start));
     read.is_ok() && (start.is_empty() || (start.get(4) == Some(&b'-') && start.get(10) == Some(&b'T')))
@@ -382,17 +384,17 @@ mod tests {
     /// A file on a disk with limited space.
     struct Disk {
         file: File,
-        room: Arc<AtomicU64>,
+        space: Arc<AtomicU64>,
     }
 
     impl Write for Disk {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let room = self.room.load(Ordering::Relaxed).min(bytes.len() as u64);
-            if room == 0 {
+            let space = self.space.load(Ordering::Relaxed).min(bytes.len() as u64);
+            if space == 0 {
                 return Err(io::Error::from(ErrorKind::StorageFull));
             }
-            self.room.fetch_sub(room, Ordering::Relaxed);
-            self.file.write(&bytes[..room as usize])
+            self.space.fetch_sub(space, Ordering::Relaxed);
+            self.file.write(&bytes[..space as usize])
         }
 
         fn flush(&mut self) -> io::Result<()> {
@@ -409,18 +411,18 @@ mod tests {
     #[test]
     fn a_full_disk_leaves_no_partial_line_and_is_reported_when_there_is_space() {
         let folder = Folder::new("full");
-        let room = Arc::new(AtomicU64::new(2 * line(0).len() as u64 + 30));
-        let theirs = room.clone();
+        let space = Arc::new(AtomicU64::new(2 * line(0).len() as u64 + 30));
+        let disk_space = space.clone();
         let opener = move |path: &Path| -> io::Result<Box<dyn Sink>> {
             let file = OpenOptions::new().create(true).append(true).open(path)?;
-            Ok(Box::new(Disk { file, room: theirs.clone() }))
+            Ok(Box::new(Disk { file, space: disk_space.clone() }))
         };
         let mut log = RotatingLog::with(&folder.log(), 5000, 20, Box::new(opener)).expect("open");
         for n in 0..9 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
         assert_eq!(folder.text(0), format!("{}{}", line(0), line(1)));
-        room.store(1 << 20, Ordering::Relaxed);
+        space.store(1 << 20, Ordering::Relaxed);
         for n in 9..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
@@ -471,7 +473,7 @@ mod tests {
         for n in 0..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
-        assert_eq!(log.lost, 200);
+        assert_eq!(log.lost_lines, 200);
         assert!(full.exists() && !rotated_name(full, 1).exists());
     }
 }

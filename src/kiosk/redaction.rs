@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn names_of_recordings_and_pictures_are_removed_with_their_paths() {
         let stamp = "2026-11-22T01:00:00.000001Z";
-        for (text, wanted) in [
+        for (text, expected) in [
             ("/data/Anna Smith/scan 1.mha: cut short", "<file-1>.mha: cut short"),
             ("source = \"/data/Smith, Anna (1980).MHA\"", "source = \"<file-1>.mha\""),
             ("file=/data/Anna.vol more samples", "file=<file-1>.vol more samples"),
@@ -315,7 +315,7 @@ mod tests {
             ("no raw data, 12.5 volumes", "no raw data, 12.5 volumes"),
             ("a\n/data/b.raw\n\nc", "a\n<file-1>.raw\n\nc"),
         ] {
-            assert_eq!(redacted(text), wanted, "{text}");
+            assert_eq!(redacted(text), expected, "{text}");
         }
         // The start of a relative path is unknown: the message before it is removed, time and level stay.
         let line = format!("{stamp}  WARN saved Anna Smith.png at last");
@@ -326,13 +326,13 @@ mod tests {
     fn the_names_of_a_recording_are_removed_everywhere() {
         let mut redactor = Redactor::new();
         redactor.add_recording(Path::new("/etc/echolume/Anna Smith/Smith_20w.xyz"));
-        for (text, wanted) in [
+        for (text, expected) in [
             ("/etc/echolume/Anna Smith/Smith_20w.xyz: none", "<path-1>: none"),
             ("volume 3 of smith_20W, ANNA SMITH", "volume 3 of <name-3>, <name-2>"),
             ("Smith_20w.xyz", "<name-4>"),
             ("Blacksmith_20wide echolume", "Blacksmith_20wide echolume"),
         ] {
-            assert_eq!(redactor.redact(text), wanted, "{text}");
+            assert_eq!(redactor.redact(text), expected, "{text}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! The commands of a user, whatever gives them: a gesture on the picture, a key or a panel.
+//! The commands of a user. Gestures on the picture, keys and panels give them.
 
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, TransferName};
 

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 
 /// The effect of a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
+pub(super) enum Change {
     /// Nothing changed.
     Nothing,
     /// The tool of drags changed.
@@ -31,7 +31,7 @@ pub struct Controls {
 
 impl Controls {
     /// `settings`: the start, which [`Command::Reset`] restores.
-    pub fn new(settings: Settings) -> Controls {
+    pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
         Controls { start: settings.clone(), settings, tool: Tool::default(), rendered }
     }
@@ -45,7 +45,7 @@ impl Controls {
     }
 
     /// Restores the settings of the start, except for the size of the picture.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         let picture = self.settings.picture.clone();
         let mut again = Controls::new(self.start.clone());
         again.settings.picture = picture;
@@ -55,7 +55,7 @@ impl Controls {
 
     /// Sets width and height of the picture, pixels. The minimum is 64, so that a sheet of tiles has a pixel for each tile; a smaller
     /// window shows the picture scaled down.
-    pub fn resize(&mut self, size: [u32; 2]) {
+    pub(super) fn resize(&mut self, size: [u32; 2]) {
         let rays = self.settings.ray.rays.max(self.start.ray.rays);
         let max = MAX_PICTURE / rays.clamp(1, 4);
         self.settings.picture.size = size.map(|edge| edge.clamp(MAX_TILES, max));
@@ -63,7 +63,7 @@ impl Controls {
 
     /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
     /// the commands for the caller have an effect.
-    pub fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
+    pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;

@@ -12,7 +12,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 const MAX_PENDING: usize = 4;
 
 /// Saves files in the background.
-pub struct Exporter {
+pub(super) struct Exporter {
     folder: PathBuf,
     sender: Sender<Result<PathBuf, String>>,
     receiver: Receiver<Result<PathBuf, String>>,
@@ -23,13 +23,13 @@ pub struct Exporter {
 
 impl Exporter {
     /// `folder`: where files are saved; it is created with the first one. `wake` is called when a file is done.
-    pub fn new(folder: PathBuf, wake: Wake) -> Exporter {
+    pub(super) fn new(folder: PathBuf, wake: Wake) -> Exporter {
         let (sender, receiver) = channel();
         Exporter { folder, sender, receiver, pending: 0, number: 0, wake }
     }
 
     /// The next file that was saved since the last call, or why it was not.
-    pub fn poll(&mut self) -> Option<Result<PathBuf, String>> {
+    pub(super) fn poll(&mut self) -> Option<Result<PathBuf, String>> {
         let done = self.receiver.try_recv().ok()?;
         self.pending = self.pending.saturating_sub(1);
         Some(done)
@@ -39,7 +39,7 @@ impl Exporter {
     ///
     /// # Errors
     /// Too many files are being saved, or no thread can be started.
-    pub fn picture(&mut self, picture: Picture) -> Result<(), String> {
+    pub(super) fn picture(&mut self, picture: Picture) -> Result<(), String> {
         self.save("png", move |file| picture.save(file))
     }
 
@@ -47,10 +47,10 @@ impl Exporter {
     ///
     /// # Errors
     /// As for [`Exporter::picture`].
-    pub fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
+    pub(super) fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
         self.save("frames", move |file| {
             let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
-            let mut frames = volumes.iter().flat_map(|kept| &kept.frames);
+            let mut frames = volumes.iter().flat_map(|volume| &volume.frames);
             match frames.try_for_each(|frame| writer.frame(frame, frame.time.unwrap_or(0.0))) {
                 Ok(()) => writer.finish().map_err(|e| e.to_string()),
                 Err(e) => {

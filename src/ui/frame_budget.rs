@@ -16,7 +16,7 @@ const MIN_PICTURES: u32 = 4;
 
 /// Chooses the rung for a view that moves. Rung 0 is full quality; each one after it is faster.
 #[derive(Clone, Debug)]
-pub struct FrameBudget {
+pub(super) struct FrameBudget {
     budget: Option<Duration>,
     /// By rung: the expected time of a picture as a fraction of that on rung 0.
     expected: Vec<f64>,
@@ -33,39 +33,39 @@ pub struct FrameBudget {
 
 impl FrameBudget {
     /// `time_shares`: the time on each rung as a fraction of that on the first, decreasing. Without a budget every picture has full quality.
-    pub fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
+    pub(super) fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
         let expected = if time_shares.is_empty() { vec![1.0] } else { time_shares.to_vec() };
         let measured = expected.clone();
         FrameBudget { budget, expected, measured, rung: 0, mean: 0.0, pictures: 0, previous: None, moved: None }
     }
 
-    pub fn budget(&self) -> Option<Duration> {
+    pub(super) fn budget(&self) -> Option<Duration> {
         self.budget
     }
 
     /// Records that the view moved.
-    pub fn view_moved(&mut self, now: Instant) {
+    pub(super) fn view_moved(&mut self, now: Instant) {
         self.moved = Some(now);
     }
 
     /// Discards the measurements: the scene changed.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.measured.clone_from(&self.expected);
         (self.pictures, self.previous) = (0, None);
     }
 
     /// True if the view moved a moment ago.
-    pub fn is_moving(&self, now: Instant) -> bool {
+    pub(super) fn is_moving(&self, now: Instant) -> bool {
         self.moved.is_some_and(|at| now.saturating_duration_since(at) < REST_DELAY)
     }
 
     /// When a moving view comes to rest.
-    pub fn rests_at(&self, now: Instant) -> Option<Instant> {
+    pub(super) fn rests_at(&self, now: Instant) -> Option<Instant> {
         self.moved.map(|at| at + REST_DELAY).filter(|at| *at > now)
     }
 
     /// The rung of the next picture.
-    pub fn rung(&self, now: Instant) -> usize {
+    pub(super) fn rung(&self, now: Instant) -> usize {
         match self.budget.is_some() && self.is_moving(now) {
             true => self.rung,
             false => 0,
@@ -74,7 +74,7 @@ impl FrameBudget {
 
     /// Records the time of a picture on a rung, and chooses the next rung. Times of a view at rest are ignored unless it is on the rung of
     /// the moving view.
-    pub fn picture_took(&mut self, rung: usize, time: Duration) {
+    pub(super) fn picture_took(&mut self, rung: usize, time: Duration) {
         let Some(budget) = self.budget.map(|b| b.as_secs_f64()) else { return };
         if rung != self.rung {
             return;

@@ -22,13 +22,13 @@ const NOTCH_MM: f64 = 1.0;
 const MAX_FINGERS: usize = 10;
 /// Rotation of a drag across the height of the picture, degrees. A rate of 115 would keep the front of a volume that fills the picture
 /// under the pointer; 200 needs fewer strokes and is still slow enough to stop where intended.
-pub const DEGREES_PER_HEIGHT: f64 = 200.0;
+pub(super) const DEGREES_PER_HEIGHT: f64 = 200.0;
 /// Fingers that are closer to each other only pan, pixels: their scale and angle are noise.
 const MIN_PINCH: f64 = 24.0;
 
 /// Recognises gestures.
 #[derive(Clone, Debug, Default)]
-pub struct Gestures {
+pub(super) struct Gestures {
     pointer: Option<[f64; 2]>,
     mouse: Option<(Button, Press)>,
     /// In the order in which they touched the picture. The first two form a pair.
@@ -57,16 +57,22 @@ struct Click {
 
 impl Gestures {
     /// The commands that an input gives, in the order in which to execute them. Keys give none here.
-    pub fn input(&mut self, input: &Input, on: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
+    pub(super) fn input(
+        &mut self,
+        input: &Input,
+        viewport: &Viewport,
+        tool: Tool,
+        modifiers: Modifiers,
+    ) -> Vec<Command> {
         let Some(input) = input.sanitized() else { return Vec::new() };
         match input {
             Input::Moved(at) => {
                 self.pointer = Some(at);
-                self.mouse.as_mut().and_then(|(_, press)| press.moved(at, on)).into_iter().collect()
+                self.mouse.as_mut().and_then(|(_, press)| press.moved(at, viewport)).into_iter().collect()
             }
-            Input::Button { button, pressed } => self.button(button, pressed, on, tool, modifiers),
-            Input::Scroll(notches) => self.scroll(notches, on, tool, modifiers),
-            Input::Touch { finger, phase, at } => self.touch(finger, phase, at, on, tool),
+            Input::Button { button, pressed } => self.button(button, pressed, viewport, tool, modifiers),
+            Input::Scroll(notches) => self.scroll(notches, viewport, tool, modifiers),
+            Input::Touch { finger, phase, at } => self.touch(finger, phase, at, viewport, tool),
             Input::FocusLost => {
                 // The tile that is shown alone does not depend on what is pressed.
                 *self = Gestures { back: self.back, ..Gestures::default() };
@@ -77,7 +83,7 @@ impl Gestures {
     }
 
     /// The last position of the pointer.
-    pub fn pointer(&self) -> Option<[f64; 2]> {
+    pub(super) fn pointer(&self) -> Option<[f64; 2]> {
         self.pointer
     }
 
@@ -91,7 +97,7 @@ impl Gestures {
         &mut self,
         button: Button,
         pressed: bool,
-        on: &Viewport,
+        viewport: &Viewport,
         tool: Tool,
         modifiers: Modifiers,
     ) -> Vec<Command> {
@@ -99,21 +105,27 @@ impl Gestures {
         match (pressed, self.pointer) {
             // A button that goes down twice was released outside of the window.
             (true, Some(at)) if held.is_none_or(|held| held == button) => {
-                let press = if on.is_covered { None } else { Press::new(button, tool, modifiers, MOUSE_SLOP, at, on) };
+                let press = if viewport.is_covered {
+                    None
+                } else {
+                    Press::new(button, tool, modifiers, MOUSE_SLOP, at, viewport)
+                };
                 self.mouse = press.map(|press| (button, press));
                 Vec::new()
             }
             (false, _) if held == Some(button) => match self.mouse.take() {
-                Some((Button::Left, press)) => self.release(&press, on, tool, MOUSE_SLOP),
+                Some((Button::Left, press)) => self.release(&press, viewport, tool, MOUSE_SLOP),
                 _ => Vec::new(),
             },
             _ => Vec::new(),
         }
     }
 
-    fn scroll(&mut self, notches: f64, on: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
-        let (Some(at), Some(scene), false) = (self.pointer, on.scene, on.is_covered) else { return Vec::new() };
-        let Some(pane) = on.pane_at(at) else { return Vec::new() };
+    fn scroll(&mut self, notches: f64, viewport: &Viewport, tool: Tool, modifiers: Modifiers) -> Vec<Command> {
+        let (Some(at), Some(scene), false) = (self.pointer, viewport.scene, viewport.is_covered) else {
+            return Vec::new();
+        };
+        let Some(pane) = viewport.pane_at(at) else { return Vec::new() };
         let factor = NOTCH_ZOOM.powf(notches);
         match pane {
             Pane::Rendering if tool != Tool::Plane || modifiers.control || !scene.cuts_planes() => {
@@ -123,7 +135,7 @@ impl Gestures {
             Pane::Plane(_) if modifiers.control => {
                 vec![Command::SetSlider(PLANES_ZOOM, scene.settings.planes.zoom * factor)]
             }
-            Pane::Plane(n) => on
+            Pane::Plane(n) => viewport
                 .plane_name(n)
                 .filter(|name| *name != scene.settings.planes.plane)
                 .map(Command::Plane)
@@ -134,33 +146,35 @@ impl Gestures {
         }
     }
 
-    fn touch(&mut self, id: u64, phase: Phase, at: [f64; 2], on: &Viewport, tool: Tool) -> Vec<Command> {
+    fn touch(&mut self, id: u64, phase: Phase, at: [f64; 2], viewport: &Viewport, tool: Tool) -> Vec<Command> {
         let known = self.fingers.iter().position(|finger| finger.id == id);
         match (phase, known) {
             (Phase::Down, None) => {
-                if let (Some(pane), false) = (on.pane_at(at), on.is_covered || self.fingers.len() >= MAX_FINGERS) {
+                if let (Some(pane), false) =
+                    (viewport.pane_at(at), viewport.is_covered || self.fingers.len() >= MAX_FINGERS)
+                {
                     self.fingers.push(Finger { id, at, pane });
-                    self.restart_press(on, tool);
+                    self.restart_press(viewport, tool);
                 }
                 Vec::new()
             }
-            (Phase::Moved | Phase::Down, Some(n)) => self.finger_moved(n, at, on),
+            (Phase::Moved | Phase::Down, Some(n)) => self.finger_moved(n, at, viewport),
             (Phase::Up | Phase::Cancelled, Some(n)) => {
                 // The position of the release is ignored: it depends on how the fingertip leaves the screen.
                 self.fingers.remove(n);
                 let press = self.finger_press.take();
                 let is_tap = self.fingers.is_empty() && phase == Phase::Up && !self.had_several;
-                self.restart_press(on, tool);
-                press.filter(|_| is_tap).map_or(Vec::new(), |press| self.release(&press, on, tool, FINGER_SLOP))
+                self.restart_press(viewport, tool);
+                press.filter(|_| is_tap).map_or(Vec::new(), |press| self.release(&press, viewport, tool, FINGER_SLOP))
             }
             (_, None) => Vec::new(),
         }
     }
 
     /// A single finger acts as the left button, from its current position. Several fingers form a pair instead.
-    fn restart_press(&mut self, on: &Viewport, tool: Tool) {
+    fn restart_press(&mut self, viewport: &Viewport, tool: Tool) {
         self.finger_press = match self.fingers[..] {
-            [finger] => Press::new(Button::Left, tool, Modifiers::default(), FINGER_SLOP, finger.at, on),
+            [finger] => Press::new(Button::Left, tool, Modifiers::default(), FINGER_SLOP, finger.at, viewport),
             _ => None,
         };
         self.had_several = self.fingers.len() > 1 || (self.had_several && !self.fingers.is_empty());
@@ -169,31 +183,31 @@ impl Gestures {
         }
     }
 
-    fn finger_moved(&mut self, n: usize, at: [f64; 2], on: &Viewport) -> Vec<Command> {
+    fn finger_moved(&mut self, n: usize, at: [f64; 2], viewport: &Viewport) -> Vec<Command> {
         let old: Vec<[f64; 2]> = self.fingers.iter().map(|finger| finger.at).collect();
         self.fingers[n].at = at;
         match (&old[..], &self.fingers[..]) {
             // A third finger is ignored.
-            ([a, b, ..], [first, second, ..]) if n < 2 => pinch([*a, *b], [first.at, second.at], first.pane, on),
-            ([_], _) => self.finger_press.as_mut().and_then(|press| press.moved(at, on)).into_iter().collect(),
+            ([a, b, ..], [first, second, ..]) if n < 2 => pinch([*a, *b], [first.at, second.at], first.pane, viewport),
+            ([_], _) => self.finger_press.as_mut().and_then(|press| press.moved(at, viewport)).into_iter().collect(),
             _ => Vec::new(),
         }
     }
 
     /// Ends a press. It was a click if it did not move.
-    fn release(&mut self, press: &Press, on: &Viewport, tool: Tool, slop: f64) -> Vec<Command> {
+    fn release(&mut self, press: &Press, viewport: &Viewport, tool: Tool, slop: f64) -> Vec<Command> {
         let Some((at, pane)) = press.click() else { return Vec::new() };
         let is_second = self.last_click.take().is_some_and(|first| {
             (at[0] - first.at[0]).hypot(at[1] - first.at[1]) < 2.0 * slop
-                && on.now.saturating_sub(first.time) <= DOUBLE_CLICK
+                && viewport.now.saturating_sub(first.time) <= DOUBLE_CLICK
         });
         if is_second {
-            return self.double_click(pane, on);
+            return self.double_click(pane, viewport);
         }
-        self.last_click = Some(Click { at, time: on.now });
-        match (pane, on.scene) {
+        self.last_click = Some(Click { at, time: viewport.now });
+        match (pane, viewport.scene) {
             (Pane::Plane(tile), Some(scene)) if tool == Tool::Plane => {
-                let point = on.point_on_plane(tile, at).map(|point| view::below_face(scene, point).to_array());
+                let point = viewport.point_on_plane(tile, at).map(|point| view::below_face(scene, point).to_array());
                 point.map(Command::MoveCrossing).into_iter().collect()
             }
             _ => Vec::new(),
@@ -201,8 +215,8 @@ impl Gestures {
     }
 
     /// A double click shows a tile alone, or all tiles again.
-    fn double_click(&mut self, pane: Pane, on: &Viewport) -> Vec<Command> {
-        let Some(scene) = on.scene else { return Vec::new() };
+    fn double_click(&mut self, pane: Pane, viewport: &Viewport) -> Vec<Command> {
+        let Some(scene) = viewport.scene else { return Vec::new() };
         if !scene.shows_three() {
             return self.back.take().into_iter().collect();
         }
@@ -211,7 +225,7 @@ impl Gestures {
         match pane {
             Pane::Rendering => vec![Command::Layout(Layout::Single)],
             Pane::Plane(n) => {
-                on.plane_name(n).map(Command::Plane).into_iter().chain([Command::Mode(Mode::Plane)]).collect()
+                viewport.plane_name(n).map(Command::Plane).into_iter().chain([Command::Mode(Mode::Plane)]).collect()
             }
         }
     }
@@ -253,9 +267,9 @@ struct Press {
 
 impl Press {
     /// A press of a button; a finger is the left one.
-    fn new(button: Button, tool: Tool, held: Modifiers, slop: f64, at: [f64; 2], on: &Viewport) -> Option<Press> {
-        let pane = on.pane_at(at)?;
-        let (scene, pixel) = on.pixel_at(at)?;
+    fn new(button: Button, tool: Tool, held: Modifiers, slop: f64, at: [f64; 2], viewport: &Viewport) -> Option<Press> {
+        let pane = viewport.pane_at(at)?;
+        let (scene, pixel) = viewport.pixel_at(at)?;
         // Only a plain press can be a click: any other one drags at once.
         let is_plain = button == Button::Left && !held.shift && !held.control;
         let drag = match (pane, tool) {
@@ -293,7 +307,7 @@ impl Press {
         (!self.is_drag).then_some((self.start, self.pane))
     }
 
-    fn moved(&mut self, to: [f64; 2], on: &Viewport) -> Option<Command> {
+    fn moved(&mut self, to: [f64; 2], viewport: &Viewport) -> Option<Command> {
         if !self.is_drag {
             let [x, y] = [to[0] - self.start[0], to[1] - self.start[1]];
             let distance = x.hypot(y);
@@ -305,14 +319,14 @@ impl Press {
             self.last = [self.start[0] + x / distance * self.slop, self.start[1] + y / distance * self.slop];
         }
         let from = std::mem::replace(&mut self.last, to);
-        if from == to { None } else { self.dragged(from, to, on) }
+        if from == to { None } else { self.dragged(from, to, viewport) }
     }
 
-    fn dragged(&mut self, from: [f64; 2], to: [f64; 2], on: &Viewport) -> Option<Command> {
-        let (scene, pixel) = on.pixel_at(to)?;
+    fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
+        let (scene, pixel) = viewport.pixel_at(to)?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
-        let of_picture = |n: f64| n / on.size[1];
-        let degrees = |x: f64, y: f64| [x, y].map(|n| n / on.pane_height(self.pane) * DEGREES_PER_HEIGHT);
+        let of_picture = |n: f64| n / viewport.size[1];
+        let degrees = |x: f64, y: f64| [x, y].map(|n| n / viewport.pane_height(self.pane) * DEGREES_PER_HEIGHT);
         let command = match self.drag {
             Drag::Nothing => return None,
             Drag::Pan => Command::Pan([x, y].map(of_picture)),
@@ -324,10 +338,10 @@ impl Press {
             }
             Drag::RotatePlanes => Command::RotatePlanes(degrees(-x, -y)),
             // Dragging up moves away from the viewer, further into the volume.
-            Drag::Clip => Command::MoveClip(-y * on.scale() * Picker::of(scene).mm_per_pixel()),
-            Drag::Step => Command::StepPlane(-y * on.scale() * scene.sheet().pixel),
+            Drag::Clip => Command::MoveClip(-y * viewport.scale() * Picker::of(scene).mm_per_pixel()),
+            Drag::Step => Command::StepPlane(-y * viewport.scale() * scene.sheet().pixel),
             Drag::Crossing(tile) => {
-                Command::MoveCrossing(view::below_face(scene, on.point_on_plane(tile, to)?).to_array())
+                Command::MoveCrossing(view::below_face(scene, viewport.point_on_plane(tile, to)?).to_array())
             }
             Drag::Face(face) => {
                 let picker = Picker::of(scene);
@@ -335,7 +349,7 @@ impl Press {
                 // Positions count along the axis from the origin, which does not move with the face.
                 let position = |pixel| closest_along((line.0 - line.1 * line.0.dot(line.1), line.1), picker.ray(pixel));
                 if self.grabbed.is_none() {
-                    self.grabbed = position(on.pixel_at(from)?.1);
+                    self.grabbed = position(viewport.pixel_at(from)?.1);
                 }
                 // Relative to where the face was grabbed: beyond its range the face waits for the pointer to come back.
                 let moved = (position(pixel)? - self.grabbed?).clamp(self.travel[0], self.travel[1]);
@@ -352,8 +366,8 @@ impl Press {
 
 /// The commands for two fingers that moved from `old` to `new` positions in the window: what is under them stays under them. `pane` is
 /// where they touched first.
-fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], pane: Pane, on: &Viewport) -> Vec<Command> {
-    let Some(scene) = on.scene else { return Vec::new() };
+fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], pane: Pane, viewport: &Viewport) -> Vec<Command> {
+    let Some(scene) = viewport.scene else { return Vec::new() };
     let between = |[a, b]: [[f64; 2]; 2]| [b[0] - a[0], b[1] - a[1]];
     let (was, is) = (between(old), between(new));
     let (old_length, new_length) = (was[0].hypot(was[1]), is[0].hypot(is[1]));
@@ -371,7 +385,7 @@ fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], pane: Pane, on: &Viewport) -> V
         Pane::Plane(_) => commands.extend([Command::Zoom(factor), Command::Roll(angle.to_degrees())]),
         Pane::Rendering => {
             // Zoom and roll are about the centre of the rendering; the pan makes up for the rest.
-            let centre = on.rendering_centre();
+            let centre = viewport.rendering_centre();
             let from_centre = |[a, b]: [[f64; 2]; 2]| [0, 1].map(|i| (a[i] + b[i]) / 2.0 - centre[i]);
             let ([x, y], [to_x, to_y]) = (from_centre(old), from_centre(new));
             let (sin, cos) = angle.sin_cos();
@@ -379,7 +393,7 @@ fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], pane: Pane, on: &Viewport) -> V
             commands.extend([
                 Command::Zoom(factor),
                 Command::Roll(angle.to_degrees()),
-                Command::Pan(pan.map(|n| n / on.size[1])),
+                Command::Pan(pan.map(|n| n / viewport.size[1])),
             ]);
         }
     }

@@ -30,13 +30,13 @@ pub enum Input {
 }
 
 /// Largest coordinate that is accepted, pixels. No window is this large; some drivers report such values.
-pub const MAX_COORDINATE: f64 = 1e6;
+pub(super) const MAX_COORDINATE: f64 = 1e6;
 /// Largest number of wheel notches in one event.
-pub const MAX_NOTCHES: f64 = 20.0;
+pub(super) const MAX_NOTCHES: f64 = 20.0;
 
 impl Input {
     /// The event with its numbers limited to what a window and a wheel can produce. None if the position is out of range or not a number.
-    pub fn sanitized(self) -> Option<Input> {
+    pub(super) fn sanitized(self) -> Option<Input> {
         let is_near = |at: [f64; 2]| at.iter().all(|n| n.abs() <= MAX_COORDINATE);
         match self {
             Input::Moved(at) | Input::Touch { at, .. } if !is_near(at) => None,

@@ -11,10 +11,10 @@ use Key::{Char, Function};
 pub struct Binding {
     pub key: Key,
     pub modifiers: Modifiers,
-    pub description: &'static str,
+    pub(super) description: &'static str,
     pub command: Command,
     /// The command repeats while the key is held.
-    pub repeats: bool,
+    pub(super) repeats: bool,
 }
 
 const NONE: Modifiers = Modifiers { shift: false, control: false, alt: false };
@@ -118,7 +118,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
 ];
 
 /// The binding of a key with these modifiers.
-pub fn binding(key: Key, modifiers: Modifiers) -> Option<&'static Binding> {
+pub(super) fn binding(key: Key, modifiers: Modifiers) -> Option<&'static Binding> {
     // Whether a sign needs shift depends on the keyboard layout.
     let is_sign = matches!(key, Char(c) if !c.is_alphanumeric());
     let modifiers = Modifiers { shift: modifiers.shift && !is_sign, ..modifiers };
@@ -132,7 +132,7 @@ fn command(key: Key, modifiers: Modifiers) -> Option<Command> {
 }
 
 /// The lines of the help: keys, such as "Shift+Left, Shift+Right", and their description, in the order of [`KEY_BINDINGS`].
-pub fn help() -> impl Iterator<Item = (String, &'static str)> {
+pub(super) fn help() -> impl Iterator<Item = (String, &'static str)> {
     KEY_BINDINGS.chunk_by(|a, b| a.description == b.description).filter_map(|same| {
         let keys: Vec<String> = same.iter().map(key_label).collect();
         Some((keys.join(", "), same.first()?.description))
@@ -155,18 +155,18 @@ fn key_label(binding: &Binding) -> String {
 
 /// The keys that are held. A toggle must not repeat while its key is held.
 #[derive(Clone, Debug, Default)]
-pub struct HeldKeys {
+pub(super) struct HeldKeys {
     modifiers: Modifiers,
     held: Vec<Key>,
 }
 
 impl HeldKeys {
-    pub fn modifiers(&self) -> Modifiers {
+    pub(super) fn modifiers(&self) -> Modifiers {
         self.modifiers
     }
 
     /// The command that an input gives, if any.
-    pub fn input(&mut self, input: &Input) -> Option<Command> {
+    pub(super) fn input(&mut self, input: &Input) -> Option<Command> {
         match *input {
             Input::Modifiers(modifiers) => self.modifiers = modifiers,
             Input::FocusLost => *self = HeldKeys::default(),

@@ -16,7 +16,7 @@ pub(super) struct Picker<'a> {
 }
 
 impl<'a> Picker<'a> {
-    pub fn of(scene: &'a Scene) -> Picker<'a> {
+    pub(super) fn of(scene: &'a Scene) -> Picker<'a> {
         let size = scene.picture_size();
         let corner = if scene.settings.layout == Layout::Four { size.map(|n| cell(n, 1, 2)) } else { [0, 0] };
         let ray = &scene.settings.ray;
@@ -29,23 +29,23 @@ impl<'a> Picker<'a> {
     }
 
     /// Width and height of the rendered part, pixels.
-    pub fn size(&self) -> [f64; 2] {
+    pub(super) fn size(&self) -> [f64; 2] {
         self.size
     }
 
     /// The centre of the rendered part, where the camera's target is.
-    pub fn centre(&self) -> [f64; 2] {
+    pub(super) fn centre(&self) -> [f64; 2] {
         std::array::from_fn(|a| self.corner[a] + self.size[a] / 2.0)
     }
 
     /// Origin and unit direction of the ray through a position on the picture.
-    pub fn ray(&self, at: [f64; 2]) -> (DVec3, DVec3) {
+    pub(super) fn ray(&self, at: [f64; 2]) -> (DVec3, DVec3) {
         let [x, y]: [f64; 2] = std::array::from_fn(|a| (at[a] - self.corner[a]) * self.rays_per_pixel);
         self.rays.at(x, y)
     }
 
     /// The position on the picture of a point in space; none behind the camera.
-    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+    pub(super) fn project(&self, point: DVec3) -> Option<[f64; 2]> {
         let r = self.rays;
         let from = point - r.origin;
         let away = from.dot(r.forward);
@@ -60,7 +60,7 @@ impl<'a> Picker<'a> {
     }
 
     /// Size of a pixel at the distance of the camera's target, mm.
-    pub fn mm_per_pixel(&self) -> f64 {
+    pub(super) fn mm_per_pixel(&self) -> f64 {
         let away = (self.rays.target - self.rays.origin).dot(self.rays.forward);
         (self.rays.origin_dx + self.rays.direction_dx * away).length() * self.rays_per_pixel
     }
@@ -82,17 +82,17 @@ pub(super) fn closest_along(line: (DVec3, DVec3), ray: (DVec3, DVec3)) -> Option
 
 /// The picture in the window at the time of an input.
 #[derive(Clone, Copy)]
-pub struct Viewport<'a> {
+pub(super) struct Viewport<'a> {
     /// Its upper left corner, pixels of the window.
-    pub corner: [f64; 2],
+    pub(super) corner: [f64; 2],
     /// Its width and height, pixels of the window: `picture.size`, or that enlarged.
-    pub size: [f64; 2],
+    pub(super) size: [f64; 2],
     /// The scene that it shows; without one nothing can be dragged.
-    pub scene: Option<&'a Scene>,
+    pub(super) scene: Option<&'a Scene>,
     /// The pointer is over a panel: a press there does not reach the picture.
-    pub is_covered: bool,
-    /// The current time, since any fixed moment; it tells a double click from two clicks.
-    pub now: Duration,
+    pub(super) is_covered: bool,
+    /// The current time, since any fixed moment; it distinguishes a double click from two clicks.
+    pub(super) now: Duration,
 }
 
 /// A pane of the picture.

@@ -12,9 +12,9 @@ const MAX_RUNGS: usize = 6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rung {
     /// Description for the display of times.
-    pub label: String,
+    pub(super) label: String,
     /// Time of a picture as a fraction of that at full quality.
-    pub time_share: f64,
+    pub(super) time_share: f64,
     change: Change,
 }
 
@@ -75,7 +75,7 @@ pub fn measured(report: &Report) -> Result<Vec<Rung>, String> {
 impl Rung {
     /// The settings on this rung; unchanged if a measured change does not fit them. `voxel`: edge of a slice pixel, mm, which is the step
     /// unless one is set.
-    pub fn apply(&self, settings: &Settings, voxel: f64) -> Settings {
+    pub(super) fn apply(&self, settings: &Settings, voxel: f64) -> Settings {
         let mut changed = settings.clone();
         match &self.change {
             Change::None => return changed,

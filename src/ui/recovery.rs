@@ -41,7 +41,7 @@ pub(super) struct Recovery {
 
 impl Recovery {
     /// Records that something is lost and schedules an attempt. False if the limit is reached.
-    pub fn lost(&mut self, lost: Lost, now: Instant) -> bool {
+    pub(super) fn lost(&mut self, lost: Lost, now: Instant) -> bool {
         self.faults += 1;
         let wait = if self.faults == 1 { Duration::ZERO } else { RETRY_INTERVAL };
         self.next_attempt = Some((now + wait, lost));
@@ -49,7 +49,7 @@ impl Recovery {
     }
 
     /// What to do now. A [`RecoveryStep::Restore`] is returned once: it counts as successful unless [`Recovery::lost`] follows.
-    pub fn poll(&mut self, now: Instant) -> RecoveryStep {
+    pub(super) fn poll(&mut self, now: Instant) -> RecoveryStep {
         match self.next_attempt {
             None => RecoveryStep::Idle,
             Some((at, _)) if now < at => RecoveryStep::WaitUntil(at),
@@ -61,7 +61,7 @@ impl Recovery {
     }
 
     /// `count`: how often the current screen presented. Resets the count of faults once it is stable.
-    pub fn presented(&mut self, count: u64) {
+    pub(super) fn presented(&mut self, count: u64) {
         if count > STABLE_FRAMES {
             self.faults = 0;
         }
@@ -78,9 +78,9 @@ pub(super) fn lost_by(error: ConsoleError) -> (Lost, GpuError) {
 
 /// Where a console is shown.
 pub(super) struct Output<'a> {
-    pub device: &'a ContextOptions,
-    pub target: Target,
-    pub present_mode: PresentMode,
+    pub(super) device: &'a ContextOptions,
+    pub(super) target: Target,
+    pub(super) present_mode: PresentMode,
 }
 
 impl Output<'_> {
@@ -88,7 +88,7 @@ impl Output<'_> {
     ///
     /// # Errors
     /// What is still lost, and why.
-    pub fn restore(
+    pub(super) fn restore(
         &self,
         console: &mut Console,
         context: &mut Arc<Context>,

@@ -6,7 +6,7 @@ use crate::scene::{
 
 /// A group of sliders in the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub(super) enum Group {
     Image,
     Surface,
     Volume,
@@ -18,7 +18,7 @@ pub enum Group {
 
 impl Group {
     /// All groups with their names, in display order.
-    pub const ALL: [(Group, &'static str); 7] = [
+    pub(super) const ALL: [(Group, &'static str); 7] = [
         (Group::Image, "Image"),
         (Group::Surface, "Surface"),
         (Group::Volume, "Volume"),
@@ -33,16 +33,16 @@ use Group::{Filters, Image, Light, Planes, Quality, Surface, Volume};
 
 /// A slider and the setting that it changes.
 pub struct Slider {
-    pub name: &'static str,
+    pub(super) name: &'static str,
     /// Unit of its value; may be empty.
-    pub unit: &'static str,
-    pub group: Group,
+    pub(super) unit: &'static str,
+    pub(super) group: Group,
     /// Its range for any volume; [`Slider::range_in`] gives the range for one scene.
-    pub range: [f64; 2],
+    pub(super) range: [f64; 2],
     /// How far a key moves it.
-    pub step: f64,
+    pub(super) step: f64,
     /// Stage 1 runs again: slices are filtered differently, or other slices become visible (unless `slices.everything` processed them all).
-    pub reruns_frames: bool,
+    pub(super) reruns_frames: bool,
     applies: fn(&Settings) -> bool,
     get: fn(&Settings) -> f64,
     write: fn(&mut Settings, f64),
@@ -51,24 +51,24 @@ pub struct Slider {
 
 impl Slider {
     /// True if the picture depends on it.
-    pub fn applies(&self, settings: &Settings) -> bool {
+    pub(super) fn applies(&self, settings: &Settings) -> bool {
         (self.applies)(settings)
     }
 
     /// Its value; outside of the range if a scene file set it so.
-    pub fn get(&self, settings: &Settings) -> f64 {
+    pub(super) fn get(&self, settings: &Settings) -> f64 {
         (self.get)(settings)
     }
 
     /// Sets the nearest value in the range. NaN changes nothing.
-    pub fn set(&self, settings: &mut Settings, value: f64) {
+    pub(super) fn set(&self, settings: &mut Settings, value: f64) {
         if !value.is_nan() {
             (self.write)(settings, value.clamp(self.range[0], self.range[1]));
         }
     }
 
     /// The range for this scene; never empty.
-    pub fn range_in(&self, scene: &Scene) -> [f64; 2] {
+    pub(super) fn range_in(&self, scene: &Scene) -> [f64; 2] {
         let [low, high] = (self.limits)(scene);
         let low = self.range[0].max(low).min(self.range[1]);
         [low, self.range[1].min(high).max(low)]
@@ -112,9 +112,9 @@ const fn slider(name: &'static str, unit: &'static str, group: Group, range: [f6
 }
 
 /// Indices in [`SLIDERS`] that keys and gestures use.
-pub const GAIN: usize = 0;
-pub const THRESHOLD: usize = 3;
-pub const PLANES_ZOOM: usize = 7;
+pub(super) const GAIN: usize = 0;
+pub(super) const THRESHOLD: usize = 3;
+pub(super) const PLANES_ZOOM: usize = 7;
 
 /// All sliders. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has them for its
 /// surface, and again for its volume layer.

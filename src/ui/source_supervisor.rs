@@ -13,7 +13,7 @@ pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Syn
 
 /// The state of the source.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SourceState {
+pub(super) enum SourceState {
     Opening,
     Open,
     /// It ended or could not be opened, and will be tried again.
@@ -23,7 +23,7 @@ pub enum SourceState {
 }
 
 /// Keeps a source open.
-pub struct SourceSupervisor {
+pub(super) struct SourceSupervisor {
     open: OpenSource,
     /// Time between two attempts. None: there is only one attempt.
     retry: Option<Duration>,
@@ -36,7 +36,12 @@ pub struct SourceSupervisor {
 
 impl SourceSupervisor {
     /// `retry`: how long to wait before the source is opened again; none: never. `record`: a file for all frames that arrive.
-    pub fn new(open: OpenSource, retry: Option<Duration>, record: Option<PathBuf>, wake: Wake) -> SourceSupervisor {
+    pub(super) fn new(
+        open: OpenSource,
+        retry: Option<Duration>,
+        record: Option<PathBuf>,
+        wake: Wake,
+    ) -> SourceSupervisor {
         SourceSupervisor {
             open,
             retry,
@@ -48,17 +53,17 @@ impl SourceSupervisor {
         }
     }
 
-    pub fn state(&self) -> &SourceState {
+    pub(super) fn state(&self) -> &SourceState {
         &self.state
     }
 
     /// When [`SourceSupervisor::poll`] has to be called without an event.
-    pub fn wakes_at(&self) -> Option<Instant> {
+    pub(super) fn wakes_at(&self) -> Option<Instant> {
         self.next_attempt
     }
 
     /// The source, if it was opened since the last call.
-    pub fn poll(&mut self, now: Instant) -> Option<Feed> {
+    pub(super) fn poll(&mut self, now: Instant) -> Option<Feed> {
         if self.next_attempt.is_some_and(|at| now >= at) {
             self.next_attempt = None;
             self.start_opening(now);
@@ -88,7 +93,7 @@ impl SourceSupervisor {
     }
 
     /// Records the end of the source, with the reason if it was unexpected.
-    pub fn ended(&mut self, why: Option<String>, now: Instant) {
+    pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
         match self.retry {
             Some(retry) => {
                 self.next_attempt = Some(now + retry);

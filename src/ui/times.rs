@@ -9,10 +9,10 @@ const MAX_RECENT: usize = 256;
 
 /// The most recent times of a repeated event.
 #[derive(Clone, Debug, Default)]
-pub struct RecentTimes(VecDeque<f64>);
+pub(super) struct RecentTimes(VecDeque<f64>);
 
 impl RecentTimes {
-    pub fn add(&mut self, time: Duration) {
+    pub(super) fn add(&mut self, time: Duration) {
         self.0.push_back(time.as_secs_f64() * 1e3);
         if self.0.len() > MAX_RECENT {
             self.0.pop_front();
@@ -20,43 +20,43 @@ impl RecentTimes {
     }
 
     /// A percentile in ms; `share`: 0..=1. None before the first time.
-    pub fn percentile(&self, share: f64) -> Option<f64> {
+    pub(super) fn percentile(&self, share: f64) -> Option<f64> {
         let mut sorted: Vec<f64> = self.0.iter().copied().collect();
         sorted.sort_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
         sorted.get((share * last as f64).round() as usize).copied()
     }
 
-    pub fn newest(&self) -> Option<f64> {
+    pub(super) fn newest(&self) -> Option<f64> {
         self.0.back().copied()
     }
 }
 
 /// The content of the display of times.
 #[derive(Clone, Debug, Default)]
-pub struct Times {
+pub(super) struct Times {
     /// By pass, for the last second in which it ran: mean time in ms, and number of runs.
-    pub passes: Vec<(&'static str, f64, u32)>,
+    pub(super) passes: Vec<(&'static str, f64, u32)>,
     /// Time from the start of a picture to its end.
-    pub pictures: RecentTimes,
+    pub(super) pictures: RecentTimes,
     /// Time from an input to the picture that shows its effect.
-    pub input_latency: RecentTimes,
+    pub(super) input_latency: RecentTimes,
     /// Rates per second, for the last complete second.
-    pub frames: f64,
-    pub volumes: f64,
-    pub shown: f64,
+    pub(super) frames: f64,
+    pub(super) volumes: f64,
+    pub(super) shown: f64,
     /// Time from the arrival of a frame to the picture that shows it, ms: 95th percentile of the last second.
-    pub latency: Option<f64>,
+    pub(super) latency: Option<f64>,
     /// Counts since the start.
-    pub dropped: u64,
-    pub lost: u64,
+    pub(super) dropped: u64,
+    pub(super) lost: u64,
     /// The physical minimum time to acquire a volume, set by the speed of sound, s.
-    pub acquisition_time: Option<f64>,
+    pub(super) acquisition_time: Option<f64>,
 }
 
 impl Times {
     /// Adds the statistics of about a second.
-    pub fn add(&mut self, statistics: &Statistics, acquisition_time: Option<f64>) {
+    pub(super) fn add(&mut self, statistics: &Statistics, acquisition_time: Option<f64>) {
         let rate = |n: u64| n as f64 / statistics.time.as_secs_f64().max(1e-3);
         (self.frames, self.volumes, self.shown) =
             (rate(statistics.frames), rate(statistics.volumes.shown), rate(statistics.pictures));

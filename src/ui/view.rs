@@ -8,7 +8,7 @@ use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, in
 use glam::{DVec2, DVec3};
 
 /// Limits of the zoom for gestures and keys. A zoom beyond them that a scene file set stays reachable.
-pub const ZOOM: [f64; 2] = [0.2, 20.0];
+pub(super) const ZOOM: [f64; 2] = [0.2, 20.0];
 
 /// Converts a point in space to the coordinates of the settings, whose depth counts from the probe's face.
 pub(super) fn below_face(scene: &Scene, point: DVec3) -> DVec3 {
@@ -32,7 +32,7 @@ fn start_depth(scene: &Scene) -> f64 {
     }
 }
 
-/// The elevation that looks along the depth axis. A single frame is shown from its side at 0, a quarter turn further.
+/// The elevation that looks along the depth axis. A single frame is shown from its side at elevation 0, 90 degrees further.
 fn level(geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Sweep(probe) if matches!(probe.motion, Motion::Still { .. }) => -90.0,
@@ -56,7 +56,7 @@ pub(super) fn upright(camera: &Camera, geometry: &Geometry) -> Camera {
     }
 }
 
-/// The camera after a rotation by azimuth and elevation, degrees. Azimuth wraps around. Elevation ends where the volume is seen from
+/// The camera after a rotation by azimuth and elevation, degrees. Azimuth wraps around. Elevation ends where the camera looks from
 /// above or below: beyond that everything would be upside down, and the far side is 180 degrees of azimuth away.
 pub(super) fn rotate(now: &Scene, [azimuth, elevation]: [f64; 2]) -> Camera {
     let camera = upright(&now.settings.camera, &now.geometry);
@@ -227,16 +227,16 @@ pub(super) fn nearest_face(scene: &Scene, at: [f64; 2]) -> Option<Face> {
     let distance = |face: &Face| {
         let (middle, out) = face_axis(scene, *face);
         let (from, to) = (picker.project(middle)?, picker.project(middle + out)?);
-        let seen = [to[0] - from[0], to[1] - from[1]];
-        let length = seen[0].hypot(seen[1]);
+        let projected = [to[0] - from[0], to[1] - from[1]];
+        let length = projected[0].hypot(projected[1]);
         if length * picker.mm_per_pixel() < MIN_FORESHORTENING {
             return None;
         }
         let grab = [at[0] - from[0], at[1] - from[1]];
-        let along = (grab[0] * seen[0] + grab[1] * seen[1]) / length;
-        let across = (grab[0] * seen[1] - grab[1] * seen[0]) / length;
+        let along = (grab[0] * projected[0] + grab[1] * projected[1]) / length;
+        let across = (grab[0] * projected[1] - grab[1] * projected[0]) / length;
         Some(across.hypot(along.min(0.0)))
     };
-    let seen = FACES.iter().filter_map(|face| Some((*face, distance(face)?)));
-    seen.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(face, _)| face)
+    let candidates = FACES.iter().filter_map(|face| Some((*face, distance(face)?)));
+    candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(face, _)| face)
 }

@@ -34,15 +34,15 @@ pub const PHANTOM: &str = "phantom";
 pub struct Config {
     /// `phantom` (the default), a recording, or `igtl://HOST[:PORT]`.
     pub source: String,
-    /// Geometry of the probe (TOML), where the source does not bring its own. Default: none.
+    /// Geometry of the probe (TOML), if the source does not contain it. Default: none.
     pub probe: Option<PathBuf>,
-    /// Volumes a second of a recording or the phantom, above 0, at most 1e6. Default: as fast as they are taken; the phantom 1.
+    /// Volumes per second of a recording or the phantom, above 0, at most 1e6. Default: as fast as possible; the phantom 1.
     pub rate: Option<f64>,
-    /// Play a recording as it was stamped. Default: false.
+    /// Play a recording at the times of its stamps. Default: false.
     pub real_time: bool,
-    /// Times that a recording is played, 1 or more. Default: 1.
+    /// Number of times that a recording is played, 1 or more. Default: 1.
     pub rounds: Option<u32>,
-    /// Play a recording over and over, as a demonstration does. Default: false.
+    /// Play a recording repeatedly, for demonstrations. Default: false.
     #[serde(rename = "loop")]
     pub forever: bool,
     /// OpenIGTLink: whose TRANSFORM, or which tool of TDATA, locations 2D frames; `image`: their own matrix. Default: any TRANSFORM.
@@ -51,15 +51,15 @@ pub struct Config {
     pub clip: Option<[u32; 4]>,
     /// Distance between the voxels that tracked frames are compounded into, 0.01 to 1000 mm. Default: between the frames' pixels.
     pub spacing: Option<f64>,
-    /// Widest gap between tracked frames that is bridged, 0 to 1000 mm. Default: 2.
+    /// Widest gap between tracked frames that is filled, 0 to 1000 mm. Default: 2.
     pub hole: Option<f64>,
     /// Presets of the scene, each over the one before. Default: none.
     pub preset: Vec<String>,
     /// Vulkan device, by number or part of its name. Default: the best.
     pub device: Option<String>,
-    /// The motor that turns the array. Default: none.
+    /// The motor that moves the array. Default: none.
     pub motor: Option<Motor>,
-    /// What a scene file holds, over the presets. Default: nothing.
+    /// The content of a scene file, over the presets. Default: empty.
     pub scene: toml::Table,
     pub display: Display,
     pub keys: Keys,
@@ -76,15 +76,15 @@ pub struct Config {
 pub struct Motor {
     /// Serial port.
     pub port: Option<String>,
-    /// Sweep from end to end, degrees. Default: a twentieth wider than the frames lie.
+    /// Angle from end to end, degrees. Default: 5 % wider than the frames.
     pub angle: Option<f64>,
-    /// Passes over the angle, and so volumes, a second.
+    /// Passes over the angle per second; each gives a volume.
     pub sweeps: Option<f64>,
     /// Home was found before and the module has not been off since. Default: false.
     pub homed: bool,
-    /// From a frame's last line to its arrival here, 0 to 10000 ms. Default: 0.
+    /// Time from a frame's last line to its arrival, 0 to 10000 ms. Default: 0.
     pub delay: Option<f64>,
-    /// Frames are stamped with the time of their first line by this machine's clock. Default: false.
+    /// Frames are stamped with the time of their first line, by the clock of this machine. Default: false.
     pub stamps: bool,
     /// Bits a second, 300 to 4000000. Default: 9600.
     pub baud: Option<u32>,
@@ -289,7 +289,7 @@ impl Config {
         if self.is_file() {
             let joined = folder.join(&self.source).into_os_string().into_string();
             self.source =
-                joined.map_err(|_| self.locations.error_at("source", "lies in a folder whose name is not UTF-8"))?;
+                joined.map_err(|_| self.locations.error_at("source", "is in a folder whose name is not UTF-8"))?;
         }
         let files = [&mut self.probe, &mut self.display.report, &mut self.live.record, &mut self.files.pictures];
         for file in files.into_iter().chain([&mut self.files.log]).flatten() {

@@ -54,13 +54,13 @@ fn the_example_has_every_key_and_marks_values_that_are_not_the_default() {
     for (name, value) in keys("", &shown).iter().map(|key| (key, at(&shown, key))) {
         let line =
             EXAMPLE.lines().position(|l| l.starts_with(&format!("{} =", name.rsplit('.').next().expect("a name"))));
-        let says = |line: usize| {
+        let mentions_default = |line: usize| {
             let comment = EXAMPLE.lines().take(line).collect::<Vec<_>>();
             comment.iter().rev().take_while(|l| l.starts_with("# ")).any(|l| l.contains("Default:"))
         };
         let differs = !value.is_table() && value != at(&defaults, name);
         assert!(
-            !differs || line.is_some_and(says),
+            !differs || line.is_some_and(mentions_default),
             "{name} = {value} is not the default, and its comment does not say so"
         );
     }
@@ -168,7 +168,7 @@ fn errors_name_the_line_the_key_and_the_allowed_values() {
 fn messages_about_flags_become_messages_about_keys() {
     let config =
         parse("source = 'a.mha'\nrate = 0\n[motor]\nport = 'p'\nsweeps = 1\nstop_bits = 3").expect("right so far");
-    for (said, wanted) in [
+    for (message, expected) in [
         ("--rate 0: must be above 0, at most 1e6", "line 2: rate: 0: must be above 0, at most 1e6"),
         (
             "invalid value '3' for '--stop-bits <N>': 3 is not",
@@ -182,8 +182,8 @@ fn messages_about_flags_become_messages_about_keys() {
         ("--tool x", "echolume.toml: tool: x"),
         ("something else --rates", "echolume.toml: something else --rates"),
     ] {
-        let error = config.flag_error(said).to_string();
-        assert!(error.contains(wanted), "{error}");
+        let error = config.flag_error(message).to_string();
+        assert!(error.contains(expected), "{error}");
     }
 }
 

@@ -245,7 +245,7 @@ impl Console {
     }
 
     /// Sets the screen to present to.
-    pub fn set_screen(&mut self, screen: Option<Screen>) {
+    pub(super) fn set_screen(&mut self, screen: Option<Screen>) {
         // Drop the old one first: a window has one surface at a time.
         self.screen = None;
         self.screen = screen;
@@ -254,7 +254,7 @@ impl Console {
     }
 
     /// Ends the console and returns its screen for another one.
-    pub fn into_screen(mut self) -> Option<Screen> {
+    pub(super) fn into_screen(mut self) -> Option<Screen> {
         self.screen.take()
     }
 
@@ -340,13 +340,13 @@ impl Console {
     }
 
     /// Sets where to draw a pointer, pixels, if no windowing system draws one.
-    pub fn set_pointer(&mut self, at: Option<[f64; 2]>) {
+    pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
         self.needs_redraw |= self.pointer != at;
         self.pointer = at;
     }
 
     /// Shows a message for a few seconds and writes it to the log.
-    pub fn notify(&mut self, text: &str, is_fault: bool) {
+    pub(super) fn notify(&mut self, text: &str, is_fault: bool) {
         match is_fault {
             true => tracing::warn!("{text}"),
             false => tracing::info!("{text}"),
@@ -368,11 +368,7 @@ impl Console {
         &mut self.stream
     }
 
-    pub fn times(&self) -> &Times {
-        &self.times
-    }
-
-    pub fn screen(&self) -> Option<&Screen> {
+    pub(super) fn screen(&self) -> Option<&Screen> {
         self.screen.as_ref()
     }
 

@@ -5,7 +5,7 @@ use evdev::KeyCode;
 
 /// The meaning of a key code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Meaning {
+pub(super) enum Meaning {
     Key(Key),
     Button(Button),
     Shift,
@@ -14,7 +14,7 @@ pub enum Meaning {
 }
 
 impl Meaning {
-    pub fn is_modifier(self) -> bool {
+    pub(super) fn is_modifier(self) -> bool {
         matches!(self, Meaning::Shift | Meaning::Control | Meaning::Alt)
     }
 }
@@ -29,7 +29,7 @@ const ROWS: [(KeyCode, &str); 5] = [
 ];
 
 /// The meaning of a key code, if it has one here.
-pub fn meaning(code: u16) -> Option<Meaning> {
+pub(super) fn meaning(code: u16) -> Option<Meaning> {
     let in_row = |(first, keys): &(KeyCode, &str)| {
         let place = code.checked_sub(first.0)?;
         keys.chars().nth(usize::from(place)).map(Key::Char)
@@ -72,7 +72,7 @@ pub fn meaning(code: u16) -> Option<Meaning> {
 }
 
 /// The meaning of a key code on a tablet, where the pen has the buttons.
-pub fn pen_meaning(code: u16) -> Option<Meaning> {
+pub(super) fn pen_meaning(code: u16) -> Option<Meaning> {
     match KeyCode(code) {
         KeyCode::BTN_TOUCH => Some(Meaning::Button(Button::Left)),
         KeyCode::BTN_STYLUS => Some(Meaning::Button(Button::Right)),

@@ -13,7 +13,7 @@ mod tests;
 mod touch;
 mod translator;
 
-pub use reader::DeviceMessage;
+pub(super) use reader::DeviceMessage;
 
 use super::input::Input;
 use crate::gpu::Wake;

@@ -6,37 +6,37 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The range of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    pub low: i32,
-    pub high: i32,
+pub(super) struct Span {
+    pub(super) low: i32,
+    pub(super) high: i32,
 }
 
 impl Span {
     /// The position of a value in the range, 0 to 1.
-    pub fn fraction(&self, value: i32) -> f64 {
+    pub(super) fn fraction(&self, value: i32) -> f64 {
         ((f64::from(value) - f64::from(self.low)) / self.length()).clamp(0.0, 1.0)
     }
 
     /// Length of the range, at least 1.
-    pub fn length(&self) -> f64 {
+    pub(super) fn length(&self) -> f64 {
         (f64::from(self.high) - f64::from(self.low)).max(1.0)
     }
 }
 
 /// The abilities of a device, by the kernel's codes.
 #[derive(Clone, Debug, Default)]
-pub struct Abilities {
-    pub keys: BTreeSet<u16>,
-    pub relative: BTreeSet<u16>,
-    pub absolute: BTreeMap<u16, Span>,
+pub(super) struct Abilities {
+    pub(super) keys: BTreeSet<u16>,
+    pub(super) relative: BTreeSet<u16>,
+    pub(super) absolute: BTreeMap<u16, Span>,
     /// A touch screen: what is touched is what is shown there.
-    pub is_direct: bool,
-    pub is_accelerometer: bool,
+    pub(super) is_direct: bool,
+    pub(super) is_accelerometer: bool,
 }
 
 /// How a device points. Axes are horizontal and vertical.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pointing {
+pub(super) enum Pointing {
     /// It moves the pointer relative to its position, if at all.
     Relative,
     /// It sets the position of the pointer: a pen, or the tablet that a virtual machine uses as a mouse.
@@ -51,15 +51,15 @@ pub enum Pointing {
 
 /// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Profile {
-    pub pointing: Pointing,
+pub(super) struct Profile {
+    pub(super) pointing: Pointing,
     /// Its wheel also reports fractions of notches.
-    pub has_fine_wheel: bool,
+    pub(super) has_fine_wheel: bool,
 }
 
 impl Profile {
     /// Classifies a device. None if it gives no inputs, such as a joystick, a power button or a lid switch.
-    pub fn of(abilities: &Abilities) -> Option<Profile> {
+    pub(super) fn of(abilities: &Abilities) -> Option<Profile> {
         if abilities.is_accelerometer {
             return None;
         }

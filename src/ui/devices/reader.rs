@@ -17,7 +17,7 @@ const MAX_DEVICES: usize = 32;
 
 /// A message of the input devices, or a wake.
 #[derive(Clone, Debug, PartialEq)]
-pub enum DeviceMessage {
+pub(in crate::ui) enum DeviceMessage {
     Input(Input),
     /// A fault to report to the user.
     Warning(String),
@@ -40,7 +40,7 @@ enum Grab {
 }
 
 /// All open devices.
-pub struct OpenDevices {
+pub(super) struct OpenDevices {
     readers: Vec<Reader>,
     translator: Translator,
     grab: bool,
@@ -53,7 +53,7 @@ pub struct OpenDevices {
 }
 
 impl OpenDevices {
-    pub fn new(size: [u32; 2], grab: bool) -> OpenDevices {
+    pub(super) fn new(size: [u32; 2], grab: bool) -> OpenDevices {
         OpenDevices {
             readers: Vec::new(),
             translator: Translator::new(size),
@@ -65,17 +65,17 @@ impl OpenDevices {
         }
     }
 
-    pub fn resize(&mut self, size: [u32; 2]) {
+    pub(super) fn resize(&mut self, size: [u32; 2]) {
         self.translator.resize(size);
     }
 
     /// The file descriptors to wait for, in the order of the indices of [`OpenDevices::read`].
-    pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+    pub(super) fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         self.readers.iter().map(|reader| reader.device.as_fd())
     }
 
     /// Opens new devices. Unplugged ones are noticed when they are read.
-    pub fn scan(&mut self, out: &mut Vec<DeviceMessage>) {
+    pub(super) fn scan(&mut self, out: &mut Vec<DeviceMessage>) {
         // Without the folder there are no devices.
         let listed = std::fs::read_dir(FOLDER).into_iter().flatten().flatten().map(|entry| entry.path());
         let is_event =
@@ -128,7 +128,7 @@ impl OpenDevices {
     }
 
     /// Reads the pending events of the device with this index in [`OpenDevices::descriptors`]. Removes it if it is gone.
-    pub fn read(&mut self, index: usize, out: &mut Vec<DeviceMessage>) {
+    pub(super) fn read(&mut self, index: usize, out: &mut Vec<DeviceMessage>) {
         let Some(reader) = self.readers.get_mut(index) else { return };
         let number = reader.number;
         let events: io::Result<Vec<Event>> = reader

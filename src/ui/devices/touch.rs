@@ -10,20 +10,20 @@ const MAX_SLOTS: usize = 16;
 
 /// Size of the screen, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Area(pub [u32; 2]);
+pub(super) struct Area(pub [u32; 2]);
 
 impl Area {
     /// The nearest position on the screen.
-    pub fn clamp(&self, at: [f64; 2]) -> [f64; 2] {
+    pub(super) fn clamp(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|n| at[n].clamp(0.0, f64::from(self.0[n].max(1)) - 1.0))
     }
 
     /// Converts values of the axes to a position on the screen.
-    pub fn from_raw(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
+    pub(super) fn from_raw(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
         self.clamp([0, 1].map(|n| spans[n].fraction(raw[n]) * (f64::from(self.0[n].max(1)) - 1.0)))
     }
 
-    pub fn centre(&self) -> [f64; 2] {
+    pub(super) fn centre(&self) -> [f64; 2] {
         self.0.map(|n| f64::from(n / 2))
     }
 }
@@ -43,7 +43,7 @@ struct Slot {
 
 /// The fingers on a touch screen.
 #[derive(Clone, Debug, Default)]
-pub struct Fingers {
+pub(super) struct Fingers {
     slots: [Slot; MAX_SLOTS],
     /// The slot that values belong to.
     current: usize,
@@ -51,12 +51,12 @@ pub struct Fingers {
 
 impl Fingers {
     /// Selects the slot that values belong to from now on. Values for an invalid slot are ignored.
-    pub fn select_slot(&mut self, slot: i32) {
+    pub(super) fn select_slot(&mut self, slot: i32) {
         self.current = usize::try_from(slot).unwrap_or(MAX_SLOTS);
     }
 
     /// Sets the tracking ID of the slot; negative: the finger is lifted.
-    pub fn set_tracking_id(&mut self, number: i32) {
+    pub(super) fn set_tracking_id(&mut self, number: i32) {
         let Some(slot) = self.slots.get_mut(self.current) else { return };
         let tracking_id = (number >= 0).then_some(number);
         if tracking_id != slot.tracking_id {
@@ -65,21 +65,21 @@ impl Fingers {
     }
 
     /// Sets a coordinate. `axis`: 0 horizontal, 1 vertical.
-    pub fn set_position(&mut self, axis: usize, value: i32) {
+    pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         let raw = self.slots.get_mut(self.current).and_then(|slot| slot.raw.get_mut(axis));
         if let Some(raw) = raw {
             *raw = Some(value);
         }
     }
 
-    pub fn set_palm(&mut self, is_palm: bool) {
+    pub(super) fn set_palm(&mut self, is_palm: bool) {
         if let Some(slot) = self.slots.get_mut(self.current) {
             slot.is_palm = is_palm;
         }
     }
 
     /// Appends the inputs of the values since the last call. `count`: number of fingers so far, of all devices.
-    pub fn report(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
+    pub(super) fn report(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
         for slot in &mut self.slots {
             if let Some((finger, at)) = slot.reported.take_if(|_| slot.is_replaced || slot.is_palm) {
                 let phase = if slot.is_palm { Phase::Cancelled } else { Phase::Up };
@@ -105,7 +105,7 @@ impl Fingers {
     }
 
     /// Cancels all fingers. Those that still touch are ignored until they are lifted.
-    pub fn cancel_all(&mut self, area: &Area, out: &mut Vec<Input>) {
+    pub(super) fn cancel_all(&mut self, area: &Area, out: &mut Vec<Input>) {
         for (finger, at) in self.slots.iter().filter_map(|slot| slot.reported) {
             out.push(Input::Touch { finger, phase: Phase::Cancelled, at: area.clamp(at) });
         }
@@ -118,7 +118,7 @@ const NOTCHES_PER_HEIGHT: f64 = 30.0;
 
 /// A motion on a touch pad.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PadMotion {
+pub(super) enum PadMotion {
     /// Motion of the pointer, in widths of the pad.
     Pointer([f64; 2]),
     /// Notches of the wheel.
@@ -127,7 +127,7 @@ pub enum PadMotion {
 
 /// A touch pad. Its buttons are pressed, not tapped.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pad {
+pub(super) struct Pad {
     raw: [Option<i32>; 2],
     /// The previous position.
     last: Option<[i32; 2]>,
@@ -136,14 +136,14 @@ pub struct Pad {
 }
 
 impl Pad {
-    pub fn set_position(&mut self, axis: usize, value: i32) {
+    pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         if let Some(raw) = self.raw.get_mut(axis) {
             *raw = Some(value);
         }
     }
 
     /// Records whether fingers touch the pad, and how many.
-    pub fn set_key(&mut self, code: u16, is_down: bool) {
+    pub(super) fn set_key(&mut self, code: u16, is_down: bool) {
         match KeyCode(code) {
             KeyCode::BTN_TOUCH => self.is_touched = is_down,
             KeyCode::BTN_TOOL_DOUBLETAP
@@ -158,7 +158,7 @@ impl Pad {
     }
 
     /// The motion since the last call.
-    pub fn report(&mut self, spans: &[Span; 2]) -> Option<PadMotion> {
+    pub(super) fn report(&mut self, spans: &[Span; 2]) -> Option<PadMotion> {
         let [Some(x), Some(y)] = self.raw else { return None };
         if !self.is_touched {
             return None;

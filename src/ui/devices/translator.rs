@@ -12,49 +12,49 @@ const PALM: i32 = 2;
 
 /// An event of a device, in the kernel's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Event {
-    pub kind: u16,
-    pub code: u16,
-    pub value: i32,
+pub(super) struct Event {
+    pub(super) kind: u16,
+    pub(super) code: u16,
+    pub(super) value: i32,
 }
 
 /// The state of a device, as queried from the kernel.
 #[derive(Clone, Debug, Default)]
-pub struct State {
+pub(super) struct State {
     /// Keys that are down.
-    pub keys: BTreeSet<u16>,
+    pub(super) keys: BTreeSet<u16>,
     /// Values of ABS_X and ABS_Y.
-    pub place: [Option<i32>; 2],
+    pub(super) place: [Option<i32>; 2],
     /// Value of ABS_MT_SLOT.
-    pub slot: i32,
+    pub(super) slot: i32,
 }
 
 /// The state of a device from its events.
-pub struct Device {
-    pub profile: Profile,
+pub(super) struct Device {
+    pub(super) profile: Profile,
     /// Keys and buttons of this device that are down.
-    pub held: BTreeSet<u16>,
-    pub place: [Option<i32>; 2],
-    pub fingers: Fingers,
-    pub pad: Pad,
-    pub pending: PendingReport,
+    pub(super) held: BTreeSet<u16>,
+    pub(super) place: [Option<i32>; 2],
+    pub(super) fingers: Fingers,
+    pub(super) pad: Pad,
+    pub(super) pending: PendingReport,
     /// The kernel dropped events: ignore the rest of this report.
-    pub skips_report: bool,
+    pub(super) skips_report: bool,
     /// Events were dropped: the state has to be queried.
-    pub needs_resync: bool,
+    pub(super) needs_resync: bool,
 }
 
 /// The events since the last report.
 #[derive(Default)]
-pub struct PendingReport {
-    pub motion: [f64; 2],
-    pub has_position: bool,
-    pub keys: Vec<(u16, i32)>,
-    pub notches: f64,
+pub(super) struct PendingReport {
+    pub(super) motion: [f64; 2],
+    pub(super) has_position: bool,
+    pub(super) keys: Vec<(u16, i32)>,
+    pub(super) notches: f64,
 }
 
 impl Device {
-    pub fn new(profile: Profile) -> Device {
+    pub(super) fn new(profile: Profile) -> Device {
         Device {
             profile,
             held: BTreeSet::new(),
@@ -68,7 +68,7 @@ impl Device {
     }
 
     /// The meaning of a key or button of this device, if it has one.
-    pub fn meaning(&self, code: u16) -> Option<Meaning> {
+    pub(super) fn meaning(&self, code: u16) -> Option<Meaning> {
         match self.profile.pointing {
             Pointing::Absolute(_) => keymap::pen_meaning(code),
             _ => keymap::meaning(code),
@@ -76,7 +76,7 @@ impl Device {
     }
 
     /// Sets the queried state. The keys that are held do not change.
-    pub fn reset_to(&mut self, state: &State, area: &Area, out: &mut Vec<Input>) {
+    pub(super) fn reset_to(&mut self, state: &State, area: &Area, out: &mut Vec<Input>) {
         (self.needs_resync, self.skips_report, self.pending) = (false, false, PendingReport::default());
         self.fingers.cancel_all(area, out);
         self.fingers.select_slot(if matches!(self.profile.pointing, Pointing::Fingers(_)) { state.slot } else { 0 });
@@ -91,7 +91,7 @@ impl Device {
         self.pending.has_position = false;
     }
 
-    pub fn axis(&mut self, axis: Abs, value: i32) {
+    pub(super) fn axis(&mut self, axis: Abs, value: i32) {
         match (axis, &self.profile.pointing) {
             (Abs::ABS_X | Abs::ABS_Y, pointing) => {
                 let axis = usize::from(axis == Abs::ABS_Y);
@@ -118,7 +118,7 @@ const HIGH_RESOLUTION_STEPS: f64 = 120.0;
 const MAX_PENDING_KEYS: usize = 64;
 
 /// Translates the events of all devices, which share one pointer and one set of modifiers.
-pub struct Translator {
+pub(super) struct Translator {
     area: Area,
     pointer: [f64; 2],
     /// The current position of the pointer was sent.
@@ -130,7 +130,7 @@ pub struct Translator {
 
 impl Translator {
     /// `size`: of the screen, pixels.
-    pub fn new(size: [u32; 2]) -> Translator {
+    pub(super) fn new(size: [u32; 2]) -> Translator {
         let area = Area(size);
         let pointer = area.clamp(area.centre());
         let (modifiers, devices) = (Modifiers::default(), BTreeMap::new());
@@ -138,21 +138,21 @@ impl Translator {
     }
 
     /// Sets the size of the screen, pixels.
-    pub fn resize(&mut self, size: [u32; 2]) {
+    pub(super) fn resize(&mut self, size: [u32; 2]) {
         self.area = Area(size);
         self.pointer = self.area.clamp(self.pointer);
         self.pointer_is_sent = false;
     }
 
     /// Adds a device. Keys that are already down are ignored, except for modifiers.
-    pub fn add(&mut self, number: u32, profile: Profile, state: &State, out: &mut Vec<Input>) {
+    pub(super) fn add(&mut self, number: u32, profile: Profile, state: &State, out: &mut Vec<Input>) {
         self.remove(number, out);
         self.devices.insert(number, Device::new(profile));
         self.resync(number, state, out);
     }
 
     /// Removes a device and releases what it held.
-    pub fn remove(&mut self, number: u32, out: &mut Vec<Input>) {
+    pub(super) fn remove(&mut self, number: u32, out: &mut Vec<Input>) {
         let Some(mut device) = self.devices.remove(&number) else { return };
         device.fingers.cancel_all(&self.area, out);
         let is_held = device.held.iter().any(|code| device.meaning(*code).is_some_and(|held| !held.is_modifier()));
@@ -165,12 +165,12 @@ impl Translator {
     }
 
     /// True if events of a device were dropped: call [`Translator::resync`].
-    pub fn needs_resync(&self, number: u32) -> bool {
+    pub(super) fn needs_resync(&self, number: u32) -> bool {
         self.devices.get(&number).is_some_and(|device| device.needs_resync)
     }
 
     /// Sets the queried state of a device after dropped events: keys that are up are released, and fingers are cancelled.
-    pub fn resync(&mut self, number: u32, state: &State, out: &mut Vec<Input>) {
+    pub(super) fn resync(&mut self, number: u32, state: &State, out: &mut Vec<Input>) {
         let Some(device) = self.devices.get_mut(&number) else { return };
         device.reset_to(state, &self.area, out);
         let up: Vec<u16> = device.held.difference(&state.keys).copied().collect();
@@ -181,7 +181,7 @@ impl Translator {
     }
 
     /// Handles an event and appends its inputs.
-    pub fn event(&mut self, number: u32, event: Event, out: &mut Vec<Input>) {
+    pub(super) fn event(&mut self, number: u32, event: Event, out: &mut Vec<Input>) {
         let Some(device) = self.devices.get_mut(&number) else { return };
         let Event { kind, code, value } = event;
         let pending = &mut device.pending;
@@ -301,8 +301,8 @@ impl Translator {
         }
     }
 
-    fn is_held(&self, wanted: Meaning) -> bool {
-        self.devices.values().any(|d| d.held.iter().any(|code| d.meaning(*code) == Some(wanted)))
+    fn is_held(&self, meaning: Meaning) -> bool {
+        self.devices.values().any(|d| d.held.iter().any(|code| d.meaning(*code) == Some(meaning)))
     }
 
     fn send_modifiers(&mut self, out: &mut Vec<Input>) {

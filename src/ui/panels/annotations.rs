@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Lengths that a scale bar may have, mm.
 const LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
-pub fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
     let Some(scene) = state.scene else { return };
     let picture = picture_rect(state, scale);
     // During a resize the scene has another size for a moment.
@@ -104,8 +104,8 @@ fn bar(painter: &Painter, area: Rect, per_point: f64) {
     if !(per_point > 0.0 && per_point.is_finite()) {
         return;
     }
-    let room = f64::from(area.width()) * 0.3 * per_point;
-    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= room) else { return };
+    let max_length = f64::from(area.width()) * 0.3 * per_point;
+    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
     let right = pos2(area.right() - 16.0, area.bottom() - 16.0);
     let left = right - vec2(width, 0.0);
@@ -130,8 +130,8 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
         .iter()
         .map(|(axis, name, colour)| {
-            let seen = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
-            (axis.dot(rays.forward), seen, *name, *colour)
+            let projected = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
+            (axis.dot(rays.forward), projected, *name, *colour)
         })
         .collect();
     // Axes that point away are drawn first, and weaker.

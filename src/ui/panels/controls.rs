@@ -31,7 +31,7 @@ const TOOLS: [(Tool, &str); 5] = [
 
 const PLANES: [(PlaneName, &str); 3] = [(PlaneName::A, "A"), (PlaneName::B, "B"), (PlaneName::C, "C")];
 
-pub fn show_modes(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     Panel::left("rail").exact_size(MODES_WIDTH).resizable(false).show_separator_line(false).show(ui, |ui| {
         let settings = state.controls.settings();
         ui.add_space(6.0);
@@ -90,7 +90,7 @@ const MAPS: [(ColourMap, &str); 5] = [
     (ColourMap::Ice, "Ice"),
 ];
 
-pub fn show_sliders(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_sliders(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let settings = state.controls.settings();
     Panel::right("column").exact_size(SLIDERS_WIDTH).resizable(false).show_separator_line(false).show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
@@ -170,7 +170,7 @@ fn choices<T: Copy>(ui: &mut Ui, name: &str, all: &[(T, &str)], is: impl Fn(T) -
     });
 }
 
-pub fn show_cine_bar(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_cine_bar(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     Panel::bottom("bar").exact_size(CINE_BAR_HEIGHT).resizable(false).show_separator_line(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
             let (label, fill) = match state.is_frozen {

@@ -7,24 +7,25 @@ mod overlays;
 mod state;
 mod theme;
 
-pub use state::{Banner, Note, PanelState, picture_area};
+pub use state::picture_area;
+pub(super) use state::{Banner, Note, PanelState};
 
 use super::command::Command;
 use super::input::{Button, Input, Modifiers, Phase};
 use crate::gpu;
-use egui::{Event, Modifiers as Held, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
+use egui::{Event, Modifiers as EguiModifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
 use std::time::Duration;
 
 /// The result of a layout.
-pub struct PanelOutput {
-    pub panels: gpu::window::Panels,
-    pub commands: Vec<Command>,
+pub(super) struct PanelOutput {
+    pub(super) panels: gpu::window::Panels,
+    pub(super) commands: Vec<Command>,
     /// When the panels need another layout without an event.
-    pub repaint_after: Duration,
+    pub(super) repaint_after: Duration,
 }
 
 /// The panels of one window.
-pub struct Panels {
+pub(super) struct Panels {
     context: egui::Context,
     egui_input: EguiInput,
     /// Pixels per point.
@@ -33,38 +34,38 @@ pub struct Panels {
 
 impl Panels {
     /// `scale`: pixels per point, limited to 0.5..=4; above 1 everything is larger.
-    pub fn new(scale: f32) -> Panels {
+    pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
         theme::apply(&context);
         Panels { context, egui_input: EguiInput::default(), scale: scale.clamp(0.5, 4.0) }
     }
 
-    pub fn scale(&self) -> f32 {
+    pub(super) fn scale(&self) -> f32 {
         self.scale
     }
 
     /// Starts again after the device with the textures was lost: all textures are sent again.
-    pub fn reset(&mut self) {
+    pub(super) fn reset(&mut self) {
         *self = Panels::new(self.scale);
     }
 
-    pub fn input(&mut self, input: &Input) {
+    pub(super) fn input(&mut self, input: &Input) {
         self.egui_input.input(input, self.scale);
     }
 
     /// True if a panel covers this position, pixels: a press there belongs to the panel.
-    pub fn covers(&self, at: [f64; 2]) -> bool {
+    pub(super) fn covers(&self, at: [f64; 2]) -> bool {
         let point = pos2(at[0] as f32 / self.scale, at[1] as f32 / self.scale);
         self.context.layer_id_at(point).is_some_and(|layer| layer.order != egui::Order::Background)
     }
 
     /// True if there is input that no layout has handled yet.
-    pub fn has_pending_input(&self) -> bool {
+    pub(super) fn has_pending_input(&self) -> bool {
         self.egui_input.has_pending_input()
     }
 
     /// Lays out the panels in a window of this size, pixels, at a time in s.
-    pub fn lay_out(&mut self, state: &PanelState, size: [u32; 2], time: f64) -> PanelOutput {
+    pub(super) fn lay_out(&mut self, state: &PanelState, size: [u32; 2], time: f64) -> PanelOutput {
         let (events, modifiers) = self.egui_input.take();
         let points = vec2(size[0] as f32, size[1] as f32) / self.scale;
         let mut input = egui::RawInput {
@@ -114,7 +115,7 @@ impl Panels {
 struct EguiInput {
     events: Vec<Event>,
     pointer: Pos2,
-    held: Held,
+    modifiers: EguiModifiers,
     /// The finger that acts as the pointer.
     finger: Option<u64>,
 }
@@ -130,12 +131,12 @@ impl EguiInput {
                 unit: MouseWheelUnit::Line,
                 delta: vec2(0.0, notches as f32),
                 phase: TouchPhase::Move,
-                modifiers: self.held,
+                modifiers: self.modifiers,
             }),
             // Keys have their own bindings: no panel has a text field.
             Input::Key { .. } => {}
             Input::Modifiers(Modifiers { shift, control, alt }) => {
-                self.held = Held { alt, ctrl: control, shift, mac_cmd: false, command: control };
+                self.modifiers = EguiModifiers { alt, ctrl: control, shift, mac_cmd: false, command: control };
             }
             Input::Touch { finger, phase, at: place } => self.touch(finger, phase, at(place)),
             Input::FocusLost => {
@@ -156,7 +157,7 @@ impl EguiInput {
             Button::Right => PointerButton::Secondary,
             Button::Middle => PointerButton::Middle,
         };
-        self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.held });
+        self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.modifiers });
     }
 
     fn touch(&mut self, finger: u64, phase: Phase, at: Pos2) {
@@ -185,7 +186,7 @@ impl EguiInput {
         !self.events.is_empty()
     }
 
-    fn take(&mut self) -> (Vec<Event>, Held) {
-        (std::mem::take(&mut self.events), self.held)
+    fn take(&mut self) -> (Vec<Event>, EguiModifiers) {
+        (std::mem::take(&mut self.events), self.modifiers)
     }
 }

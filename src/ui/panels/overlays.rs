@@ -11,7 +11,7 @@ use egui::{
     Vec2, pos2, vec2,
 };
 
-pub fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
+pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
     let picture = picture_rect(state, scale);
     if let Some(banner) = &state.banner {
         // In the centre without a picture, at the top over one.
@@ -64,7 +64,7 @@ const WIDTH: f32 = 316.0;
 /// Largest number of passes that are listed; the others share one line.
 const MAX_PASSES: usize = 9;
 
-pub fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
+pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
     let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
         let frame = Frame::new().fill(BACKGROUND.gamma_multiply(0.82)).inner_margin(Margin::same(12)).corner_radius(8);
@@ -172,7 +172,7 @@ const GESTURES: [(&str, &str); 9] = [
     ("Planes, then click", "move the point where the three planes cross"),
 ];
 
-pub fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
+pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     let mut is_closed = false;
     Area::new(Id::new("help")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(
@@ -246,7 +246,7 @@ const CORNERS: [Vec2; 7] = [
 /// The triangles that fill the pointer: it is not convex.
 const TRIANGLES: [[u32; 3]; 5] = [[0, 1, 2], [0, 2, 5], [0, 5, 6], [2, 3, 4], [2, 4, 5]];
 
-pub fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
+pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
     let Some([x, y]) = state.pointer else { return };
     let tip = pos2(x as f32 / scale, y as f32 / scale);
     // On top of everything, in a layer that receives no clicks.

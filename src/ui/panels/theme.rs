@@ -4,26 +4,26 @@
 use egui::{Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Stroke, TextStyle, Theme, vec2};
 use std::sync::Arc;
 
-pub const BACKGROUND: Color32 = Color32::from_rgb(9, 10, 13);
-pub const PANEL: Color32 = Color32::from_rgb(18, 21, 26);
-pub const BUTTON: Color32 = Color32::from_rgb(36, 42, 50);
-pub const TEXT: Color32 = Color32::from_rgb(214, 221, 229);
-pub const WEAK_TEXT: Color32 = Color32::from_rgb(138, 150, 163);
-pub const ACCENT: Color32 = Color32::from_rgb(64, 184, 220);
-pub const GOOD: Color32 = Color32::from_rgb(110, 200, 120);
-pub const WARNING: Color32 = Color32::from_rgb(250, 190, 70);
-pub const FAULT: Color32 = Color32::from_rgb(240, 96, 84);
+pub(super) const BACKGROUND: Color32 = Color32::from_rgb(9, 10, 13);
+pub(super) const PANEL: Color32 = Color32::from_rgb(18, 21, 26);
+pub(super) const BUTTON: Color32 = Color32::from_rgb(36, 42, 50);
+pub(super) const TEXT: Color32 = Color32::from_rgb(214, 221, 229);
+pub(super) const WEAK_TEXT: Color32 = Color32::from_rgb(138, 150, 163);
+pub(super) const ACCENT: Color32 = Color32::from_rgb(64, 184, 220);
+pub(super) const GOOD: Color32 = Color32::from_rgb(110, 200, 120);
+pub(super) const WARNING: Color32 = Color32::from_rgb(250, 190, 70);
+pub(super) const FAULT: Color32 = Color32::from_rgb(240, 96, 84);
 
 /// Size of running text, points: at a scale of 1 on a monitor with 96 dots per inch it is 5 mm high, which a healthy eye reads from 2 m.
-pub const TEXT_SIZE: f32 = 19.0;
+pub(super) const TEXT_SIZE: f32 = 19.0;
 /// Size of important text, such as messages.
-pub const LARGE_TEXT: f32 = 26.0;
-pub const SMALL_TEXT: f32 = 15.0;
+pub(super) const LARGE_TEXT: f32 = 26.0;
+pub(super) const SMALL_TEXT: f32 = 15.0;
 /// Minimum size of a button for a gloved finger, points: 14 mm at 96 dots per inch.
-pub const TOUCH_SIZE: f32 = 52.0;
+pub(super) const TOUCH_SIZE: f32 = 52.0;
 
 /// Sets typeface, sizes and colours.
-pub fn apply(context: &egui::Context) {
+pub(super) fn apply(context: &egui::Context) {
     let mut fonts = FontDefinitions::empty();
     let faces = [
         ("sans", FontFamily::Proportional, dejavu::sans_condensed::regular()),

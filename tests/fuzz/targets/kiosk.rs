@@ -18,7 +18,7 @@ pub fn configuration(bytes: &[u8]) -> String {
     let arguments = config.source_arguments();
     assert!(arguments.iter().all(|argument| argument.starts_with("--")), "{arguments:?}");
     config.layers().and_then(|layers| layers.finish()).expect("checked before");
-    told(config.refuse(&arguments.join(" ")))
+    told(config.flag_error(&arguments.join(" ")))
 }
 
 /// What follows a name that nobody knows stays, and so do lines.
