@@ -4,7 +4,7 @@ use super::{Failure, failed, input, say, targets};
 use crate::gpu::{Choice, Context, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
-use crate::picture::{self, grey::Grey};
+use crate::picture::{self, Grey};
 use crate::profile::pass_times;
 use crate::scene::Settings;
 use crate::scene::load::Layers;

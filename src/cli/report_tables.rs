@@ -3,7 +3,7 @@
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
 use crate::gpu::Choice;
-use crate::picture::grey::Grey;
+use crate::picture::Grey;
 use crate::picture::replace;
 use crate::thesis_tables::measure::{Asked, growth, run};
 use crate::thesis_tables::{csv, markdown};

@@ -187,7 +187,7 @@ impl Report {
     /// # Errors
     /// One line: no JSON, of another format or version, or with numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
-        Report::read(text).map_err(|e| crate::scene::load::single_line(&e))
+        Report::read(text).map_err(|e| crate::text::single_line(&e))
     }
 
     fn read(text: &str) -> Result<Report, String> {

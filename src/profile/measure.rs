@@ -1,8 +1,8 @@
 //! One scene rendered again and again: where the time goes.
 
-use super::machine::CpuTime;
-use super::{ceilings, machine};
+use super::ceilings;
 use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::machine::{self, CpuTime};
 use crate::passes::{Bind, Frequency, Part, Pass, Span};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::trace::{self, Track};

@@ -6,7 +6,6 @@ pub mod compare;
 pub mod differences;
 pub mod formats;
 pub(crate) mod judgement;
-pub mod machine;
 pub mod measure;
 pub mod pass_times;
 pub mod ranks;
@@ -14,6 +13,7 @@ pub mod statistics;
 pub mod table;
 pub mod trace;
 
+use crate::machine::Device;
 use serde::{Deserialize, Serialize};
 use statistics::Sample;
 
@@ -38,7 +38,7 @@ pub enum ProfileError {
 
 impl ProfileError {
     fn on_one_line(self) -> ProfileError {
-        let line = |text: String| crate::scene::load::single_line(&text);
+        let line = |text: String| crate::text::single_line(&text);
         match self {
             ProfileError::Format { found } => ProfileError::Format { found: line(found) },
             ProfileError::Json(fault) => ProfileError::Json(line(fault)),
@@ -92,25 +92,6 @@ pub struct Profile {
     /// How the volume is sampled and texels are read, in words.
     #[serde(default)]
     pub sampling: Option<String>,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Device {
-    pub name: String,
-    pub driver: String,
-    /// Vulkan version.
-    pub api: String,
-    /// Computes on the CPU.
-    pub is_software: bool,
-    /// ns a tick of the device's clock.
-    pub timestamp_period_ns: f64,
-    /// Bits of a time stamp; 0 where the queue has none, and then no pass has times.
-    pub valid_bits: u32,
-    /// The device's clock was tied to the host's, so that both may be drawn on one axis.
-    pub calibrated: bool,
-    /// What is known of clocks and power state, in words; None where the device tells nothing.
-    pub clocks: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,9 +3,9 @@
 
 use super::measure_growth::Fault;
 use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::machine;
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
-use crate::picture::grey::Grey;
-use crate::profile::machine;
+use crate::picture::Grey;
 use crate::scene::{
     EnhancedSigma, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth, VolumeFormat,
 };

@@ -2,7 +2,7 @@
 
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::Slot;
-use crate::picture::grey::Grey;
+use crate::picture::Grey;
 use crate::probe::{Geometry, Grid};
 use crate::scene::{Input, Scene, SceneError, Settings};
 use crate::source::StoredType;

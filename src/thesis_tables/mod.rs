@@ -9,7 +9,7 @@ pub mod measure_growth;
 pub mod sweep;
 pub mod window_growth;
 
-use crate::profile::Device;
+use crate::machine::Device;
 use crate::profile::statistics::Sample;
 use crate::thesis_tables::window_growth::Growth;
 

@@ -4,7 +4,7 @@ use crate::scenes::alone;
 use crate::scenes::device;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
-use echolume::picture::grey::Grey;
+use echolume::picture::Grey;
 use echolume::plan::Plan;
 use echolume::reference;
 use echolume::scene::{MAX_WINDOW, Scene};

@@ -1,6 +1,6 @@
 //! Why a configuration is refused.
 
-use crate::scene::load::plain;
+use crate::text::printable;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ impl ConfigError {
             Some((end, _)) => format!("{} ...", &text[..end]),
             None => text.to_string(),
         };
-        ConfigError { path: path.into(), line, key: short(&plain(key)), fault: short(&plain(fault)) }
+        ConfigError { path: path.into(), line, key: short(&printable(key)), fault: short(&printable(fault)) }
     }
 
     /// The key at fault, such as `display.scale`; empty where it is the file itself.
@@ -38,7 +38,7 @@ impl ConfigError {
 
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: ", plain(&self.path.display().to_string()))?;
+        write!(f, "{}: ", printable(&self.path.display().to_string()))?;
         if let Some(line) = self.line {
             write!(f, "line {line}: ")?;
         }

@@ -2,7 +2,7 @@
 
 use super::{told, written};
 use echolume::error_report::{Measure, Report, choose, summary_table};
-use echolume::picture::grey::Grey;
+use echolume::picture::Grey;
 use echolume::profile::{compare, formats, table as passes};
 #[cfg(feature = "view")]
 use echolume::ui::quality_ladder;

@@ -4,7 +4,8 @@ use super::{Change, Class, Options, Pair};
 use crate::profile::compare as profile;
 use crate::profile::compare::{Kind, Line, Series, Verdict};
 use crate::profile::judgement;
-use crate::verify::report::numbers::{change, number, plain};
+use crate::text::escaped;
+use crate::verify::report::numbers::{change, number};
 use crate::verify::report::{Figure, Run, Unit};
 use std::collections::BTreeMap;
 
@@ -86,7 +87,7 @@ fn told(pair: &Pair, line: &Line, options: &Options, is_only_told: bool) -> Opti
     };
     let what = format!(
         "{} {} % {word} ({:.2}..{:.2}), {medians}{under}",
-        plain(&pair.new.what),
+        escaped(&pair.new.what),
         rounded(100.0 * share),
         ratio.low,
         ratio.high

@@ -1,10 +1,29 @@
 //! What is known of the machine: device, driver, clocks.
 
 use crate::gpu::Context;
-use crate::profile::Device;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Device {
+    pub name: String,
+    pub driver: String,
+    /// Vulkan version.
+    pub api: String,
+    /// Computes on the CPU.
+    pub is_software: bool,
+    /// ns a tick of the device's clock.
+    pub timestamp_period_ns: f64,
+    /// Bits of a time stamp; 0 where the queue has none, and then no pass has times.
+    pub valid_bits: u32,
+    /// The device's clock was tied to the host's, so that both may be drawn on one axis.
+    pub calibrated: bool,
+    /// What is known of clocks and power state, in words; None where the device tells nothing.
+    pub clocks: Option<String>,
+}
 
 /// Now, by RFC 3339.
 pub fn date() -> String {
