@@ -5,7 +5,7 @@ use crate::gpu::{Choice, Context, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
 use crate::picture::{self, Grey};
-use crate::profile::pass_times;
+use crate::profile::export::pass_time_table;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::thesis_tables::measure_growth::{Row, measure, scene};
@@ -126,7 +126,7 @@ impl Filter {
             }
             if self.timings {
                 let measured = renderer.take_times().map_err(failed)?;
-                say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
+                say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
             }
         }
         if self.growth_table {

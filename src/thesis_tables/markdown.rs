@@ -1,7 +1,7 @@
 //! A report of the thesis' tables as Markdown.
 
 use super::{Conditions, DEPTH, FAN_ANGLE, Grown, Report, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, Table};
-use crate::profile::pass_times;
+use crate::profile::export::acquisition_floor;
 use crate::thesis_tables::window_growth::Growth;
 use std::fmt::Write as _;
 
@@ -167,7 +167,7 @@ fn notes(report: &Report) -> Vec<String> {
          5x5 and 7x7"
             .into(),
         format!("lines: the thesis has 64 to 256; here {}. Slices are resampled, so stages 2-4 do not see lines", usual.lines),
-        format!("as of the usual row: {}", pass_times::floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
+        format!("as of the usual row: {}", acquisition_floor(acquisition(usual.frames, usual.lines), SOUND_SPEED)),
         format!(
             "the thesis' example, {frames} frames of {lines} lines to {DEPTH} mm: {:.1} ms (thesis: around 466 ms)",
             acquisition(frames, lines) * 1e3

@@ -3,7 +3,7 @@
 use super::{told, written};
 use echolume::error_report::{Measure, Report, choose, summary_table};
 use echolume::picture::Grey;
-use echolume::profile::{compare, formats, table as passes};
+use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
 use echolume::ui::quality_ladder;
 use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
@@ -29,17 +29,17 @@ pub fn error_report(bytes: &[u8]) -> String {
 }
 
 pub fn profile(bytes: &[u8]) -> String {
-    let profile = match formats::from_json(&String::from_utf8_lossy(bytes)) {
+    let profile = match Profile::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(profile) => profile,
         Err(error) => return told(error),
     };
-    let written = formats::to_json(&profile).expect("it was checked");
-    assert_eq!(formats::from_json(&written).expect("what was written is right"), profile);
-    let _ = (formats::csv(&profile), formats::csv_samples(&profile), passes::profile(&profile));
-    match compare::compare(&profile, &profile, &compare::Options::default()) {
+    let written = profile.to_json().expect("it was checked");
+    assert_eq!(Profile::from_json(&written).expect("what was written is right"), profile);
+    let _ = (export::csv(&profile), export::csv_samples(&profile), export::profile_table(&profile));
+    match compare::compare(&profile, &profile, &compare::CompareOptions::default()) {
         Ok(compared) => {
             assert_eq!(compared.regressions().count(), 0, "it is no slower than itself");
-            passes::comparison(&compared)
+            export::comparison_table(&compared)
         }
         Err(error) => error.to_string(),
     }
