@@ -1,6 +1,7 @@
 //! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
 //! compares two, [`export`] and [`trace`] write them as text and as Chrome traces.
 
+pub(crate) mod command;
 pub mod compare;
 pub mod export;
 pub mod measure;
