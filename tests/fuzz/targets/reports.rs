@@ -1,7 +1,7 @@
 //! What an earlier run wrote, and ordinary pictures.
 
 use super::{told, written};
-use echolume::error_report::{Measure, Report, choose, summary_table};
+use echolume::error_report::{Measure, Report, choose, export as error_export};
 use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
@@ -17,7 +17,7 @@ pub fn error_report(bytes: &[u8]) -> String {
     assert_eq!(Report::from_json(&written).expect("what was written is right"), report);
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
-        summary_table::table(&report, measure);
+        error_export::summary_table(&report, measure);
         outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
         outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
     }
@@ -25,7 +25,7 @@ pub fn error_report(bytes: &[u8]) -> String {
     let rungs = 0;
     #[cfg(feature = "view")]
     let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
-    format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
+    format!("{} {rungs} {}", outcome.len(), error_export::csv(&report).len())
 }
 
 pub fn profile(bytes: &[u8]) -> String {

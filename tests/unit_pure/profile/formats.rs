@@ -39,7 +39,7 @@ fn json_comes_back_as_it_went() {
 
 #[test]
 fn other_versions_other_files_and_contradictions_are_refused() {
-    let good = to_json(&measured()).expect("JSON");
+    let good = measured().to_json().expect("JSON");
     let error = |text: &str| Profile::from_json(text).expect_err("refused").to_string();
     let other = good.replace("echolume-profile-2", "echolume-profile-9");
     assert_eq!(
