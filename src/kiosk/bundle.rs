@@ -142,7 +142,7 @@ impl Bundle {
 
     /// Adds a note to the README: what is missing, and why.
     pub fn note(&mut self, note: &str) {
-        let note = self.redactor.redact(&load::plain(note));
+        let note = self.redactor.redact(&crate::text::printable(note));
         self.notes.push(note);
     }
 

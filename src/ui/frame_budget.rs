@@ -32,7 +32,8 @@ pub(super) struct FrameBudget {
 }
 
 impl FrameBudget {
-    /// `time_shares`: the time on each rung as a fraction of that on the first, decreasing. Without a budget every picture has full quality.
+    /// `time_shares`: the time on each rung as a fraction of that on the first, decreasing. Without a budget every
+    /// picture has full quality.
     pub(super) fn new(budget: Option<Duration>, time_shares: &[f64]) -> FrameBudget {
         let expected = if time_shares.is_empty() { vec![1.0] } else { time_shares.to_vec() };
         let measured = expected.clone();

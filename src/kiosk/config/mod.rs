@@ -45,7 +45,7 @@ pub struct Config {
     /// Play a recording repeatedly, for demonstrations. Default: false.
     #[serde(rename = "loop")]
     pub forever: bool,
-    /// OpenIGTLink: whose TRANSFORM, or which tool of TDATA, locations 2D frames; `image`: their own matrix. Default: any TRANSFORM.
+    /// OpenIGTLink: the TRANSFORM or the tool of TDATA that places 2D frames; `image`: their own matrix. Default: any TRANSFORM.
     pub tool: Option<String>,
     /// The part of each tracked frame that is ultrasound, pixels: x, y, width, height. Default: all of it.
     pub clip: Option<[u32; 4]>,
@@ -264,7 +264,7 @@ impl Config {
     /// # Errors
     /// One line: a path is not UTF-8.
     pub fn to_toml(&self) -> Result<String, String> {
-        toml::to_string(self).map_err(|e| load::plain(&e.to_string()))
+        toml::to_string(self).map_err(|e| crate::text::printable(&e.to_string()))
     }
 
     /// The settings of the scene in layers: the preset of the phantom if that is the source, then the presets, then the scene.

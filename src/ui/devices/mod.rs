@@ -53,7 +53,8 @@ struct Shared {
 }
 
 impl Devices {
-    /// Starts to read devices. `size`: of the screen, pixels; `grab`: other programs do not get the events, such as the text console behind.
+    /// Starts to read devices. `size`: of the screen, pixels; `grab`: other programs do not get the events, such as the text
+    /// console behind.
     ///
     /// # Errors
     /// The thread cannot be started. Missing or unreadable devices are no error: they may appear later.
