@@ -2,9 +2,12 @@
 //!
 //! Faults are told without the file's name where the caller has its own way to say it.
 
+mod input_error;
 pub mod signals;
 mod unfinished;
 
+pub use input_error::InputError;
+pub(crate) use input_error::{escaped, quoted};
 pub use unfinished::Unfinished;
 
 use std::fs::{File, OpenOptions};
