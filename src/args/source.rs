@@ -188,9 +188,8 @@ impl SourceArgs {
             false => Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm"))),
         };
         let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
-        let widest_hole = positive("--hole", self.hole, 0.0)?;
-        options.freehand =
-            freehand::CompoundingOptions { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
+        let max_hole = positive("--hole", self.hole, 0.0)?;
+        options.freehand = freehand::CompoundingOptions { spacing, max_hole, clip: self.clip()?, ..options.freehand };
         Ok(options)
     }
 

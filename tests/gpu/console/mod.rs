@@ -10,7 +10,7 @@ use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
 use echolume::live::Update;
-use echolume::live::views::Views;
+use echolume::live::Views;
 use echolume::picture::Picture;
 use echolume::scene::Settings;
 use echolume::source::Frame;
