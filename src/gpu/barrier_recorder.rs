@@ -1,8 +1,8 @@
 //! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
 
 use super::context::Context;
-use crate::barriers::oracle::Log;
 use crate::barriers::{Access, Barrier, Worker, Workers};
+use crate::queues::oracle::Log;
 use crate::queues::{Queues, Wait};
 use ash::vk;
 

@@ -10,7 +10,7 @@ use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::Geometry;
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
 use crate::verify::report::{Figure, Level, Unit};
 use std::sync::Arc;
@@ -127,7 +127,7 @@ fn a_change(bench: &mut Bench) -> Result<Found, GpuError> {
 fn submissions(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
     let mut all = 0;
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let aside = IsolatedContext::of_queues(bench, queues)?;
         let sound = sound(&aside.context, SMALL)?;
         let mut after = 0;

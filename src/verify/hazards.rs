@@ -9,7 +9,7 @@ use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Level, Shown};
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// The same story on one, two and three queues.
 fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     let (mut found, mut sums) = (Found::default(), [0, 0]);
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let aside = IsolatedContext::of_queues(bench, queues)?;
         let [compared, wrong] = story(&mut found, &aside, queues, bench.level)?;
         sums = [sums[0] + compared, sums[1] + wrong];
@@ -41,8 +41,8 @@ fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     }
     counted(&mut found, sums[0], sums[1]);
     let there = bench.context.queue_count();
-    if there < MOST {
-        found.notes.push(format!("queues for different work: {there} of {MOST}; one does what several would"));
+    if there < MAX_QUEUES {
+        found.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
     }
     Ok(found)
 }

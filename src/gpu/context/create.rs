@@ -52,7 +52,7 @@ pub fn create_instance(
 
 /// `shows`: its pictures will be shown, with panels drawn over them.
 pub fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -> Result<ash::Device, GpuError> {
-    let priorities = [1.0; crate::queues::MOST];
+    let priorities = [1.0; crate::queues::MAX_QUEUES];
     let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
     let queues: Vec<_> = families
         .into_iter()

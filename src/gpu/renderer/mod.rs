@@ -18,12 +18,12 @@ use super::recorder::{Place, Recorder, Work};
 use super::resources::{Buffer, Purpose};
 use super::slots::Slots;
 use super::timeline::Timelines;
-use crate::barriers::oracle::Log;
 use crate::passes::chain;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Format, Initializer, Shape};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Texels};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
+use crate::queues::oracle::Log;
 use crate::queues::{Queues, Work as Task};
 use crate::scene::{Scene, VisibleBounds};
 use std::sync::Arc;
@@ -133,7 +133,7 @@ impl Renderer {
         super::formats::check(context, &plan, &scene)?;
         let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), fetch)?);
         let steps = pipelines_of(&pipelines, &plan, &scene)?;
-        let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, crate::queues::MOST);
+        let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, crate::queues::MAX_QUEUES);
         let mut renderer = Renderer {
             lanes: Vec::new(),
             picture: Recorder::new(context, 0, "picture", options.spans)?,

@@ -2,10 +2,10 @@
 //! there, some. Recorded is what a renderer does for two volumes that take turns, drawn while the other is filled.
 
 use super::Caught;
-use crate::barriers::oracle::Log;
 use crate::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
 use crate::passes::Texels;
 use crate::probe::Geometry;
+use crate::queues::oracle::Log;
 use crate::scene::Scene;
 use crate::verify::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
 use crate::verify::{drawn, isolated_context};

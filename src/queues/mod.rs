@@ -2,10 +2,12 @@
 //! ([`crate::barriers`]); between queues only semaphores do, and a submission waits for as much as it conflicts with and no more.
 //! Pure: the same for one, two and three queues, and tested without a GPU.
 
+pub mod oracle;
+
 use crate::barriers::{Access, Barrier, Tracker};
 
 /// Most queues that are of use: copies, stage 1, and everything after it.
-pub const MOST: usize = 3;
+pub const MAX_QUEUES: usize = 3;
 
 /// What is to be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,12 +23,12 @@ pub enum Work {
 impl Work {
     /// The queue that does it where there are so many: number 0 renders, 1 takes frames in, 2 copies them.
     pub fn queue(self, queues: usize) -> usize {
-        (self as usize).min(queues.clamp(1, MOST) - 1)
+        (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
 }
 
 /// By queue, the last submission that is known to be done: the values of their timelines.
-type Clock = [u64; MOST];
+type Clock = [u64; MAX_QUEUES];
 
 /// Everything that queues do to the same slots.
 #[derive(Clone, Debug)]
@@ -64,7 +66,7 @@ impl Default for Queues {
 impl Queues {
     /// `count`: 1..=3.
     pub fn new(count: usize) -> Queues {
-        Queues { each: vec![Queue::default(); count.clamp(1, MOST)] }
+        Queues { each: vec![Queue::default(); count.clamp(1, MAX_QUEUES)] }
     }
 
     pub fn count(&self) -> usize {
@@ -119,7 +121,7 @@ impl Queues {
         let mut after = self.each[queue].after;
         for wait in waits {
             let there = self.each[wait.queue].done.iter().find(|(_, value, _)| *value == wait.value);
-            let clock = there.map_or([0; MOST], |(_, _, clock)| *clock);
+            let clock = there.map_or([0; MAX_QUEUES], |(_, _, clock)| *clock);
             after = std::array::from_fn(|q| after[q].max(clock[q]));
             after[wait.queue] = after[wait.queue].max(wait.value);
         }
@@ -149,7 +151,7 @@ mod tests {
     /// What was submitted: by which queue, at which value of its timeline, what it touches, and what it waited for.
     type Submission = (usize, u64, Vec<Access>, Vec<Wait>);
 
-    fn submit(queues: &mut Queues, values: &mut [u64; MOST], queue: usize, accesses: Vec<Access>) -> Submission {
+    fn submit(queues: &mut Queues, values: &mut [u64; MAX_QUEUES], queue: usize, accesses: Vec<Access>) -> Submission {
         queues.before(queue, &accesses);
         let waits = queues.waits(queue);
         values[queue] += 1;
@@ -210,7 +212,7 @@ mod tests {
             count in 2usize..=3,
             work in prop::collection::vec((0usize..3, prop::collection::vec(access(), 1..4)), 1..30),
         ) {
-            let (mut queues, mut values) = (Queues::new(count), [0; MOST]);
+            let (mut queues, mut values) = (Queues::new(count), [0; MAX_QUEUES]);
             let work = work.into_iter();
             let all: Vec<_> = work.map(|(q, a)| submit(&mut queues, &mut values, q % count, a)).collect();
             prop_assert_eq!(hold(&all), Ok(()));
@@ -231,7 +233,7 @@ mod tests {
             passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &args)).collect()
         };
         for (count, images) in (1..=3).flat_map(|count| [(count, 1), (count, 2), (count, 3)]) {
-            let (mut queues, mut values, mut all) = (Queues::new(count), [0; MOST], Vec::new());
+            let (mut queues, mut values, mut all) = (Queues::new(count), [0; MAX_QUEUES], Vec::new());
             let mut do_it = |work: Work, accesses| {
                 let submission = submit(&mut queues, &mut values, work.queue(count), accesses);
                 // More than one queue's work is never waited for but for a reason.
@@ -269,7 +271,7 @@ mod tests {
     /// Prevents that a volume that is filled waits for the picture of another.
     #[test]
     fn frames_of_one_volume_image_do_not_wait_for_a_picture_of_the_other() {
-        let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
+        let (mut queues, mut values) = (Queues::new(2), [0; MAX_QUEUES]);
         let on = |image, write| vec![Access::of_slot(Slot::Volume, image, 0..1, write, Worker::Compute)];
         submit(&mut queues, &mut values, 1, on(0, true));
         let picture = submit(&mut queues, &mut values, 0, on(0, false));
@@ -281,7 +283,7 @@ mod tests {
 
     #[test]
     fn what_was_not_submitted_is_not_waited_for() {
-        let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
+        let (mut queues, mut values) = (Queues::new(2), [0; MAX_QUEUES]);
         let access = |slot| vec![Access::of_slot(slot, 0, 0..1, true, Worker::Compute)];
         queues.begin(1);
         assert_eq!(queues.before(1, &access(Slot::Volume)), None);

@@ -2,8 +2,6 @@
 //! before and no barrier lies between, a global memory barrier goes in front of it; nowhere else. The order is a ring: a
 //! tracker lives as long as its slots, so the end of one picture feeds the start of the next.
 
-pub mod oracle;
-
 use crate::passes::{DispatchArgs, Part, Pass, Slot};
 use crate::scene::Scene;
 use std::ops::Range;
@@ -41,7 +39,7 @@ impl Workers {
         Workers(self.0 & !Workers::from(worker).0)
     }
 
-    fn with(self, other: Workers) -> Workers {
+    pub fn with(self, other: Workers) -> Workers {
         Workers(self.0 | other.0)
     }
 }
