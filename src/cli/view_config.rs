@@ -1,0 +1,149 @@
+//! The configuration of a view: device, window and console, from flags or from a configuration file.
+
+use super::view::rungs;
+use crate::args::{SceneArgs, SourceArgs};
+use crate::gpu::window::{PresentMode, display};
+use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
+use crate::kiosk::config::{Config, Present};
+use crate::live::cine::CineLimits;
+use crate::source::live::Live;
+use crate::terminal::{Failure, input};
+use crate::ui::console::{Amiss, Console, Options};
+use crate::ui::source_supervisor::Open;
+use crate::ui::window::{self, Make, Shape};
+use std::sync::{Arc, Mutex};
+use std::time::SystemTime;
+
+/// Default size of the window, pixels.
+const DEFAULT_SIZE: [u32; 2] = [1280, 800];
+
+/// The device and the window. They stay the same for the whole run.
+pub struct WindowConfig {
+    pub device: ContextOptions,
+    pub shape: Shape,
+    /// A monitor without a desktop, instead of a window.
+    pub direct: Option<display::Wanted>,
+}
+
+impl WindowConfig {
+    /// The default: the best device, a window of [`DEFAULT_SIZE`].
+    pub fn usual() -> WindowConfig {
+        let device = ContextOptions { device: Choice::Best, validation: false };
+        let (monitor, pace, time) = (None, PresentMode::Fifo, None);
+        let direct = None;
+        WindowConfig {
+            device,
+            direct,
+            shape: Shape { size: DEFAULT_SIZE, full_screen: false, monitor, pace, stays: false, time },
+        }
+    }
+
+    /// Opens the window and runs the console that `make` creates, until the user leaves.
+    ///
+    /// # Errors
+    /// Those of [`window::run`].
+    pub fn run(self, make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
+        match self.direct {
+            None => window::run(&self.device, self.shape, make),
+            #[cfg(target_os = "linux")]
+            Some(wanted) => {
+                // Grab the keyboard: otherwise the shell of the terminal would run what is typed.
+                let (pace, time) = (self.shape.pace, self.shape.time);
+                let shape = crate::ui::direct::Shape { wanted, pace, grab: true, time };
+                crate::ui::direct::run(&self.device, shape, make)
+            }
+            #[cfg(not(target_os = "linux"))]
+            Some(_) => Err(GpuError::Window("--direct is for Linux".into())),
+        }
+    }
+
+    /// The device and window of a configuration.
+    pub fn configured(config: &Config) -> Result<WindowConfig, Failure> {
+        let mut place = WindowConfig::usual();
+        let display = &config.display;
+        place.shape.size = display.size;
+        place.shape.full_screen = display.full_screen;
+        place.shape.monitor = display.monitor.clone();
+        place.shape.pace = match display.present {
+            Present::Fifo => PresentMode::Fifo,
+            Present::Mailbox => PresentMode::Mailbox,
+        };
+        place.direct = config.display.direct.then(|| display::Wanted {
+            monitor: config.display.monitor.clone(),
+            size: None,
+            refresh: None,
+        });
+        if let Some(device) = &config.device {
+            let Ok(device) = device.parse();
+            place.device.device = device;
+        }
+        Ok(place)
+    }
+}
+
+/// The source and the console. A kiosk reads them anew after a fault.
+pub struct ConsoleConfig {
+    /// None: the console shows only a message.
+    pub source: Option<SourceArgs>,
+    /// The source, if it was opened before the window.
+    pub first: Option<Box<dyn Live>>,
+    pub options: Options,
+}
+
+impl ConsoleConfig {
+    /// A console that shows only a message. The default exit keys work.
+    pub fn nothing() -> ConsoleConfig {
+        let exit = Config::default().keys.exit;
+        let options = Options { panels: false, exit, is_kiosk: true, ..Options::usual() };
+        ConsoleConfig { source: None, first: None, options }
+    }
+
+    /// The console of a configuration. The flags of `scene` override its settings.
+    pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
+        let layers = config.layers().map_err(|e| input(config.refuse(&e.to_string())))?;
+        let (live, display, files) = (&config.live, &config.display, &config.files);
+        let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
+        let options = Options {
+            settings: scene.layers_over(layers, &[])?.finish().map_err(input)?,
+            update: live.update,
+            cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
+            budget: display.budget,
+            rungs: rungs(display.report.as_deref())?,
+            retry: Some(live.retry),
+            record,
+            folder: files.pictures.clone().unwrap_or(".".into()),
+            panels: display.panels,
+            scale: display.scale as f32,
+            ..Options::usual()
+        };
+        Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
+    }
+
+    /// The same with its source open.
+    ///
+    /// # Errors
+    /// The source cannot be opened.
+    pub fn opened(mut self) -> Result<ConsoleConfig, Failure> {
+        self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
+        Ok(self)
+    }
+
+    /// The arguments of the console: how to open the source, and its options. `factor`: pixels per point of the window system.
+    pub fn options(self, factor: f32, wake: Wake, amiss: Option<Amiss>) -> (Open, Options) {
+        let (source, first) = (self.source, Mutex::new(self.first));
+        let open: Open = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
+            Some(source) => Ok(source),
+            None => match source.as_ref().map(SourceArgs::open) {
+                Some(opened) => opened.map_err(Failure::message),
+                None => Err("there is no source".into()),
+            },
+        });
+        let scale = self.options.scale * factor;
+        (open, Options { scale, wake, amiss, ..self.options })
+    }
+}
+
+/// The current time, formatted for file names.
+fn stamp() -> String {
+    crate::ui::export::stamp(SystemTime::now())
+}

@@ -1,0 +1,161 @@
+//! `echolume report error`.
+
+use crate::args::InputArgs;
+use crate::error_report::{self, Measure, choose, dials, measure, plot};
+use crate::files::read_text;
+use crate::picture::replace;
+use crate::scene::Scene;
+use crate::terminal::{Failure, failed, input, say};
+use std::path::{Path, PathBuf};
+
+/// Longest report that is read, bytes.
+const LONGEST: u64 = 64 << 20;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Each dial is varied alone; the other settings stay as in the scene. Errors are those of the picture before the tone mapping of stage 4.\n\n\
+                        Examples:\n  \
+                        echolume report error --dial step --dial format --size 96x96 -o report\n  \
+                        echolume report error sweep.mha --preset fetal --mode vr --under-error 0.01\n  \
+                        echolume report error --under-time 16ms"
+)]
+pub struct ErrorReport {
+    #[command(flatten)]
+    input: InputArgs,
+    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick, or
+    /// all; may be repeated
+    #[arg(long, value_name = "NAME", default_value = "all")]
+    dial: Vec<String>,
+    /// Number of volumes timed at each setting of a dial
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+    /// Reference: f64 on the CPU, converged (the device's best), or auto: f64 if it takes under a minute
+    #[arg(long, value_name = "WHAT", default_value = "auto")]
+    against: String,
+    /// Write error.json, error.csv, error.svg and error.png into this folder
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Error measure: rmse, mm (distance maps) or degrees (normals)
+    #[arg(long, value_name = "NAME", default_value = "rmse")]
+    measure: String,
+    /// Print the cheapest settings with an error below this
+    #[arg(long, value_name = "ERROR")]
+    under_error: Option<f64>,
+    /// Print the most accurate settings that take less time, such as 16ms
+    #[arg(long, value_name = "TIME")]
+    under_time: Option<String>,
+    /// Use the measurements of an earlier report (error.json)
+    #[arg(long, value_name = "FILE")]
+    from: Option<PathBuf>,
+}
+
+impl ErrorReport {
+    pub fn run(&self) -> Result<(), Failure> {
+        let measure = match self.measure.as_str() {
+            "rmse" => Measure::Rmse,
+            "mm" => Measure::Mm,
+            "degrees" => Measure::Degrees,
+            other => return Err(input(format!("--measure {other}: must be rmse, mm or degrees"))),
+        };
+        let time = self.under_time.as_deref().map(|time| nanoseconds("--under-time", time)).transpose()?;
+        let report = match &self.from {
+            Some(file) => read(file)?,
+            None => self.measured()?,
+        };
+        say!("{}", error_report::summary_table::table(&report, measure).trim_end());
+        if let Some(folder) = &self.output {
+            write(&report, measure, folder)?;
+        }
+        if let Some(error) = self.under_error {
+            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.say(measure));
+        }
+        if let Some(time) = time {
+            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.say(measure));
+        }
+        Ok(())
+    }
+
+    fn measured(&self) -> Result<error_report::Report, Failure> {
+        let held = match self.against.as_str() {
+            "auto" => measure::Held::Auto,
+            "f64" => measure::Held::F64,
+            "converged" => measure::Held::Converged,
+            other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
+        };
+        let (mut source, scene) = self.input.open()?;
+        if let Some(folder) = &self.output {
+            std::fs::create_dir_all(folder)
+                .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+        }
+        let dials = self.dials(&scene)?;
+        let context = self.input.open_device(false)?;
+        let mut frames = Vec::new();
+        self.input.for_each_frame(&mut *source, |frame| {
+            frames.push(frame);
+            Ok(())
+        })?;
+        let layers = self.input.layers()?;
+        let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
+        let asked =
+            measure::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
+        let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
+        let bar = indicatif::ProgressBar::new(places as u64);
+        bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
+        let report = asked.report(&dials, |dial, place| {
+            bar.set_message(format!("{dial}: {place}"));
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        report.map_err(failed)
+    }
+
+    /// The requested dials. For `all`, those that apply to the scene.
+    fn dials(&self, scene: &Scene) -> Result<Vec<dials::Dial>, Failure> {
+        let mut turned = Vec::new();
+        if self.dial.iter().any(|d| d == "all") {
+            for name in dials::NAMES {
+                match dials::dial(name, scene) {
+                    Ok(dial) => turned.push(dial),
+                    Err(why) => say!("dial {name} left out: this scene {why}"),
+                }
+            }
+            return Ok(turned);
+        }
+        for name in &self.dial {
+            turned.push(dials::dial(name, scene).map_err(|why| match dials::NAMES.contains(&name.as_str()) {
+                true => input(format!("--dial {name}: this scene {why}")),
+                false => input(format!("--dial {name}: {why}")),
+            })?);
+        }
+        Ok(turned)
+    }
+}
+
+fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
+    let size = [1200, 800];
+    replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.csv"), report.to_csv().as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.svg"), plot::svg(report, measure, size).map_err(failed)?.as_bytes()).map_err(failed)?;
+    plot::picture(report, measure, size).map_err(failed)?.save(&folder.join("error.png")).map_err(failed)?;
+    say!("written: error.json, error.csv, error.svg, error.png in {}", folder.display());
+    Ok(())
+}
+
+/// Reads a stored report.
+pub(crate) fn read(file: &Path) -> Result<error_report::Report, Failure> {
+    let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
+    let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
+    error_report::Report::from_json(&text).map_err(|e| fault(&e))
+}
+
+/// Parses a time such as 16ms, 0.25s or 250us, in ns.
+pub(crate) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
+    let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
+    let parsed =
+        units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));
+    match parsed {
+        Some(ns) if ns > 0.0 && ns.is_finite() => Ok(ns),
+        _ => Err(input(format!("{flag} {text}: must be a time such as 16ms or 0.25s"))),
+    }
+}

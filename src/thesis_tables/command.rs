@@ -1,0 +1,87 @@
+//! `echolume report tables`.
+
+use crate::args::{Output, check_outputs, open_device};
+use crate::gpu::Choice;
+use crate::picture::grey::Grey;
+use crate::picture::replace;
+use crate::terminal::{Failure, failed, input, say};
+use crate::thesis_tables::measure::{Asked, growth, run};
+use crate::thesis_tables::{csv, markdown};
+use std::path::{Path, PathBuf};
+
+/// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.
+const WARM_UP: usize = 1;
+
+#[derive(clap::Args)]
+#[command(
+    after_help = "Thesis Tables 3-6: time of a picture in surface mode over frames a volume, volume size, 3D filter and 2D \
+                        filter, each row under the thesis' conditions. Pictures add Tables 7-9: how far the windows of the \
+                        enhanced sigma filter grow on them.\n\nExamples:\n  \
+                        echolume report tables --markdown tables.md --csv tables.csv\n  \
+                        echolume report tables scan.png --quick --repeat 3"
+)]
+pub struct ThesisTables {
+    /// Pictures for Tables 7-9: PNG, JPEG, PNM or BMP
+    pictures: Vec<PathBuf>,
+    /// Number of volumes measured in each row
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeat: u32,
+    /// Write the tables to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Write Tables 3-6 also to this file, and Tables 7-9 to NAME.growth.csv next to it
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Quick trial: volumes of a quarter of the edge length, frames of 64 lines
+    #[arg(long)]
+    quick: bool,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    device: Option<Choice>,
+}
+
+impl ThesisTables {
+    pub fn run(&self) -> Result<(), Failure> {
+        let growth_file =
+            self.csv.as_ref().filter(|_| !self.pictures.is_empty()).map(|f| f.with_extension("growth.csv"));
+        let targets: [Output; 3] = [
+            ("--markdown", self.markdown.as_deref()),
+            ("--csv", self.csv.as_deref()),
+            ("--csv", growth_file.as_deref()),
+        ];
+        check_outputs(&targets, self.pictures.iter().map(PathBuf::as_path))?;
+        let greys: Vec<Grey> =
+            self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
+        let context = open_device(self.device.clone(), false)?;
+
+        let asked = Asked { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
+        let bar = indicatif::ProgressBar::new(asked.volumes() as u64).with_message("volumes");
+        let report = run(&context, &asked, &mut || bar.inc(1));
+        bar.finish_and_clear();
+        let mut report = report.map_err(failed)?;
+        for (file, grey) in self.pictures.iter().zip(&greys) {
+            let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+            let fault = |e| failed(format!("{}: {e}", file.display()));
+            report.grown.push(growth(&context, &name, grey).map_err(fault)?);
+        }
+
+        let written = markdown::markdown(&report);
+        match &self.markdown {
+            None => say!("{}", written.trim_end()),
+            Some(file) => write(file, &written)?,
+        }
+        if let Some(file) = &self.csv {
+            write(file, &csv::tables(&report))?;
+        }
+        match growth_file {
+            Some(file) => write(&file, &csv::growth(&report.grown)),
+            None => Ok(()),
+        }
+    }
+}
+
+fn write(file: &Path, text: &str) -> Result<(), Failure> {
+    replace(file, text.as_bytes()).map_err(failed)?;
+    say!("written: {}", file.display());
+    Ok(())
+}
