@@ -19,10 +19,10 @@ pub enum GpuError {
         "validation was asked for, but the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
     )]
     NoValidation,
-    #[error("{doing}: {}", describe(*.result))]
-    Vulkan { doing: String, result: vk::Result },
-    #[error("{doing}: {fault}")]
-    Memory { doing: String, fault: String },
+    #[error("{operation}: {}", describe(*.result))]
+    Vulkan { operation: String, result: vk::Result },
+    #[error("{operation}: {fault}")]
+    Memory { operation: String, fault: String },
     #[error("{what}: needs {needed}, the device allows {allowed}")]
     Limit { what: String, needed: u64, allowed: u64 },
     #[error("{what}: the device cannot use {format} as {usage}")]
@@ -34,17 +34,17 @@ pub enum GpuError {
     #[error("frame for slice {slice}, the volume has {slices}")]
     FrameSlice { slice: u32, slices: u32 },
     #[error(
-        "frame for slice {slice}: {bytes} bytes from line {first} on are no whole lines that follow the {there} that are there"
+        "frame for slice {slice}: {bytes} bytes from line {first} on are not complete lines that follow the {received} that have arrived"
     )]
-    FrameLines { slice: u32, first: u32, bytes: usize, there: u32 },
+    FrameLines { slice: u32, first: u32, bytes: usize, received: u32 },
     #[error("volume image {image}: there are {images}")]
     VolumeImage { image: u32, images: u32 },
     #[error("the last change of scene failed ({0}); the next one builds everything anew")]
     Broken(String),
     #[error("no window: {0}")]
     Window(String),
-    #[error("the device did not finish within {seconds} s; last submitted: {doing}")]
-    TimedOut { seconds: u64, doing: String },
+    #[error("the device did not finish within {seconds} s; last submitted: {operation}")]
+    TimedOut { seconds: u64, operation: String },
 }
 
 impl GpuError {
@@ -55,13 +55,13 @@ impl GpuError {
 }
 
 /// Turns a Vulkan result into an error that says what was being done.
-pub trait Doing<T> {
-    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError>;
+pub trait ErrorContext<T> {
+    fn context(self, what: impl FnOnce() -> String) -> Result<T, GpuError>;
 }
 
-impl<T> Doing<T> for Result<T, vk::Result> {
-    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError> {
-        self.map_err(|result| GpuError::Vulkan { doing: what(), result })
+impl<T> ErrorContext<T> for Result<T, vk::Result> {
+    fn context(self, what: impl FnOnce() -> String) -> Result<T, GpuError> {
+        self.map_err(|result| GpuError::Vulkan { operation: what(), result })
     }
 }
 

@@ -1,12 +1,43 @@
 //! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
 
+use super::context::Context;
+use super::device_selection::Candidate;
+use super::error::GpuError;
 use super::faults::Poison;
-use super::{Context, Fetch, GpuError};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
 use crate::scene::{Sampling, Scene};
 use ash::vk;
+
+/// How single texels are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelAccess {
+    /// `texelFetch` from textures, as the shaders say.
+    Textures,
+    /// `imageLoad` from storage images and texel buffers: the modules are rewritten.
+    Storage,
+}
+
+impl TexelAccess {
+    /// What is fast on a device. One that is a CPU sends every fetch through its sampler in software; a GPU's textures have
+    /// caches of their own.
+    pub fn for_device(candidate: &Candidate) -> TexelAccess {
+        if candidate.is_software() { TexelAccess::Storage } else { TexelAccess::Textures }
+    }
+
+    /// What `auto` sampling is then.
+    pub fn sampling(self) -> Sampling {
+        if self == TexelAccess::Storage { Sampling::Quads } else { Sampling::Hardware }
+    }
+
+    pub fn describe(self) -> &'static str {
+        match self {
+            TexelAccess::Textures => "texels by texelFetch",
+            TexelAccess::Storage => "texels by imageLoad",
+        }
+    }
+}
 
 pub fn vulkan(format: Format) -> vk::Format {
     match format {
@@ -26,7 +57,7 @@ pub fn vulkan(format: Format) -> vk::Format {
 }
 
 /// A poison as texels of a format.
-pub fn held(poison: Poison, format: Format) -> vk::ClearColorValue {
+pub fn clear_value(poison: Poison, format: Format) -> vk::ClearColorValue {
     match format {
         Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.whole; 4] },
         Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 => vk::ClearColorValue { float32: [poison.share; 4] },
@@ -38,7 +69,7 @@ pub fn held(poison: Poison, format: Format) -> vk::ClearColorValue {
 pub fn usage(context: &Context, slot: Slot) -> vk::ImageUsageFlags {
     let read = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::TRANSFER_SRC;
     match slot {
-        Slot::Frames | Slot::ScanLut if Fetch::of(&context.candidate) == Fetch::Textures => read,
+        Slot::Frames | Slot::ScanLut if TexelAccess::for_device(&context.candidate) == TexelAccess::Textures => read,
         _ => read | vk::ImageUsageFlags::STORAGE,
     }
 }
@@ -58,10 +89,10 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 
 /// The scene with its samples taken in the way that is fastest here: by eight texels where those are loaded, and where the device
 /// cannot filter the volume's format at all.
-pub fn suited(context: &Context, fetch: Fetch, scene: Scene) -> Scene {
+pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
     let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
-    let scene = scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact });
+    let scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     let format = vulkan(Slot::Quads.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::Quads));
     let fits = fits.is_ok_and(|l| Slot::Quads.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
@@ -115,7 +146,7 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
 }
 
 /// What a device does with a format.
-pub struct Abilities {
+pub struct FormatSupport {
     pub format: String,
     pub can: Vec<&'static str>,
     pub cannot: Vec<&'static str>,
@@ -124,7 +155,7 @@ pub struct Abilities {
 }
 
 /// Every format that slots have, with everything that slots are used for.
-pub fn abilities(context: &Context) -> Vec<Abilities> {
+pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     let formats = [
         Format::R8,
         Format::R16,
@@ -153,7 +184,7 @@ pub fn abilities(context: &Context) -> Vec<Abilities> {
         let extent = |kind| edge(kind).map_or(vk::Extent3D::default(), |limits| limits.max_extent);
         let (flat, deep) = (extent(vk::ImageType::TYPE_2D), extent(vk::ImageType::TYPE_3D));
         let names = |of: Vec<&(&'static str, vk::FormatFeatureFlags)>| of.iter().map(|(name, _)| *name).collect();
-        Abilities {
+        FormatSupport {
             format: format!("{format:?}"),
             can: names(can),
             cannot: names(cannot),
@@ -164,9 +195,9 @@ pub fn abilities(context: &Context) -> Vec<Abilities> {
 }
 
 /// As if the device could filter no format of a volume.
-pub fn deny_filters(context: &mut Context) {
+pub fn disable_linear_filter(context: &mut Context) {
     for format in [Format::R8, Format::R16, Format::R16f, Format::R32f].map(vulkan) {
         let there = context.format_features(format);
-        context.take_features(format, there & !vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+        context.override_features(format, there & !vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
     }
 }

@@ -1,9 +1,8 @@
 //! Images and buffers that own their memory and free themselves.
 
-use super::GpuError;
 use super::context::Context;
-use super::error::Doing;
-use super::faults::Seam;
+use super::error::{ErrorContext, GpuError};
+use super::faults::InjectionPoint;
 use super::formats;
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
@@ -54,13 +53,13 @@ fn allocate(
     requirements: vk::MemoryRequirements,
     location: MemoryLocation,
     linear: bool,
-    doing: &dyn Fn() -> String,
+    operation: &dyn Fn() -> String,
 ) -> Result<Allocation, GpuError> {
-    context.faults.pass(Seam::Allocate).doing(doing)?;
+    context.faults.check(InjectionPoint::Allocate).context(operation)?;
     context.counts.allocations.fetch_add(1, Ordering::Relaxed);
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     let Some(allocator) = allocator.as_mut() else {
-        return Err(GpuError::Memory { doing: doing(), fault: "the context is shutting down".into() });
+        return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
     };
     allocator
         .allocate(&AllocationCreateDesc {
@@ -70,7 +69,7 @@ fn allocate(
             linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         })
-        .map_err(|e| GpuError::Memory { doing: doing(), fault: e.to_string() })
+        .map_err(|e| GpuError::Memory { operation: operation(), fault: e.to_string() })
 }
 
 fn free(context: &Context, allocation: Option<Allocation>) {
@@ -90,13 +89,13 @@ impl Image {
             Shape::Three(size) => (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D, size, 1),
             Shape::Buffer(_) => {
                 return Err(GpuError::Memory {
-                    doing: format!("create image '{}'", slot.name()),
+                    operation: format!("create image '{}'", slot.name()),
                     fault: "is a buffer".into(),
                 });
             }
         };
         let mebibytes = shape.texels() * format.texel_bytes() as u64 / (1 << 20);
-        let doing = || {
+        let operation = || {
             format!(
                 "create image '{}' ({width}x{height}x{} {format:?}, {mebibytes} MiB)",
                 slot.name(),
@@ -118,7 +117,7 @@ impl Image {
         }
         let device = &context.device;
         // SAFETY: the create structure is complete and its pointers live; limits and formats were checked for the plan.
-        let handle = unsafe { device.create_image(&create, None) }.doing(doing)?;
+        let handle = unsafe { device.create_image(&create, None) }.context(operation)?;
         // From here on a failure is cleaned up by dropping `image`.
         let mut image = Image {
             context: context.clone(),
@@ -132,11 +131,11 @@ impl Image {
         };
         // SAFETY: the image was just made by this device.
         let requirements = unsafe { device.get_image_memory_requirements(handle) };
-        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &doing)?;
+        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the image.
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
-        bound.doing(doing)?;
+        bound.context(operation)?;
         image.view = image.create_view(slot.name(), view_kind, 0, layers)?;
         if let Shape::Layers(_) = shape {
             for layer in 0..layers {
@@ -164,7 +163,7 @@ impl Image {
             .subresource_range(range);
         // SAFETY: the image is bound to memory and alive.
         let view = unsafe { self.context.device.create_image_view(&create, None) };
-        let view = view.doing(|| format!("create a view of image '{name}'"))?;
+        let view = view.context(|| format!("create a view of image '{name}'"))?;
         self.context.name(view, name);
         Ok(view)
     }
@@ -192,6 +191,15 @@ impl Drop for Image {
     }
 }
 
+/// Texels of a shape along x, y and z; the first varies fastest. A buffer counts as a row of floats.
+pub fn shape_size(shape: Shape) -> [usize; 3] {
+    match shape {
+        Shape::Two([w, h]) => [w as usize, h as usize, 1],
+        Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
+        Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
+    }
+}
+
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
 /// Whether a table of so many bytes can be read by texels, whatever its entries are.
@@ -201,7 +209,7 @@ pub fn has_texels(context: &Context, bytes: u64) -> bool {
 
 impl Buffer {
     pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
-        let doing = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
+        let operation = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
         let (usage, location) = match purpose {
             Purpose::Table => (
                 vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
@@ -212,21 +220,21 @@ impl Buffer {
             Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
         };
         if size > context.candidate.max_bytes {
-            return Err(GpuError::Limit { what: doing(), needed: size, allowed: context.candidate.max_bytes });
+            return Err(GpuError::Limit { what: operation(), needed: size, allowed: context.candidate.max_bytes });
         }
         let create = vk::BufferCreateInfo::default().size(size.max(4)).usage(usage);
         let device = &context.device;
         // SAFETY: the create structure is complete.
-        let handle = unsafe { device.create_buffer(&create, None) }.doing(doing)?;
+        let handle = unsafe { device.create_buffer(&create, None) }.context(operation)?;
         let mut buffer =
             Buffer { context: context.clone(), handle, size, texels: Default::default(), allocation: None };
         // SAFETY: the buffer was just made by this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-        let allocation = allocate(context, name, requirements, location, true, &doing)?;
+        let allocation = allocate(context, name, requirements, location, true, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the buffer.
         let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
         buffer.allocation = Some(allocation);
-        bound.doing(doing)?;
+        bound.context(operation)?;
         context.name(handle, name);
         if let Some(poison) = context.faults.poisoned() {
             buffer.bytes_mut().fill(poison.byte);
@@ -235,7 +243,7 @@ impl Buffer {
             for (n, format) in TEXELS.into_iter().enumerate() {
                 let create = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
                 // SAFETY: the buffer is bound to memory and alive; every device has these formats as texel buffers.
-                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.doing(doing)?;
+                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.context(operation)?;
                 context.name(buffer.texels[n], name);
             }
         }

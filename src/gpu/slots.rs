@@ -1,8 +1,9 @@
 //! The resources of a scene's slots, as many as its plan names.
 
 use super::context::Context;
+use super::error::GpuError;
+use super::formats;
 use super::resources::{Buffer, Image, Purpose};
-use super::{GpuError, formats};
 use crate::passes::Slot;
 use crate::passes::slots::{Initializer, Shape};
 use crate::plan::Plan;
@@ -91,10 +92,6 @@ impl Slots {
     /// Frees everything.
     pub fn clear(&mut self) {
         self.there.clear();
-    }
-
-    pub fn iter(&self) -> impl Iterator<Item = (Slot, u32)> {
-        self.there.keys().copied()
     }
 }
 

@@ -1,21 +1,21 @@
 //! Timeline semaphores, one a queue: what was submitted, and whether it is done.
 
-use super::GpuError;
 use super::context::Context;
-use super::error::Doing;
-use super::faults::Seam;
+use super::error::{ErrorContext, GpuError};
+use super::faults::InjectionPoint;
 use ash::vk;
 use std::sync::Arc;
 
 /// A software device may need minutes for a picture of 16k pixels.
-const TIME_OUT: u64 = 600;
+const TIMEOUT_SECONDS: u64 = 600;
 
 /// Done when the timeline has reached a value.
 pub struct Timeline {
     context: Arc<Context>,
     pub(super) semaphore: vk::Semaphore,
     pub submitted: u64,
-    pub(super) doing: String,
+    /// Name of the last submission.
+    pub(super) label: String,
 }
 
 impl Timeline {
@@ -23,9 +23,10 @@ impl Timeline {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: the chain is complete and outlives the call.
-        let semaphore = unsafe { context.device.create_semaphore(&create, None) }.doing(|| "create timeline".into())?;
+        let semaphore =
+            unsafe { context.device.create_semaphore(&create, None) }.context(|| "create timeline".into())?;
         context.name(semaphore, "timeline");
-        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, doing: String::new() })
+        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, label: String::new() })
     }
 
     /// Blocks until a submission is done.
@@ -36,11 +37,13 @@ impl Timeline {
         let result = self
             .context
             .faults
-            .pass(Seam::Wait)
-            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIME_OUT * 1_000_000_000) });
+            .check(InjectionPoint::Wait)
+            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIMEOUT_SECONDS * 1_000_000_000) });
         match result {
-            Err(vk::Result::TIMEOUT) => Err(GpuError::TimedOut { seconds: TIME_OUT, doing: self.doing.clone() }),
-            other => other.doing(|| format!("run {}", self.doing)),
+            Err(vk::Result::TIMEOUT) => {
+                Err(GpuError::TimedOut { seconds: TIMEOUT_SECONDS, operation: self.label.clone() })
+            }
+            other => other.context(|| format!("run {}", self.label)),
         }
     }
 
@@ -52,7 +55,7 @@ impl Timeline {
     pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
         // SAFETY: the semaphore is alive.
         let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) };
-        reached.map(|reached| reached >= value).doing(|| format!("run {}", self.doing))
+        reached.map(|reached| reached >= value).context(|| format!("run {}", self.label))
     }
 
     /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. One that is

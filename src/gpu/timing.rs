@@ -1,10 +1,11 @@
 //! Time stamps around every pass, and what is known when a device has none.
 
-use super::GpuError;
 use super::context::Context;
-use super::error::Doing;
+use super::error::{ErrorContext, GpuError};
+use crate::passes::{PassTime, Span};
 use ash::vk;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// One pool of stamps, for one command buffer.
 pub struct Stamps {
@@ -56,18 +57,19 @@ impl Stamps {
         }
         let create = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(capacity);
         // SAFETY: the create structure is complete.
-        let pool = unsafe { context.device.create_query_pool(&create, None) }.doing(|| "create time stamps".into())?;
+        let pool =
+            unsafe { context.device.create_query_pool(&create, None) }.context(|| "create time stamps".into())?;
         context.name(pool, "time stamps");
         let mut stamps =
             Stamps { context: context.clone(), pool, capacity, between: Vec::new(), statistics: None, counted: 0 };
-        if statistics && context.candidate.statistics && queue.computes {
+        if statistics && context.candidate.pipeline_statistics && queue.computes {
             let create = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::PIPELINE_STATISTICS)
                 .pipeline_statistics(vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS)
                 .query_count(capacity);
             // SAFETY: the create structure is complete and the feature enabled; a failure drops `stamps`, which frees its pool.
             let pool = unsafe { context.device.create_query_pool(&create, None) };
-            stamps.statistics = Some(pool.doing(|| "create statistics".into())?);
+            stamps.statistics = Some(pool.context(|| "create statistics".into())?);
         }
         Ok(Some(stamps))
     }
@@ -138,7 +140,7 @@ impl Stamps {
         }
         // SAFETY: the pool is alive; every query read was written by the command buffer that has finished.
         unsafe { self.context.device.get_query_pool_results(pool, 0, &mut results, vk::QueryResultFlags::TYPE_64) }
-            .doing(|| "read time stamps".into())?;
+            .context(|| "read time stamps".into())?;
         Ok(results)
     }
 }
@@ -149,6 +151,92 @@ impl Drop for Stamps {
             // SAFETY: whoever drops the stamps has waited for the device.
             unsafe { self.context.device.destroy_query_pool(pool, None) };
         }
+    }
+}
+
+/// Times since they were last taken.
+pub struct Timings {
+    times: Vec<PassTime>,
+    spans: Option<SpanLog>,
+}
+
+struct SpanLog {
+    context: Arc<Context>,
+    list: Vec<Span>,
+    began: Instant,
+    /// A time stamp of the device, and the ns since the run began that it means.
+    anchor: (u64, f64),
+}
+
+impl Timings {
+    pub fn new(context: &Arc<Context>, spans: bool) -> Timings {
+        let spans = spans.then(|| SpanLog {
+            context: context.clone(),
+            list: Vec::new(),
+            began: Instant::now(),
+            anchor: (0, 0.0),
+        });
+        Timings { times: Vec::new(), spans }
+    }
+
+    /// Does host work under a name. Without spans it is only done.
+    pub fn host<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        let Some(began) = self.spans.as_ref().map(|s| s.began) else { return work() };
+        let begin = began.elapsed();
+        let done = work();
+        let (begin, end) = (begin.as_nanos() as f64, began.elapsed().as_nanos() as f64);
+        self.spans.iter_mut().for_each(|s| s.list.push(Span { name, on_device: false, begin, end, invocations: None }));
+        done
+    }
+
+    /// Adds what one command buffer timings.
+    pub fn add(&mut self, stamps: &[Stamp], valid_bits: u32, period: f32) {
+        if let (Some(spans), Some(first)) = (&mut self.spans, stamps.first()) {
+            spans.set_anchor(first.from);
+        }
+        for stamp in stamps {
+            let ns = elapsed(stamp.from, stamp.to, valid_bits, period);
+            match self.times.iter_mut().find(|t| t.name == stamp.name) {
+                Some(time) => {
+                    time.runs += 1;
+                    time.total += ns;
+                }
+                None => self.times.push(PassTime { name: stamp.name, runs: 1, total: ns }),
+            }
+            if let Some(spans) = &mut self.spans {
+                let begin = spans.on_host_clock(stamp.from, valid_bits, period);
+                let (name, invocations) = (stamp.name, stamp.invocations);
+                spans.list.push(Span { name, on_device: true, begin, end: begin + ns, invocations });
+            }
+        }
+    }
+
+    pub fn take_times(&mut self) -> Vec<PassTime> {
+        std::mem::take(&mut self.times)
+    }
+
+    /// By their beginning.
+    pub fn take_spans(&mut self) -> Vec<Span> {
+        let mut list = self.spans.as_mut().map(|s| std::mem::take(&mut s.list)).unwrap_or_default();
+        list.sort_by(|a, b| a.begin.total_cmp(&b.begin));
+        list
+    }
+}
+
+impl SpanLog {
+    /// Set anew for every command buffer, so that clocks that drift apart do not add up their difference. A device whose clock
+    /// cannot be read is taken to have begun when the last host span ended: the submission.
+    fn set_anchor(&mut self, ticks: u64) {
+        let submitted = || self.list.iter().rev().find(|s| !s.on_device).map_or(0.0, |s| s.end);
+        self.anchor = match self.context.device_ticks() {
+            Some((now, at)) => (now, at.duration_since(self.began).as_nanos() as f64),
+            None => (ticks, submitted()),
+        };
+    }
+
+    fn on_host_clock(&self, ticks: u64, valid_bits: u32, period: f32) -> f64 {
+        let (anchor, at) = self.anchor;
+        at + signed_ticks(anchor, ticks, valid_bits) as f64 * f64::from(period)
     }
 }
 
@@ -175,5 +263,15 @@ mod tests {
         assert_eq!(signed_ticks(100, 90, 64), -10);
         assert_eq!(signed_ticks(5, (1 << 36) - 5, 36), -10);
         assert_eq!(signed_ticks((1 << 36) - 5, (9 << 36) | 5, 36), 10);
+    }
+
+    #[test]
+    fn runs_of_one_pass_are_added_up() {
+        let mut timings = Timings { times: Vec::new(), spans: None };
+        let stamp = |name, from, to| Stamp { name, from, to, invocations: None };
+        timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
+        timings.add(&[stamp("a", 5, 8)], 64, 1.0);
+        assert_eq!(timings.take_times()[0], PassTime { name: "a", runs: 2, total: 4.0 });
+        assert!(timings.take_times().is_empty() && timings.take_spans().is_empty());
     }
 }

@@ -59,7 +59,7 @@ impl Session {
     fn apply(&mut self) -> Result<(), GpuError> {
         let Some(next) = &self.next else { return Ok(()) };
         let scene = next.of(&self.backward);
-        let other = self.renderer.is_other(&scene);
+        let other = self.renderer.differs_from(&scene);
         if other && self.prepares {
             match self.renderer.prepare(&scene) {
                 Ok(true) => {}
@@ -132,7 +132,7 @@ impl Session {
         }
         let Some(volume) = self.volume.filter(|_| self.redraw) else { return Ok(false) };
         let scene = self.views.of(&self.backward);
-        if self.renderer.is_other(&scene) {
+        if self.renderer.differs_from(&scene) {
             self.renderer.change(scene.into_owned())?;
         }
         self.renderer.begin_picture()?;

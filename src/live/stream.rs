@@ -136,7 +136,7 @@ impl Stream {
         let went = self.go(patience);
         // What cannot draw any more is made anew with the next geometry that is told.
         if went.is_err()
-            && let Some(Session { turns, .. }) = self.now.take_if(|now| now.renderer.is_broken())
+            && let Some(Session { turns, .. }) = self.now.take_if(|now| now.renderer.needs_rebuild())
         {
             (self.before, self.replay) = (Some(turns), None);
         }
@@ -266,12 +266,12 @@ impl Stream {
         }
         self.cine.cut();
         let mut turns = VolumePool::new(self.options.update, self.options.images, slices);
-        let options = gpu::Options {
+        let options = gpu::RendererOptions {
             volume_images: turns.images(),
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
-            ..gpu::Options::default()
+            ..gpu::RendererOptions::default()
         };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
         if let Some(before) = self.before.take() {

@@ -22,7 +22,7 @@ pub fn measure(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
     let sampled = measure::scene(128, pixels).map_err(broken)?;
     let copied = measure::scene(2, 2048).map_err(broken)?;
     let rate = |pass: &'static Pass, scene: &Scene, of_one: f64| -> Result<Option<Ceiling>, GpuError> {
-        let rates: Vec<f64> = pass_runner::time(context, scene, pass, REPEATS)?
+        let rates: Vec<f64> = pass_runner::time_pass(context, scene, pass, REPEATS)?
             .iter()
             .filter(|ns| **ns > 0.0)
             .map(|ns| of_one / ns * 1e9)

@@ -2,7 +2,7 @@
 
 use super::machine::CpuTime;
 use super::{ceilings, machine};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Bind, Frequency, Part, Pass, Span};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::trace::{self, Track};
@@ -61,7 +61,7 @@ pub fn run(
 impl Run {
     pub fn new(context: &Arc<Context>, scene: &Scene, asked: &Asked) -> Result<Run, GpuError> {
         let ceilings = if asked.ceilings { ceilings::measure(context)? } else { None };
-        let options = Options { spans: true, ..Options::default() };
+        let options = RendererOptions { spans: true, ..RendererOptions::default() };
         Ok(Run {
             context: context.clone(),
             renderer: Renderer::new(context, scene.clone(), &options)?,
@@ -151,7 +151,7 @@ impl Run {
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
-            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.fetch().words())),
+            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.texel_access().describe())),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
         (profile, spans.collect())

@@ -34,7 +34,6 @@ pub(super) mod op {
     pub const VARIABLE: u32 = 59;
     pub const LOAD: u32 = 61;
     pub const STORE: u32 = 62;
-    pub const COPY_MEMORY: u32 = 63;
     pub const COPY_MEMORY_SIZED: u32 = 64;
     pub const ACCESS_CHAIN: u32 = 65;
     pub const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;

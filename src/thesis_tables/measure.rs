@@ -2,7 +2,7 @@
 //! and again.
 
 use super::measure_growth::Fault;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
 use crate::picture::grey::Grey;
 use crate::profile::machine;
@@ -73,7 +73,7 @@ fn measure(
     let mut renderers = Vec::new();
     for row in &table.rows {
         let scene = scene(&row.conditions).map_err(|e| broken(&e))?;
-        renderers.push(Renderer::new(context, scene, &Options::default())?);
+        renderers.push(Renderer::new(context, scene, &RendererOptions::default())?);
     }
     for n in 0..asked.warm_up + asked.repeats {
         for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {

@@ -1,6 +1,6 @@
 //! Pictures through the enhanced sigma filter, window by window: how far they grow (thesis Tables 7-9).
 
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::grey::Grey;
 use crate::probe::{Geometry, Grid};
@@ -39,7 +39,7 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<Row>) -> Result<Ve
     for (sigma, windows, settings) in rows {
         let scene = scene(grey, settings)?;
         let renderer: &mut Renderer = match &mut renderer {
-            None => renderer.insert(Renderer::new(context, scene, &Options::default())?),
+            None => renderer.insert(Renderer::new(context, scene, &RendererOptions::default())?),
             Some(there) => {
                 there.change(scene)?;
                 there

@@ -5,7 +5,7 @@ use super::devices::{Devices, Told};
 use super::input::Input;
 use super::recovery::{self, Due, Gone, Place, Recovery};
 use super::window::Make;
-use crate::gpu::window::{PresentMode, Screen, Target, display};
+use crate::gpu::window::{MonitorChoice, PresentMode, Screen, Target, monitor_size};
 use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ const SEEN: Duration = Duration::from_secs(3);
 
 pub struct Shape {
     /// Which monitor, and how.
-    pub wanted: display::Wanted,
+    pub wanted: MonitorChoice,
     pub pace: PresentMode,
     /// Nobody else gets what keys and mice say, such as the text console behind.
     pub grab: bool,
@@ -29,8 +29,8 @@ pub struct Shape {
 /// No device with such a monitor, or another program holds it; a device or a monitor that is lost again and again.
 pub fn run(device: &ContextOptions, shape: Shape, mut make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
     let place = Place { device, target: Target::Monitor(shape.wanted.clone()), pace: shape.pace };
-    let context = Context::showing(device, &place.target)?;
-    let size = display::size(&context, &shape.wanted)?;
+    let context = Context::for_presentation(device, &place.target)?;
+    let size = monitor_size(&context, &shape.wanted)?;
     let screen = Screen::new(&context, place.target.clone(), size, shape.pace)?;
     let devices = Devices::listen(size, shape.grab)
         .map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
@@ -49,7 +49,7 @@ pub fn run(device: &ContextOptions, shape: Shape, mut make: Box<Make>) -> Result
 
 struct Running<'a> {
     place: Place<'a>,
-    wanted: display::Wanted,
+    wanted: MonitorChoice,
     devices: Devices,
     // The console before its context: it holds what shows on the monitor.
     console: Console,
@@ -125,7 +125,7 @@ impl Running<'_> {
     /// Has again what is gone: another monitor may be there by now, or the same one in another mode.
     fn mend(&mut self, gone: Gone) -> Result<(), (Gone, GpuError)> {
         let wanted = &self.wanted;
-        let size = |context: &Context| display::size(context, wanted);
+        let size = |context: &Context| monitor_size(context, wanted);
         let size = self.place.mend(&mut self.console, &mut self.context, &size, gone)?;
         self.fit(size);
         Ok(())

@@ -99,7 +99,7 @@ impl Place<'_> {
         // The old one goes first: a window has one surface at a time.
         console.set_screen(None);
         if gone == Gone::Device {
-            *context = Context::showing(self.device, &self.target).map_err(still)?;
+            *context = Context::for_presentation(self.device, &self.target).map_err(still)?;
         }
         let size = size(context).map_err(still)?;
         let screen = Screen::new(context, self.target.clone(), size, self.pace).map_err(still)?;

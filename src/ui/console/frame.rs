@@ -210,12 +210,12 @@ impl Console {
             None => screen.show(panels),
         };
         match seen {
-            Ok(PresentOutcome::Shown) => {
+            Ok(PresentOutcome::Presented) => {
                 (self.fresh, self.stale, self.nowhere) = (false, self.panels.is_waiting(), None);
                 self.answered();
             }
             // Asked again when the window says so, or in a moment.
-            Ok(PresentOutcome::Nowhere) => self.nowhere = Some(now + NOWHERE),
+            Ok(PresentOutcome::NotPresentable) => self.nowhere = Some(now + NOWHERE),
             Err(lost) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
             Err(fault) => return Err(ConsoleError::Screen(fault)),
         }

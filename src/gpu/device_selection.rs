@@ -1,13 +1,13 @@
-//! Which device to use: what each one is, what it lacks, and why it was or was not picked.
+//! Which device to use: what each one is, what it missing, and why it was or was not picked.
 
-use super::GpuError;
+use super::error::GpuError;
 use ash::vk;
 use std::borrow::Cow;
 use std::ffi::CStr;
 
 /// A device as the user names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Choice {
+pub enum DeviceChoice {
     /// The best that lacks nothing.
     Best,
     /// By its number in `echolume devices`.
@@ -16,11 +16,11 @@ pub enum Choice {
     Name(String),
 }
 
-impl std::str::FromStr for Choice {
+impl std::str::FromStr for DeviceChoice {
     type Err = std::convert::Infallible;
 
-    fn from_str(text: &str) -> Result<Choice, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Choice::Name(text.to_string()), Choice::Number))
+    fn from_str(text: &str) -> Result<DeviceChoice, Self::Err> {
+        Ok(text.parse().map_or_else(|_| DeviceChoice::Name(text.to_string()), DeviceChoice::Number))
     }
 }
 
@@ -33,19 +33,19 @@ pub struct Candidate {
     pub driver: String,
     pub version: u32,
     /// What is required and not there.
-    pub lacks: Vec<Cow<'static, str>>,
+    pub missing: Vec<Cow<'static, str>>,
     /// What is optional and not there.
-    pub without: Vec<&'static str>,
+    pub missing_optional: Vec<&'static str>,
     /// The queues that are used: the first renders, the second takes frames in, the third copies them, as far as there are such.
-    pub queues: Vec<QueueOf>,
+    pub queues: Vec<QueueInfo>,
     /// Time stamps can be put on the host's clock.
-    pub calibrated: bool,
+    pub calibrated_timestamps: bool,
     /// Descriptors can be pushed.
-    pub pushes: bool,
+    pub push_descriptors: bool,
     /// Shader invocations can be counted.
-    pub statistics: bool,
+    pub pipeline_statistics: bool,
     /// Pictures can be shown on a window, with panels drawn over them.
-    pub presents: bool,
+    pub can_present: bool,
     pub limits: vk::PhysicalDeviceLimits,
     /// Largest allocation and largest buffer, whichever is less.
     pub max_bytes: u64,
@@ -53,7 +53,7 @@ pub struct Candidate {
 
 /// A queue of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct QueueOf {
+pub struct QueueInfo {
     pub family: u32,
     /// Within its family.
     pub index: u32,
@@ -71,7 +71,7 @@ impl Candidate {
     }
 
     /// Its memory is the machine's.
-    pub fn shares_memory(&self) -> bool {
+    pub fn has_unified_memory(&self) -> bool {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
     }
 
@@ -110,7 +110,7 @@ impl Candidate {
 pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     // SAFETY: the instance is alive; the call only reads.
     let handles = unsafe { instance.enumerate_physical_devices() }
-        .map_err(|result| GpuError::Vulkan { doing: "list devices".into(), result })?;
+        .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;
     Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
 }
 
@@ -131,9 +131,9 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }.unwrap_or_default();
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
 
-    let mut presents = has(ash::khr::swapchain::NAME);
-    let mut lacks = Vec::new();
-    let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name.into()));
+    let mut can_present = has(ash::khr::swapchain::NAME);
+    let mut missing = Vec::new();
+    let mut need = |there: bool, name: &'static str| (!there).then(|| missing.push(name.into()));
     need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
     if properties.api_version >= vk::API_VERSION_1_3 {
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
@@ -149,38 +149,41 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
         need(v13.synchronization2 == vk::TRUE, "synchronization2");
         need(v13.maintenance4 == vk::TRUE, "maintenance4");
-        presents &= v13.dynamic_rendering == vk::TRUE;
+        can_present &= v13.dynamic_rendering == vk::TRUE;
     }
     let queues = queues(&families);
     need(!queues.is_empty(), "a compute queue");
     let valid_bits = queues.first().map_or(0, |q| q.valid_bits);
-    let mut without = Vec::new();
+    let mut missing_optional = Vec::new();
     match queues.len() {
-        0 | 1 => without.push("an asynchronous compute queue: frames are taken in between pictures, not beside them"),
-        2 => without.push("a transfer queue: frames are copied where they are converted"),
+        0 | 1 => missing_optional
+            .push("an asynchronous compute queue: frames are taken in between pictures, not beside them"),
+        2 => missing_optional.push("a transfer queue: frames are copied where they are converted"),
         _ => {}
     }
     if valid_bits == 0 {
-        without.push("time stamps: no times are printed");
+        missing_optional.push("time stamps: no times are printed");
     }
-    let calibrated = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
-    if !calibrated {
-        without.push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
+    let calibrated_timestamps = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
+    if !calibrated_timestamps {
+        missing_optional
+            .push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
     }
-    let pushes = has(ash::khr::push_descriptor::NAME);
-    if !pushes {
-        without.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
+    let push_descriptors = has(ash::khr::push_descriptor::NAME);
+    if !push_descriptors {
+        missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
     }
     // SAFETY: as above.
-    let statistics = unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
-    if !statistics {
-        without.push("pipelineStatisticsQuery: invocations are not counted");
+    let pipeline_statistics =
+        unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
+    if !pipeline_statistics {
+        missing_optional.push("pipelineStatisticsQuery: invocations are not counted");
     }
-    if !presents {
-        without.push("VK_KHR_swapchain and dynamicRendering: nothing is shown on a window");
+    if !can_present {
+        missing_optional.push("VK_KHR_swapchain and dynamicRendering: nothing is shown on a window");
     }
     if !has(ash::ext::memory_budget::NAME) {
-        without.push("VK_EXT_memory_budget");
+        missing_optional.push("VK_EXT_memory_budget");
     }
     Candidate {
         handle,
@@ -188,13 +191,13 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         kind: properties.device_type,
         driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
         version: properties.api_version,
-        lacks,
-        without,
+        missing,
+        missing_optional,
         queues,
-        calibrated,
-        pushes,
-        statistics,
-        presents,
+        calibrated_timestamps,
+        push_descriptors,
+        pipeline_statistics,
+        can_present,
         limits: properties.limits,
         // A driver older than 1.3 leaves this 0; it is refused anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
@@ -203,9 +206,9 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
 
 /// The queues to use: one that computes, best with graphics too, since that one may show pictures; another that computes, best one
 /// that does nothing else; and one that only copies.
-fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
+fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
-    let of = |family: usize, index: u32| QueueOf {
+    let of = |family: usize, index: u32| QueueInfo {
         family: family as u32,
         index,
         valid_bits: families[family].timestamp_valid_bits,
@@ -235,33 +238,33 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
 }
 
 /// The number of the chosen device.
-pub fn choose(candidates: &[Candidate], choice: &Choice) -> Result<usize, GpuError> {
+pub fn choose(candidates: &[Candidate], choice: &DeviceChoice) -> Result<usize, GpuError> {
     let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
     if candidates.is_empty() {
         return Err(GpuError::NoDevice);
     }
     let missing = |wanted: String| GpuError::NoSuchDevice { wanted, there: names() };
     let index = match choice {
-        Choice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
-        Choice::Name(name) => {
+        DeviceChoice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
+        DeviceChoice::Name(name) => {
             let part = name.to_lowercase();
             let found = candidates.iter().position(|c| !part.is_empty() && c.name.to_lowercase().contains(&part));
             found.ok_or_else(|| missing(name.clone()))?
         }
-        Choice::Best => {
-            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.lacks.is_empty());
+        DeviceChoice::Best => {
+            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.missing.is_empty());
             let best = fitting.min_by_key(|(_, c)| c.rank()).map(|(i, _)| i);
             best.ok_or_else(|| GpuError::NoneFits(all_lacks(candidates)))?
         }
     };
-    match candidates[index].lacks.is_empty() {
+    match candidates[index].missing.is_empty() {
         true => Ok(index),
         false => Err(GpuError::NoneFits(all_lacks(&candidates[index..=index]))),
     }
 }
 
 fn all_lacks(candidates: &[Candidate]) -> String {
-    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.lacks.join(", "))).collect::<Vec<_>>().join("; ")
+    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.missing.join(", "))).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -275,13 +278,13 @@ mod tests {
             kind,
             driver: String::new(),
             version: vk::API_VERSION_1_3,
-            lacks: lacks.into_iter().map(Cow::from).collect(),
-            without: vec![],
+            missing: missing.into_iter().map(Cow::from).collect(),
+            missing_optional: vec![],
             queues: vec![],
-            calibrated: true,
-            pushes: true,
-            statistics: true,
-            presents: true,
+            calibrated_timestamps: true,
+            push_descriptors: true,
+            pipeline_statistics: true,
+            can_present: true,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }
@@ -294,9 +297,9 @@ mod tests {
             device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"]),
             device("Small", vk::PhysicalDeviceType::INTEGRATED_GPU, vec![]),
         ];
-        assert_eq!(choose(&devices, &Choice::Best).ok(), Some(2));
-        assert_eq!(choose(&devices[..2], &Choice::Best).ok(), Some(0));
-        assert_eq!(choose(&devices, &Choice::Name("PIPE".into())).ok(), Some(0));
+        assert_eq!(choose(&devices, &DeviceChoice::Best).ok(), Some(2));
+        assert_eq!(choose(&devices[..2], &DeviceChoice::Best).ok(), Some(0));
+        assert_eq!(choose(&devices, &DeviceChoice::Name("PIPE".into())).ok(), Some(0));
     }
 
     fn family(flags: vk::QueueFlags, queue_count: u32, depth: u32) -> vk::QueueFamilyProperties {
@@ -330,9 +333,9 @@ mod tests {
     #[test]
     fn a_refusal_names_what_is_missing_or_what_is_there() {
         let devices = [device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"])];
-        assert!(choose(&devices, &Choice::Best).unwrap_err().to_string().contains("maintenance4"));
-        assert!(choose(&devices, &Choice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
-        assert!(choose(&devices, &Choice::Number(7)).unwrap_err().to_string().contains("0 Old"));
-        assert!(matches!(choose(&[], &Choice::Best), Err(GpuError::NoDevice)));
+        assert!(choose(&devices, &DeviceChoice::Best).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(7)).unwrap_err().to_string().contains("0 Old"));
+        assert!(matches!(choose(&[], &DeviceChoice::Best), Err(GpuError::NoDevice)));
     }
 }

@@ -1,7 +1,7 @@
 //! Pipelines made on a thread of their own, so that a view goes on with what it has meanwhile.
 
-use super::{Key, Pipelines};
-use crate::gpu::GpuError;
+use super::error::GpuError;
+use super::pipelines::{Key, Pipelines};
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -45,9 +45,9 @@ impl AsyncPipelineCompiler {
                 if over.load(Ordering::Relaxed) {
                     break;
                 }
-                let is_new = pipelines.there(&key).is_none();
+                let is_new = pipelines.cached(&key).is_none();
                 match pipelines.get(pass, &scene, &args) {
-                    Ok(_) => drop(pipelines.context.counts.beside.fetch_add(is_new.into(), Ordering::Relaxed)),
+                    Ok(_) => drop(pipelines.context.counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed)),
                     Err(fault) => drop(theirs.lock().unwrap_or_else(|e| e.into_inner()).insert(key, fault.to_string())),
                 }
                 if let Some(wake) = &wake {
@@ -56,7 +56,8 @@ impl AsyncPipelineCompiler {
             }
         };
         let thread = std::thread::Builder::new().name("pipelines".into()).spawn(work);
-        let thread = thread.map_err(|e| GpuError::Memory { doing: "start a thread".into(), fault: e.to_string() })?;
+        let thread =
+            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
         Ok(AsyncPipelineCompiler { jobs: Some(jobs), thread: Some(thread), asked: HashSet::new(), stop, faults })
     }
 
@@ -70,7 +71,7 @@ impl AsyncPipelineCompiler {
         for step in &plan.steps {
             let args = step.args();
             let key = Pipelines::key(step.pass, scene, &args);
-            if pipelines.there(&key).is_some() {
+            if pipelines.cached(&key).is_some() {
                 continue;
             }
             if let Some(fault) = self.faults.lock().unwrap_or_else(|e| e.into_inner()).get(&key) {
