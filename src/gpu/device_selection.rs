@@ -278,7 +278,7 @@ mod tests {
             kind,
             driver: String::new(),
             version: vk::API_VERSION_1_3,
-            missing: missing.into_iter().map(Cow::from).collect(),
+            missing: lacks.into_iter().map(Cow::from).collect(),
             missing_optional: vec![],
             queues: vec![],
             calibrated_timestamps: true,
