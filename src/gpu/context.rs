@@ -1,5 +1,5 @@
-//! Instance, device, queue, allocator and messenger. One `Arc` of it is held by everything made from it, and its one `Drop`
-//! is the order of destruction.
+//! Instance, device, queues, memory allocator and validation messenger. Everything made from a context holds an `Arc` of it, and
+//! its `Drop` destroys them in order.
 
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
@@ -15,68 +15,74 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
-/// The first layers whose synchronization validation surely knows timelines (Vulkan-ValidationLayers #8559, September 2024).
+/// The first version of the layer whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559,
+/// September 2024).
 const TIMELINE_VALIDATION: u32 = vk::make_api_version(0, 1, 3, 297);
 
+/// Which device a [`Context`] uses, and how.
 #[derive(Clone, Debug)]
 pub struct ContextOptions {
     pub device: DeviceChoice,
-    /// Core and synchronization validation; every message is kept in [`Context::messages`].
+    /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
     pub validation: bool,
 }
 
+/// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
 pub struct Context {
-    /// Kept loaded as long as anything made from it lives.
+    /// The loader stays loaded as long as anything made from it lives.
     #[cfg_attr(not(feature = "view"), expect(dead_code))]
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
-    /// Of a context whose pictures are shown.
+    /// For a context that presents pictures.
     pub(super) presentation: Option<Presentation>,
     messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Box<Mutex<Vec<String>>>,
-    /// The validation layer sees that submissions wait for timelines.
+    /// The validation layer handles waits for timeline semaphores.
     layer_knows_timelines: bool,
     pub candidate: Candidate,
     pub limits: vk::PhysicalDeviceLimits,
     pub device: ash::Device,
-    /// Descriptors are pushed, where the device can; else they are sets of a pool.
+    /// `None` if the device cannot push descriptors: they are then sets of a pool.
     pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
-    /// Reads the device's clock, where it can be read.
+    /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
-    /// As of the candidate: renders, takes frames in, copies them.
+    /// In the order of `candidate.queues`: rendering, ingestion, copies.
     queues: Vec<Mutex<vk::Queue>>,
-    /// Families that slots which cross queues are shared between.
+    /// The queue families that share slots used on several queues.
     pub queue_families: Vec<u32>,
-    /// Taken in `drop`, before the device goes.
+    /// Taken in `drop`, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
     pub faults: Faults,
     pub counts: Counts,
 }
 
-/// What shows pictures.
+/// The extensions that present pictures.
 pub struct Presentation {
     pub surfaces: ash::khr::surface::Instance,
     pub swapchains: ash::khr::swapchain::Device,
-    /// Where it is a monitor.
+    /// If the target is a monitor.
     pub displays: Option<ash::khr::display::Instance>,
 }
 
-/// What is costly and must not happen for every frame, counted since the start.
+/// Counts, since the start, of costly operations that must not happen for every frame.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Of device memory.
+    /// Allocations of device memory.
     pub allocations: AtomicU64,
     pub pipelines: AtomicU64,
-    /// Those of them that were made beside the drawing.
+    /// Pipelines that were compiled in the background.
     pub async_pipelines: AtomicU64,
     pub dispatches: AtomicU64,
-    /// Waits for the whole device.
+    /// Waits until the device is idle.
     pub waits_idle: AtomicU64,
 }
 
 /// Loads Vulkan and lists the devices, for `echolume devices`.
+///
+/// # Errors
+/// No Vulkan loader or no driver.
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
     let instance = create_instance(&entry, false, false, None)?;
@@ -87,16 +93,18 @@ pub fn list() -> Result<Vec<Candidate>, GpuError> {
 }
 
 impl Context {
+    /// Opens a device.
+    ///
     /// # Errors
-    /// No loader, no device, a device that lacks what is required, or no validation layer when validation was asked for.
+    /// No Vulkan loader, no device, a device that lacks a required feature, or no validation layer although validation is requested.
     pub fn new(options: &ContextOptions) -> Result<Arc<Context>, GpuError> {
         Context::create(options, None)
     }
 
-    /// One whose pictures can be shown on `target`: the device is chosen among those that can.
+    /// Opens a device that can present on `target`.
     ///
     /// # Errors
-    /// As of [`Context::new`]; no device that can show anything there.
+    /// As for [`Context::new`]; no device that can present there.
     #[cfg(feature = "view")]
     pub fn for_presentation(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
         Context::create(options, Some(target))
@@ -116,7 +124,7 @@ impl Context {
         let debug_utils = options.validation
             || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
         let instance = create_instance(&entry, options.validation, debug_utils, target)?;
-        // The loader stays loaded until the instance is gone, also when nothing comes of it.
+        // Also on failure, the loader stays loaded until the instance is destroyed.
         let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, validates_timelines, target);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
@@ -206,29 +214,29 @@ impl Context {
         Ok(context)
     }
 
-    /// Whether the validation layer watches.
+    /// True if the validation layer is enabled.
     pub fn has_validation(&self) -> bool {
         self.messenger.is_some()
     }
 
-    /// What validation has said so far; silence is the pass mark.
+    /// All validation messages so far. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
-    /// Whether hazards between submissions that validation tells are some: older layers do not see that one queue waits for another's
-    /// timeline, and where there is one queue there is nothing to see.
+    /// True if hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline
+    /// of another; with a single queue that does not matter.
     pub fn validates_timelines(&self) -> bool {
         self.layer_knows_timelines || self.queue_count() == 1
     }
 
-    /// Bytes of device memory that something holds now.
+    /// Bytes of device memory in use.
     pub fn allocated(&self) -> u64 {
         let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
         allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
     }
 
-    /// Bytes of the device's own memory, free or not.
+    /// Total bytes of the device's own memory.
     pub fn memory(&self) -> u64 {
         // SAFETY: the handle belongs to this instance; the call only reads.
         let there = unsafe { self.instance.get_physical_device_memory_properties(self.candidate.handle) };
@@ -236,7 +244,7 @@ impl Context {
         own.map(|heap| heap.size).sum()
     }
 
-    /// A time stamp of the device, and when the host read it; none where the device's clock cannot be read.
+    /// A time stamp of the device, and the time at which the host read it; `None` if the device's clock cannot be read.
     pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
         let clock = self.clock.as_ref()?;
         let info = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
@@ -246,7 +254,7 @@ impl Context {
         Some((*ticks.first()?, before + before.elapsed() / 2))
     }
 
-    /// Features of a format in optimal tiling.
+    /// Features of a format with optimal tiling.
     pub fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
         // SAFETY: the handle belongs to this instance; the call only reads.
@@ -254,7 +262,7 @@ impl Context {
         *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
     }
 
-    /// From now on a format has these features.
+    /// Fault injection: from now on a format has these features.
     pub(super) fn override_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
         self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
     }
@@ -282,17 +290,17 @@ impl Context {
         }
     }
 
-    /// The queue that does this one's work: where there are fewer than asked for, several are one.
+    /// The queue for this role; with fewer queues on the device than roles, several roles share the last one.
     pub fn queue(&self, number: usize) -> QueueInfo {
         self.candidate.queues[number.min(self.queues.len() - 1)]
     }
 
-    /// How many queues there are for different work: 1..=3.
+    /// Number of queues in use: 1..=3.
     pub fn queue_count(&self) -> usize {
         self.queues.len()
     }
 
-    /// `done`: a fence that is signalled when it is done, or null.
+    /// Submits to a queue. `done` is a fence to signal at completion, or null.
     pub(super) fn submit(
         &self,
         queue: usize,
@@ -312,7 +320,7 @@ impl Context {
             .context(operation)
     }
 
-    /// What is done to the queue that renders by others than [`Context::submit`], one at a time.
+    /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].
     #[cfg(feature = "view")]
     pub(super) fn on_queue<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> T {
         work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
@@ -325,7 +333,10 @@ impl Context {
         let _ = unsafe { self.device.device_wait_idle() };
     }
 
-    /// The largest image of this kind, and its bytes.
+    /// The limits of an image of this format, type and usage.
+    ///
+    /// # Errors
+    /// A combination that the device does not support.
     pub fn image_limits(
         &self,
         format: vk::Format,
@@ -360,7 +371,7 @@ fn load() -> Result<ash::Entry, GpuError> {
     unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
 }
 
-/// `target`: what its pictures will be shown on, if on anything.
+/// `target`: where pictures will be presented, if anywhere.
 fn create_instance(
     entry: &ash::Entry,
     validation: bool,
@@ -373,7 +384,7 @@ fn create_instance(
         .api_version(vk::API_VERSION_1_3);
     let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
     let mut extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
-    // The layer itself brings this one.
+    // The layer itself provides this extension.
     extensions.extend(validation.then_some(ash::ext::validation_features::NAME.as_ptr()));
     if let Some(target) = target {
         extensions.extend(target.extensions(entry)?.iter().map(|name| name.as_ptr()));
@@ -390,13 +401,13 @@ fn create_instance(
     // SAFETY: every pointer in `create` outlives the call.
     let instance = unsafe { entry.create_instance(&create, None) };
     match instance {
-        // The loader says so when no driver is installed at all.
+        // The loader returns this if no driver is installed.
         Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(GpuError::NoDevice),
         other => other.context(|| "create instance".into()),
     }
 }
 
-/// `shows`: its pictures will be shown, with panels drawn over them.
+/// `shows`: the device will present pictures with panels drawn over them.
 fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -> Result<ash::Device, GpuError> {
     let priorities = [1.0; MAX_QUEUES];
     let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
@@ -429,7 +440,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -
         .enabled_features(&core)
         .push_next(&mut v12)
         .push_next(&mut v13);
-    // SAFETY: `choose` made sure that everything asked for is there; every pointer outlives the call.
+    // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
     unsafe { instance.create_device(candidate.handle, &create, None) }
         .context(|| format!("create device '{}'", candidate.name))
 }
@@ -442,7 +453,7 @@ fn create_messenger(
     let debug = ash::ext::debug_utils::Instance::new(entry, instance);
     let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
-        // Not PERFORMANCE: it asks for transfer layouts, and images stay in GENERAL by design.
+        // Not PERFORMANCE: it recommends transfer layouts, but images stay in GENERAL by design.
         .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
         .pfn_user_callback(Some(on_message))
         .user_data(std::ptr::from_ref(messages).cast_mut().cast());

@@ -1,18 +1,18 @@
-//! Which device to use: what each one is, what it missing, and why it was or was not picked.
+//! Device selection: the properties of each device, what it lacks, and which one is used.
 
 use super::error::GpuError;
 use ash::vk;
 use std::borrow::Cow;
 use std::ffi::CStr;
 
-/// A device as the user names it.
+/// The device that a user asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// The best that lacks nothing.
+    /// The best device that lacks no required feature.
     Best,
     /// By its number in `echolume devices`.
     Number(usize),
-    /// By a part of its name, in any case.
+    /// By a part of its name, ignoring case.
     Name(String),
 }
 
@@ -32,22 +32,22 @@ pub struct Candidate {
     pub kind: vk::PhysicalDeviceType,
     pub driver: String,
     pub version: u32,
-    /// What is required and not there.
+    /// Required features that the device lacks.
     pub missing: Vec<Cow<'static, str>>,
-    /// What is optional and not there.
+    /// Optional features that the device lacks, with the consequence.
     pub missing_optional: Vec<&'static str>,
-    /// The queues that are used: the first renders, the second takes frames in, the third copies them, as far as there are such.
+    /// The queues to use: the first renders, the second (if any) ingests frames, the third (if any) copies them.
     pub queues: Vec<QueueInfo>,
-    /// Time stamps can be put on the host's clock.
+    /// Time stamps can be converted to the host's clock.
     pub calibrated_timestamps: bool,
-    /// Descriptors can be pushed.
+    /// Supports push descriptors.
     pub push_descriptors: bool,
-    /// Shader invocations can be counted.
+    /// Can count shader invocations.
     pub pipeline_statistics: bool,
-    /// Pictures can be shown on a window, with panels drawn over them.
+    /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
     pub limits: vk::PhysicalDeviceLimits,
-    /// Largest allocation and largest buffer, whichever is less.
+    /// The smaller of the largest allocation and the largest buffer, bytes.
     pub max_bytes: u64,
 }
 
@@ -57,11 +57,11 @@ pub struct QueueInfo {
     pub family: u32,
     /// Within its family.
     pub index: u32,
-    /// Of its time stamps; 0 for none.
+    /// Valid bits of its time stamps; 0 without time stamps.
     pub valid_bits: u32,
     pub computes: bool,
     pub draws: bool,
-    /// Whether it copies single slices of a 3D image, and not only all of it.
+    /// True if it can copy single slices of a 3D image; otherwise only complete images.
     pub copies_slices: bool,
 }
 
@@ -70,12 +70,12 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
-    /// Its memory is the machine's.
+    /// True if it shares the machine's memory.
     pub fn has_unified_memory(&self) -> bool {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
     }
 
-    /// Of the time stamps of the queue that renders; 0 for none.
+    /// Valid bits of the time stamps of the rendering queue; 0 without time stamps.
     pub fn valid_bits(&self) -> u32 {
         self.queues.first().map_or(0, |q| q.valid_bits)
     }
@@ -157,8 +157,8 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let mut missing_optional = Vec::new();
     match queues.len() {
         0 | 1 => missing_optional
-            .push("an asynchronous compute queue: frames are taken in between pictures, not beside them"),
-        2 => missing_optional.push("a transfer queue: frames are copied where they are converted"),
+            .push("an asynchronous compute queue: frames are converted between pictures, not in parallel with them"),
+        2 => missing_optional.push("a transfer queue: frames are copied on the queue that converts them"),
         _ => {}
     }
     if valid_bits == 0 {
@@ -167,7 +167,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let calibrated_timestamps = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
     if !calibrated_timestamps {
         missing_optional
-            .push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
+            .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
     }
     let push_descriptors = has(ash::khr::push_descriptor::NAME);
     if !push_descriptors {
@@ -180,7 +180,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         missing_optional.push("pipelineStatisticsQuery: invocations are not counted");
     }
     if !can_present {
-        missing_optional.push("VK_KHR_swapchain and dynamicRendering: nothing is shown on a window");
+        missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
     }
     if !has(ash::ext::memory_budget::NAME) {
         missing_optional.push("VK_EXT_memory_budget");
@@ -199,13 +199,13 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         pipeline_statistics,
         can_present,
         limits: properties.limits,
-        // A driver older than 1.3 leaves this 0; it is refused anyway.
+        // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
 }
 
-/// The queues to use: one that computes, best with graphics too, since that one may show pictures; another that computes, best one
-/// that does nothing else; and one that only copies.
+/// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
+/// without graphics; and one for transfers only.
 fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
     let of = |family: usize, index: u32| QueueInfo {
@@ -226,7 +226,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     let only_computes =
         |f: &vk::QueueFamilyProperties| f.queue_flags.contains(compute) && !f.queue_flags.contains(graphics);
     match find(&only_computes).filter(|f| *f != first) {
-        Some(beside) => queues.push(of(beside, 0)),
+        Some(family) => queues.push(of(family, 0)),
         None if families[first].queue_count > 1 => queues.push(of(first, 1)),
         None => return queues,
     }
@@ -237,7 +237,10 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     queues
 }
 
-/// The number of the chosen device.
+/// The index of the chosen device.
+///
+/// # Errors
+/// No such device, or one that lacks a required feature.
 pub fn choose(candidates: &[Candidate], choice: &DeviceChoice) -> Result<usize, GpuError> {
     let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
     if candidates.is_empty() {
@@ -291,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_device_is_a_gpu_that_lacks_nothing_and_software_comes_last() {
+    fn the_best_device_is_a_complete_gpu_and_software_comes_last() {
         let devices = [
             device("llvmpipe", vk::PhysicalDeviceType::CPU, vec![]),
             device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"]),
@@ -312,10 +315,10 @@ mod tests {
         }
     }
 
-    /// One queue in all (lavapipe); all in one family but several queues (Intel); families of their own (NVIDIA, AMD), of which one
-    /// that copies may only copy whole images.
+    /// A single queue (lavapipe); several queues in one family (Intel); separate families (NVIDIA, AMD), where the transfer family
+    /// may only copy complete images.
     #[test]
-    fn as_many_queues_are_used_as_there_are_for_different_work() {
+    fn one_queue_is_used_for_each_role_that_the_device_has_a_queue_for() {
         use vk::QueueFlags as Q;
         let all = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
         let families = |list: &[vk::QueueFamilyProperties]| -> Vec<(u32, u32)> {
@@ -331,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_what_is_missing_or_what_is_there() {
+    fn an_error_names_the_missing_feature_or_the_devices() {
         let devices = [device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"])];
         assert!(choose(&devices, &DeviceChoice::Best).unwrap_err().to_string().contains("maintenance4"));
         assert!(choose(&devices, &DeviceChoice::Number(0)).unwrap_err().to_string().contains("maintenance4"));

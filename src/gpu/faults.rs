@@ -1,5 +1,5 @@
-//! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested;
-//! slowness, so that what finds it is; and wrong results, so that the checks of the device are.
+//! Fault injection. Failures of driver calls test the error paths for out of memory, a lost device and a time-out. Slow passes test
+//! the detection of slowness. Wrong results test the checks of `verify`.
 
 use crate::passes::fault_injection::Change;
 use crate::passes::slots::{Format, Initializer};
@@ -9,17 +9,17 @@ use ash::vk;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
-/// Where a call into the driver can be made to fail.
+/// A kind of driver call that can be made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectionPoint {
     Allocate,
     Submit,
     Wait,
-    /// An image of a window.
+    /// Acquiring an image of a swapchain.
     Acquire,
 }
 
-/// How a call fails, for those who know no Vulkan.
+/// How a call fails, for modules that do not use Vulkan's types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectedFailure {
     OutOfDeviceMemory,
@@ -39,38 +39,38 @@ impl InjectedFailure {
     }
 }
 
-/// What new memory holds before anything is written to it.
+/// What newly allocated memory holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poison {
-    /// Texels of floats.
+    /// Texels of float formats.
     pub float: f32,
-    /// Texels that stand for 0..1.
-    pub share: f32,
-    /// Texels of whole numbers.
-    pub whole: u32,
-    /// Buffers.
+    /// Texels of normalized formats, 0..1.
+    pub normalized: f32,
+    /// Texels of integer formats.
+    pub integer: u32,
+    /// Each byte of a buffer.
     pub byte: u8,
 }
 
 impl Poison {
-    /// Two that differ in every bit that counts: what holds neither of them where it should was computed from them.
+    /// Two poisons that differ in every significant bit. A result that differs between them was computed from uninitialized memory.
     pub const BOTH: [Poison; 2] = [
-        Poison { float: f32::NAN, share: 2.0 / 3.0, whole: 0xabab_abab, byte: 0xff },
-        Poison { float: -999.5, share: 1.0 / 3.0, whole: 0x5555_5555, byte: 0x55 },
+        Poison { float: f32::NAN, normalized: 2.0 / 3.0, integer: 0xabab_abab, byte: 0xff },
+        Poison { float: -999.5, normalized: 1.0 / 3.0, integer: 0x5555_5555, byte: 0x55 },
     ];
 
-    /// As a texel of a format holds it.
+    /// The value of a poisoned texel of a format.
     pub fn texel_value(self, format: Format) -> f64 {
         match format {
-            Format::R32u | Format::Rg32u => f64::from(self.whole),
-            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.share)).round() / 255.0,
-            Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.share)).round() / 65535.0,
+            Format::R32u | Format::Rg32u => f64::from(self.integer),
+            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.normalized)).round() / 255.0,
+            Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.normalized)).round() / 65535.0,
             _ => f64::from(self.float),
         }
     }
 }
 
-/// At most one planned failure, one slow pass, one poison, and one wrong result.
+/// The injected faults of a context: at most one failure, one slow pass, one poison, and one wrong result.
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
@@ -81,7 +81,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// The `after`-th call from now (0: the next) at this point returns `result` instead of reaching the driver.
+    /// The `after`-th call from now (0: the next) at this point returns `result` and does not reach the driver.
     pub fn inject(&self, point: InjectionPoint, after: u32, result: vk::Result) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = Some((point, after, result));
     }
@@ -102,12 +102,12 @@ impl Faults {
         }
     }
 
-    /// Forgets a planned failure that was not reached.
+    /// Cancels a planned failure that has not happened.
     pub fn forget(&self) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
 
-    /// From now on new memory holds this; zeros where something relies on them ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
+    /// From now on new memory holds this; slots that must start with zeros still do ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
     pub fn poison(&self, poison: Option<Poison>) {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
     }
@@ -116,7 +116,7 @@ impl Faults {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// From now on the pass is dispatched so many times instead of once. It writes the same each time: only time passes. 0 leaves it out.
+    /// From now on each dispatch of the pass runs this many times; the results stay the same. 0 leaves it out.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }
@@ -128,13 +128,13 @@ impl Faults {
         }
     }
 
-    /// From now on, and for as long as the context lives, the device is told or given something else. Before anything is made from the
-    /// context; the first one holds.
+    /// Changes what the device receives, as long as the context lives. To be called before anything is made from the context; only the
+    /// first call has an effect.
     pub fn inject_change(&self, change: Change) {
         self.change.get_or_init(|| change);
     }
 
-    /// How often what is planted changed something.
+    /// How often the injected change has changed something.
     pub fn change_count(&self) -> u64 {
         self.changes.load(Ordering::Relaxed)
     }
@@ -147,7 +147,7 @@ impl Faults {
         changed
     }
 
-    /// What a dispatch works on; none if it is left out.
+    /// The arguments of a dispatch; `None` if it is left out.
     pub(super) fn args(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Option<DispatchArgs> {
         let mut args = *args;
         self.apply(|change| change.args(pass.name, scene, &mut args));
@@ -188,7 +188,7 @@ impl Faults {
         self.apply(|change| change.frame(scene, bytes));
     }
 
-    /// Bytes of a slot that a pass alone is given.
+    /// The input bytes of a slot for a single pass.
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
             self.frame(scene, &mut bytes);

@@ -1,4 +1,4 @@
-//! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-/// A compute pipeline and what it is bound by.
+/// A compute pipeline and its layout.
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
@@ -22,13 +22,13 @@ pub struct Pipeline {
     pub handle: vk::Pipeline,
 }
 
-/// Shader, constants, and the formats of what is read: those of storage images are part of the module.
+/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
 pub(super) type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
-/// Where the words of a shader come from; embedded unless hot reload compiles them.
+/// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
-/// Every pipeline made so far, by shader and constants: going back to an earlier setting compiles nothing.
+/// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
 pub struct Pipelines {
     pub(super) context: Arc<Context>,
     made: Mutex<HashMap<Key, Arc<Pipeline>>>,
@@ -37,7 +37,7 @@ pub struct Pipelines {
     sampler: vk::Sampler,
 }
 
-/// The shaders that are part of the program.
+/// The embedded shaders.
 pub fn embedded() -> Arc<Shaders> {
     Arc::new(|name| {
         spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
@@ -82,10 +82,10 @@ impl Pipelines {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
     }
 
-    /// The pipeline of a pass in a scene; made at its first use.
+    /// The pipeline of a pass in a scene, compiled at its first use.
     ///
     /// # Errors
-    /// A shader that is not there, or that disagrees with the pass's declaration.
+    /// A shader that does not exist, or that disagrees with the declaration of the pass.
     pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let key = Pipelines::key(pass, scene, args);
         if let Some(pipeline) = self.cached(&key) {
@@ -104,9 +104,9 @@ impl Pipelines {
         self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
-        let told = self.context.faults.constants(pass.name, &key.1);
-        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &told, &words, module)?);
-        // Another thread may have made it meanwhile: both serve.
+        let constants = self.context.faults.constants(pass.name, &key.1);
+        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module)?);
+        // Another thread may have made the same pipeline meanwhile; either can be used.
         self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
         Ok(pipeline)
     }
@@ -187,7 +187,7 @@ impl Pipeline {
         // SAFETY: as above; the shader module is alive until after the call.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
         context.counts.pipelines.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: a module may go once its pipelines are made.
+        // SAFETY: a shader module may be destroyed once its pipelines are made.
         unsafe { device.destroy_shader_module(shader, None) };
         pipeline.handle = made.map_err(|(_, result)| result).context(operation)?[0];
         context.name(pipeline.handle, name);

@@ -1,4 +1,4 @@
-//! Images and buffers that own their memory and free themselves.
+//! Images and buffers that own their memory.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -12,12 +12,13 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+/// An image, its memory and its views.
 pub struct Image {
     context: Arc<Context>,
     pub handle: vk::Image,
-    /// All of it.
+    /// A view of the complete image.
     pub view: vk::ImageView,
-    /// Each layer of an array by itself: what a frame is read through.
+    /// A view of each layer of an array: frames are read through these.
     pub layers: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
@@ -25,25 +26,26 @@ pub struct Image {
     allocation: Option<Allocation>,
 }
 
+/// A buffer and its memory, mapped as long as it lives.
 pub struct Buffer {
     context: Arc<Context>,
     pub handle: vk::Buffer,
     pub size: u64,
-    /// A table as texels of one, two and four floats.
+    /// For a lookup table: views with texels of one, two and four floats.
     texels: [vk::BufferView; 3],
     allocation: Option<Allocation>,
 }
 
-/// What a buffer is for, which decides where it lives.
+/// The purpose of a buffer. It decides the kind of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// A table that shaders read.
+    /// A lookup table that shaders read.
     Table,
-    /// Numbers of passes, written by the CPU.
+    /// Uniform numbers of passes, written by the CPU.
     Params,
-    /// Frames on their way in, written by the CPU.
+    /// Data to upload, written by the CPU.
     Staging,
-    /// Results on their way out, read by the CPU.
+    /// Results to download, read by the CPU.
     Readback,
 }
 
@@ -75,13 +77,16 @@ fn allocate(
 fn free(context: &Context, allocation: Option<Allocation>) {
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
-        // Freeing what this allocator made cannot fail; a Drop could not report it anyway.
+        // Freeing an allocation of this allocator cannot fail, and a Drop could not report it.
         let _ = allocator.free(allocation);
     }
 }
 
 impl Image {
     /// An image in layout UNDEFINED.
+    ///
+    /// # Errors
+    /// Out of memory; a device that fails.
     pub fn new(context: &Arc<Context>, slot: Slot, shape: Shape, format: Format) -> Result<Image, GpuError> {
         let (kind, view_kind, [width, height, depth], layers) = match shape {
             Shape::Two([w, h]) => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, [w, h, 1], 1),
@@ -90,7 +95,7 @@ impl Image {
             Shape::Buffer(_) => {
                 return Err(GpuError::Memory {
                     operation: format!("create image '{}'", slot.name()),
-                    fault: "is a buffer".into(),
+                    fault: "the slot is a buffer".into(),
                 });
             }
         };
@@ -118,7 +123,7 @@ impl Image {
         let device = &context.device;
         // SAFETY: the create structure is complete and its pointers live; limits and formats were checked for the plan.
         let handle = unsafe { device.create_image(&create, None) }.context(operation)?;
-        // From here on a failure is cleaned up by dropping `image`.
+        // From here on, dropping `image` cleans up after a failure.
         let mut image = Image {
             context: context.clone(),
             handle,
@@ -169,7 +174,7 @@ impl Image {
     }
 }
 
-/// Every layer of the one mip level.
+/// All layers of the only mip level.
 pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
     base_mip_level: 0,
@@ -202,7 +207,7 @@ pub fn shape_size(shape: Shape) -> [usize; 3] {
 
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
-/// Whether a table of so many bytes can be read by texels, whatever its entries are.
+/// True if a lookup table of this size can be a texel buffer, for any size of its entries.
 pub fn has_texels(context: &Context, bytes: u64) -> bool {
     bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
 }
@@ -250,12 +255,12 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// A table as texels of so many floats.
+    /// The view of a lookup table with texels of 1, 2 or 4 floats.
     pub fn texels(&self, components: u32) -> vk::BufferView {
         self.texels[components.ilog2().min(2) as usize]
     }
 
-    /// The bytes, mapped as long as the buffer lives. Every purpose is visible to the host.
+    /// The mapped bytes. Buffers of every purpose are visible to the host.
     pub fn bytes(&self) -> &[u8] {
         let bytes = self.allocation.as_ref().and_then(|a| a.mapped_slice()).unwrap_or(&[]);
         &bytes[..bytes.len().min(self.size as usize)]

@@ -34,9 +34,10 @@ pub fn checks(_: Level) -> Vec<Check> {
 fn uses(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, context) = (Found::default(), &bench.context);
     for of in formats::format_support(context) {
-        let [columns, rows, edge] = of.largest;
-        let missing = if of.cannot.is_empty() { String::new() } else { format!("; not {}", of.cannot.join(", ")) };
-        let can = of.can.join(", ");
+        let [columns, rows, edge] = of.max_extent;
+        let missing =
+            if of.unsupported.is_empty() { String::new() } else { format!("; not {}", of.unsupported.join(", ")) };
+        let can = of.supported.join(", ");
         found.notes.push(format!("{}: {can}{missing}; {columns}x{rows}, {edge}^3", of.format));
     }
     let fetch = TexelAccess::for_device(&context.candidate);
