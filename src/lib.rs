@@ -21,8 +21,8 @@
 //! # Render a file
 //!
 //! ```
-//! use echolume::scene::{Input, Scene, load::Layers};
-//! use echolume::{Context, ContextOptions, Renderer, RendererOptions};
+//! use echolume::scene::{Input, load::Layers};
+//! use echolume::{Context, ContextOptions, Renderer, RendererOptions, Scene};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut recording = echolume::source::open("tests/data/bone-l14/bone.mha".as_ref(), None)?;
@@ -51,12 +51,12 @@
 //! A source implements [`source::live::Live`]: it states the geometry once, then hands over frames on its own clock.
 //!
 //! ```
-//! use echolume::live::{Feed, Step, Stream, StreamOptions};
+//! use echolume::live::{Feed, Step};
 //! use echolume::probe::{Geometry, Grid};
 //! use echolume::scene::load::Layers;
 //! use echolume::source::live::{Event, Live};
 //! use echolume::source::{Frame, StoredType, recorder::Header};
-//! use echolume::{Context, ContextOptions};
+//! use echolume::{Context, ContextOptions, Stream, StreamOptions};
 //! use std::time::Duration;
 //!
 //! /// Eight slices of 16 x 16 pixels that become brighter.
@@ -113,9 +113,9 @@
 //! use echolume::gpu::pass_runner::PassRunner;
 //! use echolume::passes::{Arrays, DispatchArgs, Texels, by_name};
 //! use echolume::probe::{Geometry, Grid};
-//! use echolume::scene::{Input, Scene, load::Layers};
+//! use echolume::scene::{Input, load::Layers};
 //! use echolume::source::StoredType;
-//! use echolume::{Context, ContextOptions};
+//! use echolume::{Context, ContextOptions, Scene};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut layers = Layers::default();
@@ -145,7 +145,8 @@
 //! ```
 //! use echolume::plan::Plan;
 //! use echolume::probe::{Geometry, Grid};
-//! use echolume::scene::{Input, Scene, load::Layers};
+//! use echolume::scene::{Input, load::Layers};
+//! use echolume::Scene;
 //! use echolume::source::StoredType;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -220,3 +221,8 @@ pub mod thesis_tables;
 pub mod ui;
 #[forbid(unsafe_code)]
 pub mod verify;
+
+pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
+pub use live::{Stream, StreamOptions};
+pub use scene::Scene;
+pub use source::Recording;

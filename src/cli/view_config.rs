@@ -161,8 +161,7 @@ fn stamp() -> String {
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(quality_ladder::built_in()),
-        Some(file) => {
-            quality_ladder::measured(&read_report(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display())))
-        }
+        Some(file) => quality_ladder::measured(&read_report(file)?)
+            .map_err(|e| failed(format!("--report {}: {e}", file.display()))),
     }
 }
