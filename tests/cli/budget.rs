@@ -22,7 +22,7 @@ pub fn error_report(volume: &str) -> String {
 }
 
 #[test]
-fn a_budget_of_time_takes_what_a_report_measured_and_no_setting_of_the_users() {
+fn a_time_budget_uses_the_report_and_overrides_no_setting_of_the_user() {
     let folder = Folder::new("budget");
     let report = folder.write("error.json", error_report("[160, 216, 33]"));
     let picture = |name: &str, more: &[&str]| {

@@ -6,7 +6,7 @@ use std::process::Command;
 const DIRECT: [&str; 5] = ["view", "--source", "phantom", "--direct", "--monitor"];
 
 #[test]
-fn without_such_a_monitor_one_line_says_so() {
+fn a_missing_monitor_is_reported_in_one_line() {
     let nowhere = [&DIRECT[..], &["no such monitor", "--size", "640x480", "--refresh", "60"]].concat();
     let ran = run(&nowhere);
     refuses(&nowhere, &ran, 1, &[]);
@@ -18,7 +18,7 @@ fn without_such_a_monitor_one_line_says_so() {
 }
 
 #[test]
-fn what_only_a_monitor_has_is_not_taken_elsewhere() {
+fn options_of_a_monitor_are_refused_elsewhere() {
     for (arguments, named) in [
         (&["--refresh", "60"][..], "--direct"),
         (&["--direct", "--full-screen"], "--full-screen"),

@@ -58,7 +58,7 @@ fn a_sweep_goes_into_frames_and_back_without_a_change() {
 }
 
 #[test]
-fn what_is_damaged_or_missing_is_said_and_makes_no_sequence() {
+fn damaged_and_missing_frames_are_reported_and_make_no_sequence() {
     let folder = Folder::new("damaged");
     let [head, frames, back, volume] = ["head.mha", "head.frames", "back.mha", "v.mha"].map(|n| folder.path(n));
     done(&["phantom", "-o", &head, "--volumes", "3", "--both-ways", "--no-speckle", "--speed-ratio", "0"]);
@@ -82,7 +82,7 @@ fn what_is_damaged_or_missing_is_said_and_makes_no_sequence() {
 }
 
 #[test]
-fn no_sequence_is_made_of_what_is_none() {
+fn no_sequence_is_made_of_other_files() {
     let folder = Folder::new("sequence");
     let [out, nrrd, frames] = ["out.mha", "out.nrrd", "out.frames"].map(|n| folder.path(n));
     for (arguments, named) in [

@@ -25,7 +25,7 @@ fn huge(folder: &Folder, name: &str, start: &[u8]) -> String {
 }
 
 #[test]
-fn nothing_that_is_read_may_be_endless() {
+fn no_input_may_be_endless() {
     let folder = Folder::new("endless");
     let (out, volume) = (folder.path("out.png"), folder.path("out.mha"));
     let fifo = folder.path("fifo.toml");

@@ -42,7 +42,7 @@ fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help
 }
 
 #[test]
-fn no_wrong_recording_is_met_with_a_panic_or_a_picture() {
+fn wrong_recordings_cause_neither_a_panic_nor_a_picture() {
     let folder = Folder::new("recordings");
     let sweep = fs::read(SWEEP).expect("read the sweep");
     let split = sweep.windows(6).position(|w| w == b"LOCAL\n").expect("the header ends") + 6;
@@ -167,7 +167,7 @@ fn info_does_not_hide_the_facts_and_devices_not_the_software() {
 }
 
 #[test]
-fn presets_do_not_break_the_rules_of_vulkan_nor_differ_between_formats() {
+fn presets_pass_validation_and_do_not_differ_between_formats() {
     let folder = Folder::new("presets");
     let [_, mha, vol] =
         [(BONE, "bone", "a"), (SWEEP, "fetal", "b"), (KRETZ, "fetal", "c")].map(|(file, preset, name)| {
@@ -198,7 +198,7 @@ fn no_slot_is_missing_from_the_dump_and_no_pass_from_the_times() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said_and_nothing_is_destroyed() {
+fn unwritable_outputs_are_reported_and_nothing_is_destroyed() {
     let folder = Folder::new("outputs");
     let (file, copy) = (folder.write("file", "mine"), folder.path("copy.mha"));
     fs::copy(BONE, &copy).expect("copy the recording");

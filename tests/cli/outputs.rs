@@ -89,7 +89,7 @@ fn filled<'a>(row: &'a Row, output: &'a str) -> Vec<&'a str> {
 }
 
 #[test]
-fn where_nothing_can_be_written_one_line_says_so_before_any_work() {
+fn outputs_that_cannot_be_written_are_refused_before_any_work() {
     let folder = Folder::new("readonly");
     let rows = rows(&folder);
     let file = folder.write("file", "mine");
@@ -141,7 +141,7 @@ fn a_full_disk_costs_no_old_file_and_leaves_nothing() {
 }
 
 #[test]
-fn what_is_read_is_not_written_over_nor_one_file_twice() {
+fn inputs_are_not_overwritten_and_no_file_is_written_twice() {
     let folder = Folder::new("inputs");
     let copy = |from: &str, name: &str| folder.write(name, fs::read(from).expect("read"));
     let probe = copy(MOTOR_PROBE, "p.toml");

@@ -53,7 +53,7 @@ fn a_recording_of_a_stream_is_replayed_to_the_same_pictures_bit_for_bit() {
 }
 
 #[test]
-fn a_pipe_is_drawn_to_its_last_whole_volume_and_what_is_wrong_with_it_is_said() {
+fn a_pipe_is_drawn_to_its_last_complete_volume_and_its_faults_are_reported() {
     let folder = Folder::new("pipe");
     let out = folder.path("out");
     let stream = ["stream", "--source", "-", "--mode", "mip", "--size", "24x24", "--out", &out];
@@ -108,7 +108,7 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
 }
 
 #[test]
-fn the_phantom_streams_until_it_is_told_to_end() {
+fn the_phantom_streams_until_it_is_stopped() {
     let said = done(&[&["stream", "--null", "--rate", "4", "--volumes", "3", "--validate"], &SMALL[..]].concat());
     let last = said.lines().last().expect("a line");
     assert!(last.contains(" 3 volumes shown") || last.contains(" 4 volumes shown"), "{said}");

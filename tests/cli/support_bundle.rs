@@ -36,7 +36,7 @@ fn pack(folder: &Folder, config: &str) -> (BTreeMap<String, String>, Vec<u8>) {
 }
 
 #[test]
-fn what_is_packed_is_listed_and_says_what_machine_this_is() {
+fn the_archive_lists_its_files_and_describes_the_machine() {
     let folder = Folder::new("bundle");
     folder.write("a.log", "2026-11-22T01:00:00.000000Z  WARN newest\n");
     folder.write("a.log.1", "2026-11-22T00:00:00.000000Z  WARN older\n");
@@ -64,7 +64,7 @@ fn what_is_packed_is_listed_and_says_what_machine_this_is() {
 }
 
 #[test]
-fn a_name_that_was_planted_is_in_no_byte_of_it() {
+fn an_injected_patient_name_is_in_no_byte_of_the_archive() {
     let folder = Folder::new("planted");
     let home = folder.0.join(format!("{NAME}, A"));
     fs::create_dir_all(&home).expect("a folder with a name");
@@ -117,7 +117,7 @@ fn a_name_that_was_planted_is_in_no_byte_of_it() {
 }
 
 #[test]
-fn nothing_is_written_over_and_what_is_asked_for_wrongly_is_refused() {
+fn nothing_is_overwritten_and_wrong_options_are_refused() {
     let folder = Folder::new("bundle-refused");
     let there = folder.write("there.tar.gz", "mine");
     let config = folder.write("c.toml", "[files]\nlog = 'none.log'");

@@ -22,7 +22,7 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 
 /// Everything that CI has time for passes on this device, and every file says so.
 #[test]
-fn everything_quick_is_as_it_should_be_here() {
+fn every_quick_check_passes_on_this_device() {
     let folder = Folder::new("verify-quick");
     let [junit, html] = ["junit.xml", "page.html"].map(|name| folder.path(name));
     let pictures = folder.path("pictures");
@@ -46,7 +46,7 @@ fn everything_quick_is_as_it_should_be_here() {
 
 /// Every planted fault, every dropped barrier, and that nothing is noticed where nothing is planted.
 #[test]
-fn every_planted_fault_and_every_dropped_barrier_is_caught() {
+fn every_injected_fault_and_every_dropped_barrier_is_caught() {
     let folder = Folder::new("verify-self-test");
     let (_, run) = kept(&folder, "run.json", &["--self-test"]);
     let planted = self_test::faults().count();
@@ -93,7 +93,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
 }
 
 #[test]
-fn what_cannot_be_verified_is_said_in_one_line_with_its_own_exit_code() {
+fn refusals_of_verify_are_one_line_with_their_own_exit_code() {
     let folder = Folder::new("verify-refused");
     let text = folder.write("text.json", "no baseline");
     let other = folder.write("other.json", "{\"format\": \"somebody else's\"}");

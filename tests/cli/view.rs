@@ -10,7 +10,7 @@ fn bare(arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn what_a_view_cannot_be_of_is_refused_in_one_line_before_a_window_opens() {
+fn impossible_views_are_refused_in_one_line_before_a_window_opens() {
     let folder = Folder::new("view");
     let cut = folder.write("cut.mha", &std::fs::read(SWEEP).expect("read")[..3000]);
     let wrong = folder.write("cart.toml", "source = 'phantom'\nrate = -1\n");

@@ -157,7 +157,7 @@ fn no_bytes_break_any_parser() {
 
 /// Faults that are planted are found: a number that is believed, a length that is allocated, a word that two bits away is another.
 #[test]
-fn what_is_planted_is_found() {
+fn injected_faults_are_found() {
     fn number(bytes: &[u8]) -> String {
         let text = String::from_utf8_lossy(bytes);
         let value = text.split_once("gear = ").and_then(|(_, v)| v.split_whitespace().next()?.parse::<f64>().ok());

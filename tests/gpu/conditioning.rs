@@ -81,7 +81,7 @@ fn an_exponential_decay_becomes_a_straight_line_that_ends_at_the_dynamic_range()
 }
 
 #[test]
-fn nothing_becomes_black_and_more_never_becomes_less() {
+fn zero_becomes_black_and_the_mapping_is_monotonic() {
     let device = Device::new();
     let scene = lines(400, "dynamic_range = 200");
     // From below the smallest denormal to full scale, zeros and negative samples on other lines.
@@ -178,7 +178,7 @@ fn the_wobblers_wires_stay_where_they_are() {
 }
 
 #[test]
-fn what_would_alias_is_taken_away_and_what_is_slow_stays() {
+fn decimation_removes_aliases_and_keeps_low_frequencies() {
     let device = Device::new();
     let factor = 8.0;
     let amplitude = |period: f64| {
@@ -195,7 +195,7 @@ fn what_would_alias_is_taken_away_and_what_is_slow_stays() {
 }
 
 #[test]
-fn it_is_in_the_plan_only_where_it_does_something() {
+fn conditioning_is_planned_only_where_it_changes_something() {
     let conditions = |scene: &Scene| Plan::new(scene).steps.iter().any(|s| s.pass.name == "condition");
     for (samples, asked, is_there) in [
         (400, "", false),
@@ -228,7 +228,7 @@ fn it_is_in_the_plan_only_where_it_does_something() {
 }
 
 #[test]
-fn what_cannot_be_conditioned_is_refused_by_name() {
+fn impossible_conditioning_is_refused_by_name() {
     for (asked, field, fault) in [
         ("dynamic_range = 0", "conditioning.dynamic_range", "1..=200"),
         ("dynamic_range = nan", "conditioning.dynamic_range", "1..=200"),

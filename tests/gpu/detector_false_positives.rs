@@ -47,7 +47,7 @@ fn spread(device: &Device, deviation: f64, threshold: f64, rough: u32) -> Spread
 /// tenth of the wall, the default, is crossed by noise of a tenth of it somewhere on a third of the rays; the rough
 /// detector asks for a second such crossing.
 #[test]
-fn noise_spreads_a_wall_no_more_than_it_did() {
+fn noise_spreads_a_wall_within_the_measured_bounds() {
     let device = Device::new();
     // Threshold, rough; then for noise of 0, 0.05, 0.1 and 0.2 of the wall: spread in steps, share of wrong places.
     let measured = [
@@ -109,7 +109,7 @@ fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
 /// specks that lie one upon another. Shortly before the wall fewer are ridden over: the fine search begins half a rough ring
 /// and a fine one before where the rough one fires.
 #[test]
-fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
+fn only_long_steps_pass_over_specks_in_the_fluid() {
     let device = Device::new();
     let shares = [1, 2, 3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [34.0, 90.0]));
     println!("shares of specks and of walls found, by the rough step: {shares:.4?}");
@@ -204,7 +204,7 @@ fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> (Vec<f64>, f64) {
 /// The limits are what was measured (llvmpipe; the noise is the same everywhere), times 1.2 and 0.003. What is lost are walls
 /// whose height is three deviations of the noise or less.
 #[test]
-fn the_adaptive_detector_is_led_astray_less_than_the_plain_one_and_misses_no_more() {
+fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
     let device = Device::new();
     type Make<'a> = &'a dyn Fn(&mut Noise) -> (Vec<f64>, f64);
     // Shares of early surfaces and of lost walls, by rough step 1 and 2.
@@ -250,7 +250,7 @@ fn the_adaptive_detector_is_led_astray_less_than_the_plain_one_and_misses_no_mor
 /// Prevents specks that are found by a detector that is told to pass over them, walls that are lost behind them, and thin
 /// shells that are lost where they are all there is.
 #[test]
-fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
+fn the_lasting_detector_ignores_specks_but_not_a_thin_shell() {
     let device = Device::new();
     for rough in [1, 2, 3] {
         for gap in [[34.0, 90.0], [8.0, 16.0]] {
@@ -285,7 +285,7 @@ fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
 /// Prevents a shader that takes another way than its reference through noise, gaps, second looks and specks: on rays that
 /// are nothing but edges, in all combinations of settings. A difference within 1e-6 of its bar may go either way.
 #[test]
-fn every_detector_follows_its_reference_through_noise() {
+fn every_detector_matches_its_reference_in_noise() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let pass = echolume::passes::by_name("raycast_surface").expect("pass");

@@ -79,7 +79,7 @@ fn aos_step(u: &Texels, tau: f64, conductance: impl Fn(f64) -> f64) -> Texels {
 }
 
 #[test]
-fn aos_is_what_dense_solves_give() {
+fn aos_equals_dense_solves() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let quotient = |k: f64| move |g: f64| 1.0 / (1.0 + (g / k).powi(2));

@@ -113,7 +113,7 @@ fn leapt(renderer: &mut Renderer) -> [f64; 2] {
 }
 
 #[test]
-fn leaping_changes_no_bit_of_any_mode() {
+fn empty_space_skipping_changes_no_bit_in_any_mode() {
     let device = Device::new();
     let (mut tried, mut leapt_far) = (0, 0);
     for (g, (name, geometry)) in geometries().iter().enumerate() {

@@ -84,7 +84,7 @@ const OBLIQUE: &str = "picture = { size = [28, 24] }
 
 /// Row: Ra = 0, Rw = 0, single frame, T and F near 180 deg, 1:1000 anisotropy.
 #[test]
-fn probes_at_the_ends_of_what_is_built_are_drawn() {
+fn probes_at_the_limits_of_what_is_built_are_drawn() {
     let device = Device::new();
     let still =
         |probe: Probe| Probe { motion: Motion::Still { thickness: 2.0 }, slices: Axis::centred(1.0, 1), ..probe };
@@ -144,7 +144,7 @@ fn probes_at_the_ends_of_what_is_built_are_drawn() {
 
 /// Row: single line, F = 0, and what has no picture: a clear error at load.
 #[test]
-fn probes_that_place_nothing_are_refused_by_name() {
+fn probes_without_a_valid_geometry_are_refused_by_name() {
     let plain = fan(20.0, 12.0, 2.0, 1.1, 0.6);
     let cases = [
         ("single line", Probe { lines: Axis::centred(0.1, 1), ..plain.clone() }, "scan lines", "at least 2"),
@@ -203,7 +203,7 @@ fn cameras_inside_and_rays_along_faces_see_what_the_reference_sees() {
 
 /// A ray within a face of the box, and one just beside it: Beer's law inside, nothing outside, no number that is none.
 #[test]
-fn a_ray_within_a_face_is_no_number_that_is_none() {
+fn a_ray_within_a_face_gives_no_nan() {
     let device = Device::new();
     let block = Geometry::Cartesian(Grid { size: [20, 20, 20], spacing: [1.0; 3], origin: [0.5; 3] });
     // 40 pixels of 0.5 mm over 20 mm, shifted by half a pixel: some rays run in the faces x = 0 and x = 20 to the last bit.

@@ -115,7 +115,7 @@ fn more_absorption_is_never_less_opaque() {
 
 /// Row: NaN, Inf, denormal and negative samples. (What is counted and stored: `sources`.)
 #[test]
-fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
+fn non_finite_samples_reach_no_pass() {
     let device = Device::new();
     let hostile = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, -1e-42, -3.0, f32::MIN_POSITIVE / 2.0];
     let folder = Folder::new("extremes");
@@ -244,7 +244,7 @@ fn a_light_on_the_surface_itself_gives_finite_colours() {
 
 /// One hit among misses has no neighbour to make a normal from: it is lit, not black, by every light that shines on it.
 #[test]
-fn one_hit_among_misses_is_lit() {
+fn a_single_hit_among_misses_is_lit() {
     let device = Device::new();
     let scene = plate("light = { direction = [0.2, 0.1, 0.9], shadow = {}, occlusion = {} }");
     let one = map(&scene, |x, y| if (x, y) == (120, 77) { 31.5 } else { MISS });

@@ -87,7 +87,7 @@ fn sigma_filters(window: u32, largest: u32, sigma: &str) -> Vec<(String, &'stati
 }
 
 #[test]
-fn a_constant_stays_and_a_hot_pixel_goes() {
+fn filters_keep_a_constant_and_remove_a_hot_pixel() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let size = [21, 15];
@@ -167,7 +167,7 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
 }
 
 #[test]
-fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
+fn no_filter_of_distances_invents_a_surface() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let mut random = Noise(2);
@@ -211,7 +211,7 @@ fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
 }
 
 #[test]
-fn what_no_filter_can_do_is_refused_by_name_and_limit() {
+fn filter_settings_beyond_a_limit_are_refused_by_name_and_limit() {
     for (toml, words) in [
         ("distance = { sigma = { noise = 'multiplicative' } }", ["distance.sigma", "additive"]),
         ("distance = { enhanced_sigma = { noise = 'multiplicative' } }", ["distance.enhanced_sigma", "additive"]),

@@ -58,7 +58,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 #[test]
-fn pictures_match_the_stored_ones_that_the_reference_made() {
+fn pictures_match_the_goldens_of_the_reference() {
     let device = Device::new();
     for (name, scene, frames) in goldens() {
         let expected = as_picture(&reference::render(&scene, &frames)[&Slot::Screen]);

@@ -134,7 +134,7 @@ pub fn volume_of(renderer: &mut Renderer) -> Texels {
 
 /// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
 #[test]
-fn a_whole_volume_is_never_mixed() {
+fn a_complete_volume_never_mixes_frames_of_two() {
     for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
         let playing = Playing::new(queues);
         let device = &playing.device;
@@ -167,7 +167,7 @@ fn a_whole_volume_is_never_mixed() {
 /// Prevents work that grows with time: once all ways of a sweep have been seen, frames and pictures take no memory of the device, no
 /// pipeline and no wait for all of it.
 #[test]
-fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
+fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
     let device = Device::new();
     for (update, toml) in [
         (Update::Whole, "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"),
@@ -194,7 +194,7 @@ fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
 
 /// Prevents rolling volumes that end otherwise than whole ones, and slices that are made anew for no reason.
 #[test]
-fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
+fn a_rolling_volume_shows_each_frame_and_ends_as_the_complete_one() {
     for queues in 1..=3 {
         let playing = Playing::new(queues);
         let device = &playing.device;

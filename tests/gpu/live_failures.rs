@@ -12,7 +12,7 @@ use std::time::Duration;
 
 /// Prevents a stream that stops, or shows anything wrong, for what a source does wrong.
 #[test]
-fn what_is_wrong_is_said_and_left_out() {
+fn faulty_frames_are_reported_and_left_out() {
     let device = Device::new();
     let mut events = events(header(0.0), stamped(1));
     events.insert(0, Event::Frame(stamped(0).remove(0)));
@@ -61,7 +61,7 @@ fn what_is_wrong_is_said_and_left_out() {
 
 /// Prevents settings that reach pictures only with the next volume, or take the stream down.
 #[test]
-fn other_settings_are_drawn_of_the_volume_that_is_there() {
+fn new_settings_are_drawn_from_the_present_volume() {
     let device = Device::new();
     let mut stream =
         stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::Options::default());
@@ -112,7 +112,7 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
 
 /// Prevents volumes that are never whole where some slices are not seen and frames come line by line.
 #[test]
-fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
+fn missing_slices_outside_the_visible_bounds_do_not_make_a_volume_incomplete() {
     let device = Device::new();
     let toml = "mode = 'mip'\nregion = { elevation = [-1, 1], depth = [30, 50] }";
     let lines = |frame: Frame| {
@@ -131,7 +131,7 @@ fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
 
 /// Prevents slices that went through stage 1 as it was before from being shown beside those after, as one whole volume.
 #[test]
-fn settings_that_need_frames_again_show_whole_volumes_only() {
+fn settings_that_need_new_frames_show_complete_volumes_only() {
     let device = Device::new();
     for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
         let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));

@@ -93,7 +93,7 @@ type Change = fn(&mut Scene);
 
 /// What a change may touch: the names of the passes from which on everything that reads runs again.
 #[test]
-fn in_every_mode_a_change_runs_again_what_it_touches() {
+fn in_every_mode_a_change_reruns_only_the_affected_passes() {
     let device = Device::new();
     for (mode, passes, _) in MODES {
         let base = of(mode);

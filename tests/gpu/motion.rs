@@ -218,7 +218,7 @@ fn a_ball_swept_both_ways_does_not_move() {
 
 /// The phantom's ball, swept forth and back with the motor moving: the two distance maps, in one view.
 #[test]
-fn the_phantom_stands_still_between_sweeps_forth_and_back() {
+fn the_phantom_does_not_move_between_forward_and_backward_sweeps() {
     use echolume::source::phantom::{Body, Options as Made, Phantom, Truth};
     let device = Device::new();
     let made =

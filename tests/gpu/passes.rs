@@ -35,7 +35,7 @@ fn every_pass_matches_its_reference() {
 
 /// How texels are read may cost time, never a bit: every pass that reads some, in every format and variant that the scenes have.
 #[test]
-fn texels_loaded_are_the_texels_fetched() {
+fn storage_loads_and_texture_fetches_give_the_same_texels() {
     let device = Device::new();
     let ways = [Fetch::Textures, Fetch::Storage];
     let mut singles = ways.map(|fetch| PassRunner::fetching(&device, fetch).expect("single"));
@@ -92,7 +92,7 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
 }
 
 #[test]
-fn what_measures_the_device_computes_what_it_says() {
+fn device_measurements_compute_the_stated_result() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
     for fetch in [Fetch::Textures, Fetch::Storage] {
@@ -161,7 +161,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
 }
 
 #[test]
-fn what_is_outside_the_sector_is_not_touched() {
+fn texels_outside_the_sector_are_not_written() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");

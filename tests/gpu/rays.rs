@@ -125,7 +125,7 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
 
 /// A thin opaque layer of the transfer function, which long steps jump over.
 #[test]
-fn pre_integration_sees_a_layer_that_long_steps_jump_over() {
+fn pre_integration_finds_a_layer_that_long_steps_miss() {
     let device = Device::new();
     let opacity = |step: f64, compositing: &str| {
         let toml = format!(
@@ -159,7 +159,7 @@ fn opacity_of_thick(device: &Device) -> f64 {
 
 /// Through an even medium, opacity h is reached after -ln(1 - h) / kappa, and a veil is what lies before the surface.
 #[test]
-fn a_hit_lies_where_the_ray_is_opaque_enough_and_a_veil_ends_at_the_surface() {
+fn a_hit_is_where_opacity_reaches_the_threshold_and_the_volume_layer_ends_there() {
     let device = Device::new();
     for step in [0.07, 0.5, 1.5] {
         let toml = format!(
@@ -216,7 +216,7 @@ fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
 
 /// Start depths belong to what they are said of: the surface's leaves the veil and the planes beside it whole.
 #[test]
-fn a_start_depth_cuts_only_what_it_belongs_to() {
+fn a_start_depth_cuts_only_its_own_mode() {
     let device = Device::new();
     let body = |p: DVec3| if p.y < 3.0 { 0.8 } else { ((p.y - 7.0) / 0.8 + 0.5).clamp(0.1, 0.9) };
     let toml = |more: &str| {

@@ -26,7 +26,7 @@ fn drawn(device: &Device) -> Renderer {
 }
 
 #[test]
-fn a_change_runs_again_what_it_touches_and_nothing_else() {
+fn a_change_reruns_only_the_affected_passes() {
     let device = Device::new();
     let mut renderer = drawn(&device);
     let picture = renderer.picture().expect("picture");
@@ -192,7 +192,7 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
 
 /// The layer sees a missing barrier between a writer and a reader (not between two writers: that is the oracle's).
 #[test]
-fn a_dropped_barrier_is_seen_by_synchronization_validation() {
+fn synchronization_validation_reports_a_dropped_barrier() {
     let recorded = drawn(&Device::new()).barriers();
     assert!(recorded > 20, "{recorded}");
     let mut seen = 0;

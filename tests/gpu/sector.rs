@@ -6,7 +6,7 @@ use echolume::probe::Geometry;
 
 /// Beyond the rim is nothing, and no filter may see it: pixels take the nearest sample as far out as the filters reach.
 #[test]
-fn no_filter_draws_the_rim_of_the_sector_towards_nothing() {
+fn no_filter_blends_the_sector_border_with_the_outside() {
     let device = Device::new();
     for (filters, tolerance) in [
         ("median = true, sigma = { window = 9, sigma = inf }", 0.0),
@@ -76,7 +76,7 @@ fn ripple(device: &Device, slices: &str) -> f64 {
 
 /// Thesis Fig. 32, 33.
 #[test]
-fn a_slight_blur_takes_away_wood_grain() {
+fn a_slight_blur_removes_wood_grain_artefacts() {
     let device = Device::new();
     let [plain, blurred, three, five] =
         ["", "blur = true", "smooth = { kernel = 3 }", "smooth = { kernel = 5 }"].map(|slices| ripple(&device, slices));

@@ -17,7 +17,7 @@ fn told(caught: &Caught) {
 
 /// Prevents that everything is called caught.
 #[test]
-fn a_fault_without_effect_is_reported_as_uncaught() {
+fn an_injected_fault_without_effect_is_reported_as_uncaught() {
     let faults = [
         InjectedFault {
             name: "nowhere",

@@ -177,7 +177,7 @@ fn no_light_and_no_map_gives_anything_but_finite_colours() {
 }
 
 #[test]
-fn of_several_surfaces_the_one_that_was_asked_for_is_taken() {
+fn the_requested_surface_of_several_is_taken() {
     let device = Device::new();
     let block = Geometry::Cartesian(Grid { size: [12, 160, 12], spacing: [0.25; 3], origin: [0.0; 3] });
     let walls = [8.0, 17.0, 29.0];

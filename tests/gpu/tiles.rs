@@ -120,7 +120,7 @@ fn flat_modes_have_no_ray_no_transfer_and_no_distance_map() {
 }
 
 #[test]
-fn a_plane_that_moves_runs_again_alone() {
+fn only_a_moved_plane_runs_again() {
     let device = Device::new();
     let with = |toml: &str| {
         scene(
@@ -159,7 +159,7 @@ fn a_plane_that_moves_runs_again_alone() {
 
 /// Prevents planes that look otherwise for being toned at once: by more than the rounding of floats of 16 bits, one level.
 #[test]
-fn planes_that_are_toned_at_once_are_those_that_are_toned_after() {
+fn planes_toned_together_equal_planes_toned_afterwards() {
     let device = Device::new();
     let tone = "gamma = 1.4, contrast = 1.3, brightness = 0.05";
     for toml in [

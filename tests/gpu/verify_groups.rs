@@ -55,7 +55,7 @@ fn spans(first: [f64; 2], second: [f64; 2]) -> Vec<Span> {
 
 /// A program that says something else than this one, or nothing, or is not there.
 #[test]
-fn other_bits_of_another_number_of_threads_are_seen() {
+fn a_result_that_depends_on_the_number_of_threads_is_detected() {
     let mut bench = bench();
     if !bench.context.candidate.name.contains("llvmpipe") {
         return;
@@ -85,7 +85,7 @@ fn other_bits_of_another_number_of_threads_are_seen() {
 }
 
 #[test]
-fn a_picture_that_differs_by_one_bit_is_seen() {
+fn a_picture_that_differs_by_one_bit_is_detected() {
     let mut bench = bench();
     let modes = bench.modes().expect("pictures");
     let mut other = modes[3].picture.clone();
@@ -99,14 +99,14 @@ fn a_picture_that_differs_by_one_bit_is_seen() {
 
 /// A pass that is left out leaves its output as it was: zeros, that look like a dark picture.
 #[test]
-fn an_output_that_is_not_written_is_seen() {
+fn an_output_that_is_not_written_is_detected() {
     let mut bench = prepared(Some(|context| context.faults.slow_down("light", 0)));
     let seen = failures(&mut bench, &named(verify::poison::checks(Level::Quick), "every mode on poisoned memory"));
     assert!(seen.iter().any(|fault| fault.contains("'picture' are never written")), "{seen:?}");
 }
 
 #[test]
-fn memory_that_is_not_given_back_is_seen() {
+fn leaked_memory_is_detected() {
     let context: Arc<Context> = bench().context.clone();
     let before = context.allocated();
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }");
@@ -121,7 +121,7 @@ fn memory_that_is_not_given_back_is_seen() {
 
 /// A volume that lies half a voxel aside.
 #[test]
-fn a_picture_that_is_not_the_reference_s_is_seen() {
+fn a_picture_unlike_the_reference_is_detected() {
     use verify::formats::{Largest, reference};
     let bench = bench();
     let scene = scene(
@@ -142,7 +142,7 @@ fn a_picture_that_is_not_the_reference_s_is_seen() {
 
 /// Each volume is sent into the image that is drawn, and not into the other.
 #[test]
-fn two_volumes_in_one_image_are_seen() {
+fn two_volumes_in_one_image_are_detected() {
     let bench = bench();
     let mut found = Found::default();
     let into_the_same = |round: usize| round as u32 % 2;
@@ -153,7 +153,7 @@ fn two_volumes_in_one_image_are_seen() {
 
 /// What is planted here is seen by the known answers; each that fails has pictures of one size that differ.
 #[test]
-fn a_known_answer_that_is_another_is_shown() {
+fn a_wrong_known_answer_is_shown() {
     let sound = bench();
     for planted in verify::self_test::faults().filter(|p| ["stale slice", "shifted half pixel"].contains(&p.name)) {
         let mut bench = sound.planted(planted.change).expect("bench");
@@ -177,7 +177,7 @@ fn a_known_answer_that_is_another_is_shown() {
 
 /// A tile of a picture is less than one in a hundred of its values: of all of them 2 may be far off, of a tile's half.
 #[test]
-fn one_lost_workgroup_of_a_picture_is_seen() {
+fn one_lost_workgroup_is_detected() {
     let grey = Picture { width: 80, height: 64, rgba: vec![128; 4 * 80 * 64] };
     let judged = |first: u32, size: [u32; 2]| {
         let (mut found, mut got) = (Found::default(), grey.clone());
@@ -195,7 +195,7 @@ fn one_lost_workgroup_of_a_picture_is_seen() {
 }
 
 #[test]
-fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
+fn impossible_time_stamps_are_detected() {
     use verify::stamps::looked_at;
     let [share, outside] = looked_at(&spans([2000.0, 8000.0], [8000.0, 10_000.0])).expect("sane");
     assert!((share - 0.8).abs() < 1e-9 && outside == 0.0);
@@ -212,7 +212,7 @@ fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
 
 /// A frame of something else arrives before each picture.
 #[test]
-fn a_renderer_that_draws_otherwise_than_a_fresh_one_is_seen_by_the_stress() {
+fn a_renderer_unlike_a_fresh_one_is_detected_by_the_stress_check() {
     let spoil = |renderer: &mut Renderer, image: u32| {
         let frame = vec![200; renderer.frame_bytes()];
         renderer.frame(4, &frame, image)

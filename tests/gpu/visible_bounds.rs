@@ -113,7 +113,7 @@ fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
 }
 
 #[test]
-fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
+fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
     let mut noise = Noise(17);
     for (name, geometry) in geometries() {
         let (mut shares, mut cases) = (0.0, 0);
@@ -218,7 +218,7 @@ fn speckle(scene: &Scene) -> Vec<Texels> {
 }
 
 #[test]
-fn the_picture_is_that_of_a_volume_filtered_whole() {
+fn the_picture_equals_that_of_the_completely_filtered_volume() {
     let device = Device::new();
     let mut smallest = 1.0f64;
     for (g, (name, geometry)) in geometries().iter().enumerate() {
@@ -262,7 +262,7 @@ fn with(window: &str, slices: &str) -> Scene {
 }
 
 #[test]
-fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
+fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
     let device = Device::new();
     let smooth = ", median = true, smooth = { lateral = 1.0, elevation = 0.3 }";
     let scene = with("region = { lateral = [-4, 6], depth = [20, 30], elevation = [4, 9] }", smooth);

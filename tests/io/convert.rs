@@ -39,7 +39,7 @@ fn filled(probe: &Probe) -> Volume {
 }
 
 #[test]
-fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
+fn converted_voxels_have_the_fields_value_and_none_outside_the_sector() {
     let probe = probe();
     let volume = filled(&probe);
     let (mut inside, mut outside, mut worst) = (0, 0, 0.0f64);
@@ -71,7 +71,7 @@ fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
 }
 
 #[test]
-fn what_is_written_is_read_back_voxel_by_voxel() {
+fn a_written_volume_is_read_back_voxel_by_voxel() {
     let folder = Folder::new("round");
     let volume = filled(&probe());
     let grid = lattice(&Geometry::Sweep(probe()), 1.7).expect("a lattice");

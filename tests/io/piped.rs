@@ -172,7 +172,7 @@ fn the_probe_file_that_is_given_goes_before_the_stream() {
 }
 
 #[test]
-fn no_first_line_is_taken_for_what_it_is_not() {
+fn wrong_first_lines_are_refused_by_name() {
     let huge = 1u64 << 60;
     let mut unknown = probe();
     unknown["array"]["radus_mm"] = json!(1);
@@ -267,7 +267,7 @@ impl Read for Endless {
 }
 
 #[test]
-fn what_is_not_taken_does_not_pile_up() {
+fn unread_frames_do_not_accumulate() {
     for changes in [json!({"samples": 512, "lines": 256}), json!({"samples": 512, "lines": 256, "lines_at_once": 1})] {
         let came = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let start = Cursor::new(stream(&changed(changes), &[]));

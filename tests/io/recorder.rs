@@ -149,7 +149,7 @@ fn a_damaged_frame_hides_no_other() {
 }
 
 #[test]
-fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
+fn foreign_frames_are_refused_and_nothing_is_overwritten() {
     let folder = Folder::new("refused");
     let path = folder.join("sweep.frames");
     let mut writer = Writer::create(&path, header()).expect("made");
@@ -195,7 +195,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn no_bytes_are_met_with_a_panic(changes in prop::collection::vec((0usize..5000, any::<u8>()), 0..12), cut in 0usize..5000) {
+    fn no_bytes_cause_a_panic(changes in prop::collection::vec((0usize..5000, any::<u8>()), 0..12), cut in 0usize..5000) {
         let folder = Folder::new(&format!("any-{:?}", std::thread::current().id()));
         let path = folder.join("any.frames");
         let _ = std::fs::remove_file(&path);

@@ -141,7 +141,7 @@ fn run(name: &str, file: &Path) -> ExitStatus {
 }
 
 #[test]
-fn whoever_holds_a_signal_is_told_and_nobody_else_stops_it() {
+fn a_signal_reaches_its_holder_and_otherwise_ends_the_process() {
     let folder = Folder::new("signals");
     for (name, _, ends) in CASES {
         let file = folder.join("file");

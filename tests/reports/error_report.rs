@@ -73,7 +73,7 @@ fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
 
 /// A picture of the device's own as reference says how far it is from where it would go.
 #[test]
-fn a_converged_reference_tells_its_own_error() {
+fn a_converged_reference_states_its_own_error() {
     let _alone = alone();
     let report = report(&[], &["rays", "lut", "adaptive"], Held::Converged);
     for dial in &report.dials {

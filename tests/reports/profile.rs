@@ -17,7 +17,7 @@ fn asked(repeats: usize) -> Asked {
 }
 
 #[test]
-fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
+fn an_injected_slow_pass_is_found_and_no_other_pass_blamed_as_much() {
     let _alone = alone();
     let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
     slow.faults.slow_down("median_distance", 6);
@@ -70,7 +70,7 @@ fn identical_runs_are_hardly_ever_called_different() {
 
 /// What is written down is what was measured, whole and on one clock.
 #[test]
-fn a_profile_adds_up_and_survives_being_written() {
+fn a_profile_is_consistent_and_round_trips() {
     let _alone = alone();
     let context = device();
     let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
@@ -118,7 +118,7 @@ fn a_profile_adds_up_and_survives_being_written() {
 
 /// The picture alone, from another angle each time: what the camera changes runs again and nothing before it.
 #[test]
-fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
+fn a_rotating_view_reruns_the_picture_and_not_the_frames() {
     let _alone = alone();
     let context = device();
     let turning = Asked { still: true, turn: 170.0, ..asked(3) };

@@ -107,7 +107,7 @@ fn check(scene: &Scene, shares: &[[f64; 3]]) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
-    fn every_place_looks_at_what_its_brick_reaches(
+    fn every_point_samples_only_within_its_bricks_reach(
         probe in probes(),
         brick in prop_oneof![Just(4u32), Just(7), Just(16)],
         pixels in 24..90u32,
@@ -145,7 +145,7 @@ fn bricks_of_a_wobbler_and_of_a_cartesian_volume_are_tight() {
 }
 
 #[test]
-fn a_scene_whose_places_f32_cannot_tell_apart_takes_every_sample() {
+fn empty_space_skipping_is_off_where_f32_cannot_resolve_positions() {
     let grid = Grid { size: [64, 64, 64], spacing: [1e-3; 3], origin: [900.0, 0.0, 0.0] };
     assert!(!scene(Geometry::Cartesian(grid), 8, 64).skips());
     let grid = Grid { size: [64, 64, 64], spacing: [1.0, 1.0, 1e-3], origin: [0.0; 3] };

@@ -105,7 +105,7 @@ fn what_cannot_be_compared_is_refused_by_name() {
 }
 
 #[test]
-fn distances_are_compared_where_both_hit_and_the_rest_is_counted() {
+fn distances_are_compared_where_both_hit_and_misses_are_counted() {
     let a = texels(5, 1, &[10.0, 12.0, MISS, 7.0, MISS]);
     let b = texels(5, 1, &[10.5, 11.0, 3.0, MISS, MISS]);
     let e = distances(&a, &b).expect("comparable");
@@ -218,7 +218,7 @@ fn what_cannot_be_reached_names_the_nearest() {
 }
 
 #[test]
-fn dials_of_one_setting_are_not_turned_together() {
+fn dials_of_one_setting_are_not_combined() {
     let sigma = vec![point("none", &[], 0.0, 0.05, 10.0), point("7", &["filter.sigma.window=7"], 7.0, 0.01, 12.0)];
     let median = vec![point("none", &[], 0.0, 0.04, 10.0), point("on", &["filter.sigma=off"], 1.0, 0.01, 11.0)];
     let other = vec![point("none", &[], 0.0, 0.03, 10.0), point("on", &["filter.sigmas=1"], 1.0, 0.0, 11.0)];
@@ -312,7 +312,7 @@ fn crowded() -> Report {
 }
 
 #[test]
-fn plots_show_every_dial_and_the_letters_are_drawn() {
+fn plots_show_every_dial_with_its_text() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     for (name, shown) in [("small", small()), ("crowded", crowded())] {
         let svg = plot::svg(&shown, Measure::Rmse, [1200, 800]).expect("a plot");

@@ -301,7 +301,7 @@ fn no_unusable_frame_changes_the_volume_or_goes_uncounted() {
 }
 
 #[test]
-fn what_is_clipped_off_is_not_compounded() {
+fn clipped_pixels_are_not_compounded() {
     let grid = grid([4, 4, 1], 1.0);
     for (clip, expected) in [
         ([1, 2, 2, 1], Some(vec![9, 10])),
@@ -394,7 +394,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_pose_is_met_with_a_panic(
+    fn no_pose_causes_a_panic(
         numbers in prop::collection::vec(prop_oneof![-20.0..20.0f64, any::<f64>()], 24),
         size in prop::array::uniform2(0usize..9),
         clip in prop::option::of(prop::array::uniform4(0usize..9)),

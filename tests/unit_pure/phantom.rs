@@ -43,7 +43,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
-fn the_number_of_threads_does_not_show() {
+fn the_number_of_threads_changes_no_byte() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| bytes(small(Body::Head)))
@@ -222,7 +222,7 @@ fn every_second_volume_goes_backwards() {
 }
 
 #[test]
-fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
+fn impossible_sweeps_and_files_are_refused_in_one_line() {
     let ok = small(Body::Sphere);
     let wrong = [
         (Options { volumes: 0, ..ok.clone() }, "volumes"),

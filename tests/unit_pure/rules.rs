@@ -40,7 +40,7 @@ fn code(text: &str) -> String {
 }
 
 #[test]
-fn layers_hold() {
+fn no_layer_uses_a_layer_above_it() {
     // A folder or file, and what it must not name.
     let rules: &[(&str, &[&str])] = &[
         ("src/scene", &["crate::gpu", "crate::passes", "crate::plan", "crate::barriers", "ash::vk"]),
@@ -130,7 +130,7 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
 
 /// What `tools/mutants` makes a crate of is a crate: nothing in it names a module that it leaves behind.
 #[test]
-fn what_mutants_are_planted_in_stands_alone() {
+fn the_crate_of_tools_mutants_is_complete() {
     let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");
     let list = tool.split("\npure=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its list");
     let copied: Vec<String> = list.split_whitespace().map(|path| format!("src/{path}")).collect();
@@ -267,7 +267,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
 }
 
 #[test]
-fn a_disagreement_names_both_sides() {
+fn an_interface_mismatch_names_both_sides() {
     let scene = scenes().swap_remove(1);
     let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone.plain").unwrap())).unwrap();
     let tone = echolume::passes::by_name("tone").unwrap();

@@ -60,7 +60,7 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
 }
 
 #[test]
-fn help_and_times_come_over_the_picture_and_go() {
+fn help_and_times_overlay_the_picture_and_disappear() {
     let desk = Desk::new(false);
     let view = open(&desk);
     let (_, size) = picture();
@@ -83,7 +83,7 @@ fn help_and_times_come_over_the_picture_and_go() {
 }
 
 #[test]
-fn a_picture_and_a_loop_are_saved_under_names_that_say_nothing_of_anybody() {
+fn saved_pictures_and_loops_have_names_without_patient_data() {
     let desk = Desk::new(false);
     let folder = Folder::new("saved");
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);

@@ -46,7 +46,7 @@ fn a_window_that_is_resized_shows_a_picture_of_its_size() {
 }
 
 #[test]
-fn a_window_at_rest_dispatches_nothing() {
+fn an_idle_window_dispatches_nothing() {
     let desk = Desk::new(false);
     let view = desk.view(&["--no-ui", "--size", "200x160", "--source", SWEEP]);
     view.shows(&headless([200, 160], &[]), "the picture");

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn ratios_of_regions_are_those_of_the_files() {
+fn figures_of_regions_equal_those_of_the_files() {
     let folder = Folder::new("ratios");
     let picture = |x: u32, y: u32| noise(x, y) / if x < 32 { 4 } else { 2 } + if x < 32 { 40_000 } else { 1000 };
     let file = folder.write("in.pgm", pgm(64, 48, true, picture));
@@ -45,7 +45,7 @@ fn ratios_of_regions_are_those_of_the_files() {
 
 /// Every filter of the command line, against the f64 reference of the same slice.
 #[test]
-fn every_filter_by_its_name_is_the_one_of_the_settings() {
+fn every_filter_name_gives_the_filter_of_the_settings() {
     let folder = Folder::new("names");
     let file =
         folder.write("in.pgm", pgm(45, 37, true, |x, y| 20_000 + noise(x, y) / 8 + if x > 20 { 20_000 } else { 0 }));

@@ -79,7 +79,7 @@ fn a_gaussian_spreads_a_point_by_its_kernel() {
 }
 
 #[test]
-fn colours_become_grey_by_rec_709_and_that_is_said() {
+fn colours_become_grey_by_rec_709_with_a_note() {
     let folder = Folder::new("colour");
     let ppm = [b"P6 4 1 255\n".as_slice(), &[255, 0, 0, 0, 255, 0, 0, 0, 255, 77, 77, 77]].concat();
     let file = folder.write("in.ppm", ppm);

@@ -6,7 +6,7 @@ use echolume::gpu::faults::Seam;
 
 /// Prevents a console that ends with its probe, or needs to be told that it is back.
 #[test]
-fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
+fn a_lost_source_is_awaited_and_the_picture_stays() {
     let device = Device::new();
     let sources = Arc::new(Mutex::new(Vec::new()));
     let mut options = options();
@@ -65,7 +65,7 @@ fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
 
 /// Prevents a console that goes down with its device, or shows something else on the next one.
 #[test]
-fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
+fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
     for (seam, is_frozen) in [(Seam::Submit, true), (Seam::Submit, false), (Seam::Wait, true)] {
         let (device, other) = (Device::new(), Device::new());
         let mut desk = Desk::new(&device, options());
@@ -95,7 +95,7 @@ fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
 
 /// Prevents a console that is black for ever because memory ran out at the wrong moment.
 #[test]
-fn memory_that_runs_out_anywhere_is_got_over() {
+fn running_out_of_memory_anywhere_is_recovered() {
     let device = Device::new();
     let mut reached = 0;
     for n in (0..60).step_by(8) {

@@ -104,7 +104,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
 
 /// Prevents a picture that is saved other than it is seen, and a loop that lacks a frame.
 #[test]
-fn what_is_saved_is_what_is_seen_and_kept() {
+fn exported_files_are_what_was_shown_and_recorded() {
     let (device, folder) = (Device::new(), Folder::new("saved"));
     let mut desk = Desk::new(&device, Options { folder: folder.0.clone(), ..options() });
     // Nothing to save yet is no fault of anything.
@@ -134,7 +134,7 @@ fn what_is_saved_is_what_is_seen_and_kept() {
 
 /// Prevents panels that keep the picture from being what the settings say, where they lie beside it.
 #[test]
-fn panels_take_room_and_nothing_else() {
+fn panels_take_space_and_change_nothing_else() {
     let device = Device::new();
     let mut desk = Desk::new(&device, Options { panels: true, scale: 0.5, ..options() });
     desk.begin();

@@ -4,7 +4,7 @@ use super::*;
 
 /// Prevents a kiosk that runs hot all night: nothing is dispatched and nobody woken for a picture that stands still.
 #[test]
-fn a_console_at_rest_does_nothing_and_wants_nothing() {
+fn an_idle_console_dispatches_nothing_and_asks_for_no_wake_up() {
     let device = Device::new();
     for (overlay, panels, hud) in [(true, false, false), (false, false, false), (true, true, true)] {
         let mut desk = Desk::new(&device, Options { overlay, panels, scale: 0.5, ..options() });
@@ -42,7 +42,7 @@ fn a_console_at_rest_does_nothing_and_wants_nothing() {
 
 /// Prevents a view that stays coarse, and one that is slow under a hand for being fine.
 #[test]
-fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() {
+fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
     let device = Device::new();
     let mut settings = plain();
     settings.light.shadow = Some(Default::default());

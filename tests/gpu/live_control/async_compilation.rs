@@ -21,7 +21,7 @@ fn waking() -> (Arc<AtomicU64>, live::Options) {
 
 /// Prevents a view that stands still while shaders compile, whichever way the volumes are swept that come meanwhile.
 #[test]
-fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
+fn a_new_mode_compiles_in_the_background_while_pictures_continue() {
     // What is expected is drawn elsewhere, so that every pipeline here is the stream's.
     let (device, plain) = (Device::new(), Device::new());
     let (woken, options) = waking();
@@ -60,7 +60,7 @@ fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
 
 /// Prevents a stream that ends, or goes black, for settings that are beyond the device; and that they come back with another device.
 #[test]
-fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
+fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
     let (device, other) = (Device::new(), Device::new());
     let (_, options) = waking();
     let toml = "mode = 'mip'";
@@ -99,7 +99,7 @@ fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
 
 /// Prevents a stream that never draws again because memory ran out once, wherever that was: what was drawn before is drawn anew.
 #[test]
-fn memory_that_runs_out_while_settings_change_costs_the_settings_and_not_the_stream() {
+fn running_out_of_memory_rejects_the_settings_and_keeps_the_stream() {
     let (device, plain) = (Device::new(), Device::new());
     let (before, after) = ("mode = 'mip'", "mode = 'sr'\nslices.median = true");
     let (old, new) = (of(&plain, before, 1), of(&plain, after, 1));

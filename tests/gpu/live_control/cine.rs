@@ -6,7 +6,7 @@ use echolume::source::recorder::Replay;
 /// Prevents a frozen picture that changes, work for frames that nobody sees, a recording with a gap, and a volume of which the first
 /// frames came while frozen from being shown as if it were whole.
 #[test]
-fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
+fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let folder = Folder::new("frozen");
@@ -39,7 +39,7 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
 
 /// Prevents a look back at something else than what was seen, volumes that are counted twice, and a place that points at another volume.
 #[test]
-fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
+fn a_replayed_volume_is_identical_to_the_live_picture() {
     let device = Device::new();
     for (update, toml) in [
         (Update::Whole, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
@@ -70,7 +70,7 @@ fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
 
 /// Prevents a look back that tears the volume that is arriving meanwhile, or is torn by it, with no image to spare and with one.
 #[test]
-fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
+fn cine_replay_and_arriving_frames_do_not_mix() {
     let device = Device::new();
     let toml = "mode = 'mip'\nslices.everything = true";
     for images in [2, 3] {
@@ -100,7 +100,7 @@ fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
 
 /// Prevents frozen pictures of which a part is of the settings before, and frames that are sent again for nothing.
 #[test]
-fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
+fn settings_changed_while_frozen_redraw_the_same_volume() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
@@ -140,7 +140,7 @@ fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
 /// Prevents a volume of slices with and without a filter, where settings change twice before it has come again; and that another
 /// volume is shown than the one that was asked for last.
 #[test]
-fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginning() {
+fn settings_changed_during_a_replay_restart_the_replay() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         for asked in [None, Some(0)] {
@@ -173,7 +173,7 @@ fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginni
 
 /// Prevents a stream that waits for ever for frames that nobody kept.
 #[test]
-fn without_a_cine_loop_other_settings_wait_for_the_next_volume_and_nothing_else_does() {
+fn without_a_cine_loop_only_changed_settings_wait_for_the_next_volume() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let options = live::Options { update, ..live::Options::default() };

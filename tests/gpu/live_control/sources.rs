@@ -15,7 +15,7 @@ fn other() -> (Header, Vec<Frame>) {
 
 /// Prevents a source that is taken for late because it counts from nought, and volumes of two sources that are taken for one another.
 #[test]
-fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() {
+fn a_new_source_that_counts_from_zero_continues_with_its_own_volumes() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
@@ -78,7 +78,7 @@ fn a_frozen_volume_outlives_its_device() {
 
 /// Prevents what is looked at from vanishing because a cable was changed, and a probe that is never shown.
 #[test]
-fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
+fn a_geometry_change_while_frozen_waits_until_the_stream_resumes() {
     let device = Device::new();
     let mut bench = Bench::new(&device, "mode = 'mip'", kept(Update::Whole));
     bench.begin(header(0.3));
@@ -108,7 +108,7 @@ fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
 
 /// Prevents a device that runs hot for a picture that stands still.
 #[test]
-fn a_stream_that_has_nothing_to_do_says_so_and_does_nothing() {
+fn an_idle_stream_reports_it_and_does_nothing() {
     let device = Device::new();
     let mut bench = Bench::new(&device, "mode = 'sr'", kept(Update::Whole));
     assert!(bench.stream.is_idle(), "before anything came");

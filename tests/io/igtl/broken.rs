@@ -126,7 +126,7 @@ fn bodies_that_cannot_be_true_are_refused_by_name() {
 }
 
 #[test]
-fn a_peer_cannot_break_the_line_or_drive_the_terminal() {
+fn a_peer_cannot_break_lines_or_control_the_terminal() {
     let mut bytes = raw(1, "TRANS\n\x1b[2J", &[0; 47]);
     bytes[14..20].copy_from_slice(b"\r\n\x1b[2J");
     bytes[1] = 9;

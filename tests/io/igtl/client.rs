@@ -177,7 +177,7 @@ fn the_queue_is_bounded_in_bytes_as_well() {
 }
 
 #[test]
-fn a_peer_that_stands_still_is_given_up() {
+fn a_stalled_peer_is_given_up() {
     let half = stored("Image_Motor_v1.bin")[..90].to_vec();
     let whole = bytes(&transform("Probe", 1.0, 1.0));
     let scripts = vec![send_and_stay(half), send_and_stay(whole.clone()), send_and_stay(whole)];

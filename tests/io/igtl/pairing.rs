@@ -25,7 +25,7 @@ fn push_all(pairing: &mut Pairing, messages: Vec<Message>) -> Vec<Paired> {
 }
 
 #[test]
-fn a_pose_of_the_same_time_is_taken_as_it_is_in_either_order() {
+fn a_pose_of_the_same_time_is_taken_unchanged_in_either_order() {
     for first in [true, false] {
         let mut messages = vec![transform("Probe", 10.0, 7.0), frame(10.0)];
         if !first {
@@ -52,7 +52,7 @@ fn between_two_poses_both_parts_are_interpolated() {
 }
 
 #[test]
-fn the_turn_takes_the_shorter_way() {
+fn rotations_are_interpolated_the_shorter_way() {
     let messages = vec![turned("P", 1.0, 3.0, 0.0), frame(1.02), turned("P", 1.04, -3.0, 0.0)];
     let paired = push_all(&mut pairing(None), messages);
     assert!(paired[0].pose.matrix3.x_axis.x < -0.999_999, "{}", paired[0].pose);
@@ -95,7 +95,7 @@ fn poses_of_two_devices_are_not_mixed() {
 }
 
 #[test]
-fn a_matrix_that_is_no_rotation_is_not_turned() {
+fn a_matrix_without_a_rotation_is_not_interpolated() {
     let scaled = Transform { device: "P".into(), time: 1.0, matrix: IDENTITY.map(|row| row.map(|v| v * 2.0)) };
     let messages = vec![Message::Transform(scaled), frame(1.01), transform("P", 1.04, 2.0)];
     let paired = push_all(&mut pairing(None), messages);

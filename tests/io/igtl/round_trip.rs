@@ -78,7 +78,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_message_survives_the_way_there_and_back(message in message(), second in any::<bool>(), more in vec(any::<u8>(), 0..70)) {
+    fn every_message_round_trips(message in message(), second in any::<bool>(), more in vec(any::<u8>(), 0..70)) {
         let bytes = encode(&message, if second { Version::V2 } else { Version::V1 }).unwrap();
         prop_assert_eq!(&whole(&bytes), &message);
         // What stands behind it is the next one's.
@@ -120,7 +120,7 @@ fn the_two_coordinate_systems_are_half_a_turn_apart() {
 }
 
 #[test]
-fn what_the_format_cannot_hold_is_not_written() {
+fn values_beyond_the_format_are_refused() {
     let error = |message| encode(&message, Version::V1).unwrap_err().to_string();
     for (time, said) in [(-1.0, "-1 s"), (f64::NAN, "NaN s"), (4_294_967_296.0, "4294967296 s")] {
         assert!(error(transform("a", time, 0.0)).contains(&format!("time stamp: is {said}")));

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const SWEEP: Sweep = Sweep { angle: 24.0, rate: 4.0, volumes: Some(3) };
 
 #[test]
-fn status_tells_what_is_there_and_moves_nothing() {
+fn status_describes_the_module_and_moves_nothing() {
     let simulator = simulated(None);
     let status = Drive::open(&settings(&simulator, 2000), &table()).expect("opened").status().expect("answered");
     assert_eq!(status.module, "TMCM-1140 firmware 1.16");
@@ -144,7 +144,7 @@ fn the_watchdog_is_written_only_when_it_differs_and_only_where_there_is_one() {
 }
 
 #[test]
-fn what_moves_is_sent_once_and_what_asks_again() {
+fn moving_requests_are_sent_once_and_queries_are_repeated() {
     let simulator = simulated(Some("mute@0"));
     let mut drive = Drive::open(&settings(&simulator, 300), &table()).expect("opened");
     drive.home().expect("home");

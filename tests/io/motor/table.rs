@@ -26,7 +26,7 @@ proptest! {
 }
 
 #[test]
-fn a_degree_is_what_steps_and_gear_make_of_it() {
+fn steps_per_degree_follow_from_steps_and_gear() {
     let table = table();
     // 200 full steps of 16 microsteps, 12 turns for one.
     assert!((table.steps_per_degree() - 200.0 * 16.0 * 12.0 / 360.0).abs() < 1e-9);
@@ -135,7 +135,7 @@ fn frames_get_the_angle_and_direction_of_their_time() {
 }
 
 #[test]
-fn what_was_not_seen_has_no_angle() {
+fn times_outside_the_track_have_no_angle() {
     let at = |time, angle| Position { time, angle, direction: Direction::Forward, pass: 0 };
     let track = Track::new(vec![at(1.0, 0.0), at(1.05, 1.0), at(3.0, 2.0), at(3.05, 2.0)], 0.1).expect("in order");
     for time in [0.9, 3.1, 2.0, f64::NAN, f64::INFINITY] {

@@ -43,7 +43,7 @@ fn replies_are_read_out_of_the_bytes_of_the_manuals() {
 }
 
 #[test]
-fn only_what_does_no_harm_twice_is_sent_twice() {
+fn only_idempotent_requests_are_sent_twice() {
     let all = [
         Request::rotate_right(1, 0, 1),
         Request::rotate_left(1, 0, 1),

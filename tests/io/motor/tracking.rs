@@ -140,7 +140,7 @@ fn hold_against_the_truth(frames: &[Frame], filled: u64) {
 }
 
 #[test]
-fn volumes_come_out_whole_with_the_slices_and_directions_of_the_array() {
+fn volumes_are_complete_with_the_slices_and_directions_of_the_array() {
     let one = |pieces: bool, clock: Clock| {
         let simulator = Arc::new(simulated(None));
         let mut swept = swept(&simulator, Free { pieces, ..Free::new(&simulator) }, clock);
@@ -201,7 +201,7 @@ fn dropping_the_source_stops_the_motor_while_it_looks_for_home_too() {
 }
 
 #[test]
-fn what_the_motor_cannot_place_is_told_at_once() {
+fn frames_without_a_motor_position_are_reported_at_once() {
     let simulator = Arc::new(simulated(None));
     for (motion, named) in
         [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be whole")]
@@ -220,7 +220,7 @@ fn what_the_motor_cannot_place_is_told_at_once() {
 
 /// The demonstration: the phantom's frames have no place of their own, and come back to it.
 #[test]
-fn the_phantom_on_a_free_running_array_is_put_together_again() {
+fn the_phantom_on_a_free_running_array_is_reassembled() {
     let simulator = simulated(None);
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
     let motor = turning(&simulator, sweep);

@@ -162,7 +162,7 @@ fn uneven_kretz_tables_stay_uneven() {
 }
 
 #[test]
-fn what_a_kretz_file_cannot_give_is_said() {
+fn missing_parts_of_a_kretz_file_are_named() {
     let folder = Folder::new("kretz");
     let wavelet = folder.write("w.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(2, 0x1100, b"xy")));
     assert!(total(&wavelet).unwrap_err().contains("wavelet"));

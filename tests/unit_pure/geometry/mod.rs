@@ -72,7 +72,7 @@ fn samples_lie_where_trigonometry_puts_them() {
 }
 
 #[test]
-fn a_place_is_unswept_to_where_it_was_swept_from() {
+fn unsweeping_a_point_inverts_the_sweep() {
     let s = 3.0f64.sqrt();
     let (x, y, position) = fan().unswept(DVec3::new(-4.0, 20.0 + 7.0 * s, 7.0));
     assert!(near(x, -4.0) && near(y, 34.0) && near(position, PI / 6.0), "{x}, {y}, {position}");
@@ -95,7 +95,7 @@ fn ways(probe: &Probe) -> Vec<Probe> {
 }
 
 #[test]
-fn indices_come_back_from_space_for_every_array_motion_and_way_of_the_motor() {
+fn indices_round_trip_through_space_for_every_array_motion_and_advance() {
     let two = Probe { slices: Axis::Even { first: -1.0, pitch: 2.0, count: 2 }, ..linear() };
     let seven = Probe { slices: Axis::Even { first: -4.0, pitch: 2.0, count: 7 }, ..linear() };
     for probe in [fan(), linear(), two, seven].iter().flat_map(ways) {
@@ -116,7 +116,7 @@ fn indices_come_back_from_space_for_every_array_motion_and_way_of_the_motor() {
 
 /// A line of three is taken a third of the frame's time after the one before.
 #[test]
-fn the_motor_goes_on_while_the_lines_of_a_frame_are_taken() {
+fn the_motor_moves_while_a_frame_is_acquired() {
     let moving = |advance| Probe { advance, ..linear() };
     assert_eq!(moving(Advance::None).slice_position(2.0, 1.0), 0.0);
     assert!(near(moving(Advance::Same(0.9)).slice_position(2.0, 1.0), 0.6));

@@ -20,7 +20,7 @@ fn even(first: f64, pitch: f64, count: usize) -> Axis {
 }
 
 #[test]
-fn numbers_beyond_their_limits_are_refused_and_told_shortly() {
+fn numbers_beyond_their_limits_are_refused_in_a_short_message() {
     [fan(), linear(), still()].iter().for_each(taken);
     let pitch = |sample_pitch| Probe { sample_pitch, ..fan() };
     refused(&pitch(0.0), "sample pitch", &["is 0, must lie in 1e-6..=1e6"]);
@@ -113,7 +113,7 @@ fn the_sector_lies_beyond_the_wobble_axis() {
 }
 
 #[test]
-fn the_motor_s_way_is_finite_and_one_a_slice() {
+fn the_advance_of_the_motor_is_finite_and_one_per_slice() {
     let with = |advance| Probe { advance, ..linear() };
     refused(&with(Advance::Same(f64::NAN)), "motion", &["one finite advance a slice"]);
     refused(&with(Advance::Each(vec![0.1; 3])), "motion", &["one finite advance a slice"]);

@@ -49,7 +49,7 @@ fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
 }
 
 #[test]
-fn a_set_of_workers_lacks_what_was_taken_out_of_it() {
+fn a_set_of_workers_lacks_what_was_removed() {
     assert!(Workers::DEVICE.has(Worker::Compute) && Workers::DEVICE.has(Worker::Copy));
     assert!(!Workers::DEVICE.has(Worker::Host));
     let copies = Workers::DEVICE.without(Worker::Compute);

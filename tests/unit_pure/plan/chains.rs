@@ -15,7 +15,7 @@ fn args(iteration: u32) -> DispatchArgs {
 }
 
 #[test]
-fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() {
+fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
     let filters = "slices = { median = true, sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }";
     let frames = scene(voxels([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
     let link = |name: &str, iteration| slice_link(&frames, name, &args(iteration));
@@ -32,7 +32,7 @@ fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() 
 }
 
 #[test]
-fn a_chain_of_no_filter_ends_where_it_begins() {
+fn an_empty_chain_leaves_its_slot_unchanged() {
     let plain = scene(voxels([8, 8, 5]), "mode = 'sr'");
     assert_eq!((distance_end(&plain), picture_end(&plain)), (Slot::Distance, Slot::Picture));
     let filtered = scene(
@@ -48,7 +48,7 @@ fn a_chain_of_no_filter_ends_where_it_begins() {
 }
 
 #[test]
-fn frames_are_copied_where_the_volume_stores_what_they_hold() {
+fn frames_are_copied_where_the_volume_has_their_format() {
     let of = |stored, range, toml: &str| {
         let settings = toml::from_str(toml).expect("settings");
         copied(&Scene::new(voxels([8, 8, 5]), Input { stored, range }, settings).expect("scene"))
@@ -69,7 +69,7 @@ fn frames_are_copied_where_the_volume_stores_what_they_hold() {
 }
 
 #[test]
-fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
+fn renderings_with_several_rays_or_planes_use_an_intermediate_slot() {
     let of = |toml: &str| rendered(&scene(voxels([8, 8, 5]), toml));
     assert_eq!(of("mode = 'vr'"), Slot::Picture);
     assert_eq!(of("mode = 'vr'\nray = { rays = 2 }"), Slot::Rendered);
@@ -101,7 +101,7 @@ fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
 }
 
 #[test]
-fn each_filter_makes_as_much_more_as_those_behind_it_look_at() {
+fn each_filter_covers_the_reach_of_the_filters_after_it() {
     let all = "median = true, estimator = 'nagao-matsuyama', sigma = { window = 9 }, enhanced_sigma = { window = 5, largest = 11 }, \
                perona_malik = { repeat = 3 }, smooth = { lateral = 2.0, depth = 1.0, elevation = 1.0 }";
     // Reaches: 1, 2, 4, 5, 1 a step, then 6 columns and 3 rows; across slices none in a plane.

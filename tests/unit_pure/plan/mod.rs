@@ -30,7 +30,7 @@ const FILTERED: &str = "mode = 'mip'
     slices = { median = true, perona_malik = { scheme = 'aos', repeat = 2 }, smooth = { elevation = 1.0 } }";
 
 #[test]
-fn steps_are_told_apart_by_what_makes_them_run() {
+fn steps_are_sorted_by_their_frequency() {
     let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
     let names = |when| plan.steps_of(when).map(|(i, s)| (i, s.pass.name, s.iteration)).collect::<Vec<_>>();
     let frame = names(Frequency::Frame);

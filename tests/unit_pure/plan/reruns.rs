@@ -50,7 +50,7 @@ fn a_change_of_nothing_runs_nothing() {
 }
 
 #[test]
-fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
+fn only_readers_of_a_changed_slot_run_again() {
     let lit = "light tone";
     assert_eq!(passes(&with(""), &with("light = { direction = [1.0, 0.0, 0.5] }")), lit);
     assert_eq!(passes(&with(""), &with("post = { gamma = 2.0 }")), "tone");
@@ -75,7 +75,7 @@ fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
 }
 
 #[test]
-fn stage_1_runs_again_where_its_own_numbers_change() {
+fn stage_1_runs_again_when_its_parameters_change() {
     let sharper = |settings: &str| scene(voxels([6, 8, 5]), &FILTERED.replace("median = true", settings));
     let before = sharper("sigma = { sigma = 0.1 }");
     assert_eq!(rerun(&before, &sharper("sigma = { sigma = 0.2 }")), Rerun::Frames);
@@ -89,7 +89,7 @@ fn stage_1_runs_again_where_its_own_numbers_change() {
 }
 
 #[test]
-fn slots_of_another_shape_format_or_meaning_begin_anew() {
+fn slots_of_another_shape_format_or_meaning_are_created_again() {
     let stored =
         |format: &str| scene(fan(Advance::None), &SURFACE.replace("median = true", &format!("format = '{format}'")));
     assert_eq!(rerun(&stored("r16f"), &stored("r8")), Rerun::Everything);
@@ -109,7 +109,7 @@ fn slots_of_another_shape_format_or_meaning_begin_anew() {
 
 /// Less of a region that is large enough for several workgroups, and more of it again.
 #[test]
-fn less_to_be_seen_keeps_the_volume_and_more_needs_frames() {
+fn smaller_visible_bounds_keep_the_volume_and_larger_ones_need_frames() {
     let (all, less) = (with(""), with("region = { depth = [10, 20] }"));
     assert!(all.seen.holds(&less.seen) && all.seen != less.seen);
     assert_eq!(passes(&all, &less), "raycast_surface median_distance bilateral_distance light tone");
@@ -117,7 +117,7 @@ fn less_to_be_seen_keeps_the_volume_and_more_needs_frames() {
 }
 
 #[test]
-fn tables_are_made_anew_where_what_they_follow_from_changes() {
+fn lookup_tables_are_built_again_when_their_inputs_change() {
     let volume =
         |way: Advance, more: &str| scene(fan(way), &format!("mode = 'vr'\nslices = {{ pixels = 40 }}\n{more}"));
     let still = |more: &str| volume(Advance::None, more);
@@ -158,7 +158,7 @@ fn tiles_and_blocks_follow_from_their_planes() {
 
 /// The filters of the distance map take turns with two slots: median writes A, the bilateral B, A and B again.
 #[test]
-fn a_filter_whose_input_was_overwritten_takes_those_before_it_along() {
+fn a_filter_with_an_overwritten_input_reruns_the_filters_before_it() {
     let scene = with("");
     let plan = Plan::new(&scene);
     let stale_after = |which: &[(&str, u32)], contents: &Contents| {

@@ -55,7 +55,7 @@ fn too_few_samples_say_how_little_their_range_covers() {
 }
 
 #[test]
-fn nothing_and_what_is_no_number_are_refused() {
+fn empty_and_non_finite_samples_are_refused() {
     assert_eq!(Sample::new(&[]), Err(SampleError::Empty));
     let Err(SampleError::NotFinite { at: 1, .. }) = Sample::new(&[1.0, f64::NAN]) else { panic!("NaN was ordered") };
     assert_eq!(

@@ -129,7 +129,7 @@ fn a_clock_that_is_not_tied_is_named() {
 }
 
 #[test]
-fn what_is_no_stretch_of_time_is_refused() {
+fn invalid_time_spans_are_refused() {
     for (begin, end) in [(5.0, 4.0), (f64::NAN, 1.0), (0.0, f64::INFINITY), (-1e300, 0.0)] {
         let error = chrome(&profile(1), &[span("bad", Track::Host, begin, end)]).expect_err("refused").to_string();
         assert!(error.starts_with("span \"bad\" of repeat 0: from "), "{error}");

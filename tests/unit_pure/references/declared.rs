@@ -104,7 +104,7 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
 }
 
 #[test]
-fn filters_that_were_not_asked_for_or_change_nothing_are_not_needed_and_say_why() {
+fn filters_that_are_off_or_change_nothing_are_skipped_and_explained() {
     let plain = slices([8, 8], "");
     let flat = scene([8; 3], "mode = 'mip'");
     for name in ["median", "estimator", "sigma", "enhanced_sigma", "growth", "perona_malik", "aos"] {
@@ -141,7 +141,7 @@ fn filters_that_were_not_asked_for_or_change_nothing_are_not_needed_and_say_why(
 }
 
 #[test]
-fn filters_of_distance_maps_take_turns() {
+fn filters_of_distance_maps_alternate_between_two_slots() {
     let scene = distances(
         [21, 10],
         "median = 5, bilateral = { pixels = 1.2, distance = 4.0, repeat = 2 }, sigma = {}, enhanced_sigma = {}, perona_malik = {}",
@@ -172,7 +172,7 @@ fn filters_of_distance_maps_take_turns() {
 }
 
 #[test]
-fn shaders_get_the_numbers_that_the_references_go_by() {
+fn shaders_and_references_get_the_same_parameters() {
     let scene = slices(
         [8, 8],
         "sigma = { window = 9, sigma = 0.125, noise = 'multiplicative' },

@@ -89,7 +89,7 @@ fn windows_grow_until_they_hold_as_many_like_the_centre_as_they_began_with() {
 }
 
 #[test]
-fn few_that_are_alike_give_way_to_the_four_neighbours() {
+fn too_few_similar_pixels_fall_back_to_the_four_neighbours() {
     let scene =
         slices([3, 3], "enhanced_sigma = { window = 3, largest = 3, sigma = 0.01, centre = 'gradient-inverse' }");
     // The estimate lies half-way between 0 and its neighbours, where no pixel is.
@@ -108,7 +108,7 @@ fn few_that_are_alike_give_way_to_the_four_neighbours() {
 /// Slopes whose centre is estimated at 3 + 9/7 along x and at 3 - 9/7 along y, by the first of two masks that are as flat: the pixels
 /// alike are the column at 4, and the row at 2.
 #[test]
-fn a_centre_is_estimated_from_what_lies_that_way() {
+fn a_centre_is_estimated_with_the_chosen_estimator() {
     let scene = slices([7, 7], "enhanced_sigma = { window = 3, largest = 3, sigma = 0.2, centre = 'nagao-matsuyama' }");
     let at = |slope: Texels| filtered(&scene, "enhanced_sigma_slice", &slope).one(3, 3, 0);
     assert_eq!(at(plane([7, 7], |x, _| x as f64)), 4.0);

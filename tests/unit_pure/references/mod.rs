@@ -115,7 +115,7 @@ fn same(got: &Texels, expected: &Texels, what: &str) {
 
 /// What a pass makes of slice 2 of 3 goes there and nowhere else; into a plane, which has no slices, it goes as well.
 #[test]
-fn a_filtered_slice_goes_where_it_belongs() {
+fn a_filtered_slice_is_written_to_its_own_layer() {
     let source = noise([6, 5], 1);
     for (name, filter) in [
         ("median_slice", "median = true"),

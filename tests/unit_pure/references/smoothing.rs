@@ -84,7 +84,7 @@ fn a_gaussian_spreads_a_point_by_its_weights_along_its_own_axis() {
 
 /// Pixels of 0.5 mm: a deviation of 1 mm is two of them.
 #[test]
-fn a_gaussian_is_as_wide_as_was_asked_for() {
+fn a_gaussian_has_the_requested_width() {
     let grid = Grid { size: [41, 3, 1], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };
     let scene = scenes::scene(Geometry::Cartesian(grid), FLOATS, "slices = { smooth = { lateral = 1.0 } }");
     let got = filtered(&scene, "gaussian_lateral", &plane([41, 3], |x, _| f64::from(x == 20)));
@@ -95,7 +95,7 @@ fn a_gaussian_is_as_wide_as_was_asked_for() {
 }
 
 #[test]
-fn a_gaussian_across_slices_makes_the_slices_of_its_turn_and_no_others() {
+fn a_gaussian_across_slices_writes_only_the_slices_of_its_dispatch() {
     let scene = scene([2, 2, 9], "slices = { smooth = { elevation = 1.0 } }");
     let source = Texels::from_fn([2, 2, 9], 1, |[x, y, z], _| if z == 4 { 1.0 + (2 * y + x) as f64 } else { 0.0 });
     let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
@@ -167,7 +167,7 @@ fn lee(source: &Texels, radius: usize, few: usize, range: impl Fn(f64) -> f64) -
 }
 
 #[test]
-fn a_sigma_filter_takes_the_mean_of_its_like() {
+fn a_sigma_filter_averages_only_similar_samples() {
     for (window, few) in [(3, 1), (5, 2), (7, 3)] {
         let source = noise([10, 8], window);
         let got = filtered(
@@ -186,7 +186,7 @@ fn a_sigma_filter_takes_the_mean_of_its_like() {
 }
 
 #[test]
-fn a_sigma_filter_of_distances_leaves_misses_out() {
+fn a_sigma_filter_of_distances_ignores_misses() {
     for seed in 0..4 {
         let source = holed([10, 8], 40 + seed);
         let got = filtered(&distances([10, 8], "sigma = { window = 5, sigma = 0.0625 }"), "sigma_distance", &source);
@@ -206,14 +206,14 @@ fn a_sigma_filter_of_distances_leaves_misses_out() {
 
 /// At exactly two sigma a pixel counts.
 #[test]
-fn a_pixel_at_the_very_end_of_the_range_is_alike() {
+fn a_pixel_at_the_end_of_the_range_counts_as_similar() {
     let source = rows([[0.75, 0.25, 0.5], [0.75, 0.5, 0.0], [1.0, 1.0, 1.0]]);
     let got = filtered(&slices([3, 3], "sigma = { window = 3, sigma = 0.125 }"), "sigma_slice", &source);
     assert_eq!(got.one(1, 1, 0), (0.75 + 0.25 + 0.5 + 0.75 + 0.5) / 5.0);
 }
 
 #[test]
-fn a_sigma_filter_of_pictures_takes_each_channel_alone() {
+fn a_sigma_filter_of_pictures_filters_each_channel_separately() {
     let source = colours([7, 6], 5);
     let got = filtered(&picture([7, 6], "sigma = { window = 3, sigma = 0.0625 }"), "sigma_picture", &source);
     for c in 0..4 {

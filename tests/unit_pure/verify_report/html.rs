@@ -123,7 +123,7 @@ fn what_went_wrong_comes_first_with_its_pictures_side_by_side() {
 }
 
 #[test]
-fn a_run_in_which_all_is_well_says_so_and_one_of_nothing_does_not() {
+fn a_run_without_failures_says_so_and_an_empty_run_does_not() {
     let well = checked(&page(&run(1), Some(&run(1))));
     assert_eq!(text(all(&well, "h1")[0]), "Passed");
     assert!(all(&well, "#failures").is_empty());
@@ -137,7 +137,7 @@ fn a_run_in_which_all_is_well_says_so_and_one_of_nothing_does_not() {
 }
 
 #[test]
-fn a_picture_that_is_none_is_told_and_the_page_is_still_written() {
+fn a_broken_picture_is_reported_and_the_page_still_written() {
     let mut run = run(1);
     fail(&mut run, "passes", "tone");
     check(&mut run, "passes", "tone").pictures[0].actual.rgba.pop();

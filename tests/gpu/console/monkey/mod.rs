@@ -13,7 +13,7 @@ use random_source::Wild;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// It runs in a process of its own, whose memory no other test uses.
-const TEST: &str = "console::monkey::nothing_that_hands_sources_and_devices_do_breaks_it";
+const TEST: &str = "console::monkey::random_input_sources_and_device_losses_break_nothing";
 /// Resident memory that the second half may take more than the first, bytes: pictures are large at times, and what they leave is not
 /// given back at once.
 const GROWTH: u64 = 128 << 20;
@@ -21,7 +21,7 @@ const GROWTH: u64 = 128 << 20;
 /// Prevents panics, messages of validation, leaks, and a console that draws no more, after whatever was done to it. MONKEY_SECONDS goes
 /// on for longer, MONKEY_SEED does the same again.
 #[test]
-fn nothing_that_hands_sources_and_devices_do_breaks_it() {
+fn random_input_sources_and_device_losses_break_nothing() {
     if own_process::is_child() {
         return run();
     }
