@@ -1,4 +1,4 @@
-//! Sweeps as Cartesian volumes: right where the sector is, nothing where it is not, and read back as they were written.
+//! Sweeps converted to Cartesian volumes: correct inside the sector, empty outside, and read back without a change.
 
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
@@ -20,7 +20,7 @@ fn probe() -> Probe {
     }
 }
 
-/// Straight in every coordinate, so that only the bend of the polar lattice between samples is left as an error.
+/// Linear in every coordinate, so that only the curvature of the polar lattice between samples remains as an error.
 fn field(p: DVec3) -> f64 {
     20_000.0 + 150.0 * p.x + 90.0 * p.y - 120.0 * p.z
 }

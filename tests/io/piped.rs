@@ -1,4 +1,4 @@
-//! Raw frames through a pipe: each with its place, time and bytes, whatever the pieces; and any bytes come to an end. Needs no GPU.
+//! Raw frames through a pipe: each keeps its slice, time and bytes however the data are split; and any bytes terminate. Needs no GPU.
 
 use crate::common::files::{data, repository};
 use echolume::probe::{Advance, Geometry};
@@ -46,7 +46,7 @@ fn piped(bytes: Vec<u8>) -> Piped {
     Piped::new(Cursor::new(bytes), None).unwrap()
 }
 
-/// All events but the end, and why it came.
+/// All events but the end, and the reason of the end.
 fn all(mut piped: Piped) -> (Vec<Event>, Option<String>) {
     let mut events = Vec::new();
     loop {
@@ -247,7 +247,7 @@ fn patience_is_kept_and_dropping_does_not_hang() {
     let started = Instant::now();
     drop(piped);
     assert!(started.elapsed() < SOON);
-    // The other end hears of it with the next byte, or the one after.
+    // The other end notices it with one of the next two bytes.
     while writer.write_all(&[1; 8]).is_ok() {
         assert!(started.elapsed() < SOON);
         std::thread::sleep(Duration::from_millis(1));

@@ -1,4 +1,4 @@
-//! Error against run time without a device: the measures, the front, the choice, the file, the plot.
+//! Error against run time without a device: the metrics, the Pareto front, the choice, the file, the plot.
 
 use crate::common::files::data;
 use echolume::error_report::choose::{cheapest_under, most_accurate_under};
@@ -192,7 +192,7 @@ fn dials_are_combined_by_squares_and_factors() {
     assert_eq!(cheap.set, ["volume_format=r8"]);
     assert_eq!(cheap.turned, [("format".to_string(), "r8".to_string())]);
     assert!((cheap.error - 0.03f64.hypot(0.02)).abs() < 1e-12 && (cheap.time - 8e6).abs() < 1e-3, "{cheap:?}");
-    // A margin of 15 % leaves no room for that.
+    // A margin of 15 % excludes that.
     let safe = cheapest_under(&small(), Measure::Rmse, 0.04, 0.15).expect("the default is");
     assert!(safe.set.is_empty() && (safe.error - 0.03f64.hypot(0.004)).abs() < 1e-12, "{safe:?}");
     let both = most_accurate_under(&small(), Measure::Rmse, 40e6, 0.0).expect("all fits");
@@ -289,7 +289,7 @@ fn times_are_a_median_and_a_range() {
     assert_eq!(Time::of(&[]), None);
 }
 
-/// Eleven dials as a measurement has them, crowded about one default.
+/// Eleven dials as in a real measurement, all close to one default.
 fn crowded() -> Report {
     let names = ["step", "compositing", "format", "filter3d", "termination", "sigma", "perona-malik", "adaptive"];
     let names = names.into_iter().chain(["resolution", "rays", "lut"]);

@@ -1,4 +1,4 @@
-//! OpenIGTLink as a live source: volumes and freehand frames with known values, and what is amiss.
+//! OpenIGTLink as a live source: volumes and freehand frames with known values, and faults.
 
 use super::client::*;
 use super::messages::*;
@@ -17,7 +17,7 @@ fn connect(messages: Vec<u8>, options: NetworkOptions) -> Network {
     Network::connect(&serve(vec![send_and_stay(messages)]), options).unwrap()
 }
 
-/// Events until one is what was waited for, 10 s at most.
+/// Events up to the awaited one, for 10 s at most.
 fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> {
     let (mut events, started) = (Vec::new(), Instant::now());
     while !events.last().is_some_and(&is_last) {
@@ -29,7 +29,7 @@ fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> 
     events
 }
 
-/// Waits until so many messages have come, 10 s at most.
+/// Waits for so many messages, for 10 s at most.
 fn received(network: &Network, messages: u64) {
     let started = Instant::now();
     while network.statistics().messages < messages && started.elapsed() < Duration::from_secs(10) {
@@ -41,7 +41,7 @@ fn is_fault(named: &str) -> impl Fn(&Event) -> bool + use<'_> {
     move |event| matches!(event, Event::Fault(fault) if fault.contains(named))
 }
 
-/// The next volume: what it began with, if it did, and its frames.
+/// The next volume: its header, if it begins a stream, and its frames.
 fn volume(network: &mut Network, slices: usize) -> (Option<Header>, Vec<Frame>) {
     let events = until(network, |e| matches!(e, Event::Frame(frame) if frame.slice + 1 == slices));
     let (mut header, mut frames) = (None, Vec::new());
@@ -189,7 +189,7 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
         let expected = [0, 0, 10, 15, 20, 25, 30, 35, 40, 45, 50, 0, 0];
         assert_eq!(middles(&grid, &frames), expected, "{poses:?}");
         assert_eq!((frames[0].bytes[0], frames[0].volume), (0, 0));
-        // At 9 mm there is no volume; the one at 3 mm replaces nothing but what was bridged.
+        // There is no volume at 9 mm; the frame at 3 mm replaces only bridged voxels.
         let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.slice == 12));
         assert!(events.iter().any(is_fault("frames outside of the volume")), "{events:?}");
         let frames: Vec<Frame> =
@@ -202,7 +202,7 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
 fn frames_without_a_pose_are_reported_and_do_not_wait_for_ever() {
     let early = |k: u8| bytes(&Message::Image(tracked(k)));
     let messages = [early(1), early(20), bytes(&moved(20)), early(30), bytes(&moved(30)), bytes(&moved(31))].concat();
-    // Two have a pose, four are waited for.
+    // Two have a pose, four are awaited.
     let mut network = connect(messages, sweep_options());
     until(&mut network, is_fault("frames without a pose left out: no pose came near their time"));
     let started = Instant::now();

@@ -13,7 +13,7 @@ fn frame(time: f64) -> Message {
     Message::Image(image(time, [2, 3, 1]))
 }
 
-/// Turned about z, x mm along.
+/// Rotated about z, moved by x mm.
 fn turned(device: &str, time: f64, angle: f64, x: f32) -> Message {
     let (sine, cosine) = (angle.sin() as f32, angle.cos() as f32);
     let matrix = [[cosine, -sine, 0.0, x], [sine, cosine, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -153,7 +153,7 @@ proptest! {
         }
         paired.extend(pairing.finish());
         prop_assert!(paired.iter().all(|p| p.lag.abs() <= TOLERANCE));
-        // The pose is a function of time: here, an angle. Between two poses it is exact, next to one it is as far off in time.
+        // The pose is a function of time, here an angle. Between two poses it is exact; next to one it is off by the time difference.
         for p in &paired {
             let x = p.pose.matrix3.x_axis;
             let angle = if p.interpolated { p.image.time } else { p.image.time - p.lag };

@@ -32,7 +32,7 @@ fn home_is_where_the_switch_is_however_it_is_looked_for() {
         drive.home().expect("found");
         let status = drive.status().expect("answered");
         assert_eq!(status.speed, 0.0);
-        // The module now counts from where the shaft really is, and not from where it began, 7 deg away. Only as exactly as
+        // The module now counts from the real position of the shaft, not from its start, 7 deg away. It is only as exact as
         // the switch is polled, which on a busy machine is seldom.
         let off = (status.angle - simulator.angle()).abs();
         assert!(off < 0.5, "{home:?} {home_direction:?} {reversed}: {off} deg beside it");
@@ -66,7 +66,7 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
     assert_eq!(track.at(first - 1e-3), Place::Outside);
     assert_eq!(track.at(last + 1e-3), Place::Outside);
     assert!(matches!(track.at((first + last) / 2.0), Place::Pass { .. } | Place::Turning { .. }), "{count}");
-    // At rest where it was sent: nothing to stop.
+    // The motor has reached its target: nothing to stop.
     let before = simulator.received().len();
     drop(drive);
     assert_eq!(simulator.received().len(), before);

@@ -1,4 +1,4 @@
-//! Frames that come without a place, and get it from the simulated motor: each carries the angle that the array really had.
+//! Frames without a position get one from the simulated motor: each carries the true angle of the array.
 
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::probes::wobbler;
@@ -43,7 +43,7 @@ fn header(probe: Probe) -> Header {
 struct Free {
     simulator: Arc<Simulator>,
     header: Option<Header>,
-    /// The frame that is being taken: when its first line was, and where the array was then.
+    /// The frame in progress: the time of its first line, and the angle of the array then.
     taking: Option<(Instant, SystemTime, f64)>,
     pieces: bool,
     /// The second half of a frame that comes in pieces.
@@ -102,7 +102,7 @@ fn swept(simulator: &Arc<Simulator>, source: Free, clock: Clock) -> Swept {
 
 const ARRIVAL: Clock = Clock::Arrival { delay: 0.0 };
 
-/// Frames until so many volumes are whole, or the end.
+/// Frames until so many volumes are complete, or the end.
 fn frames(swept: &mut Swept, volumes: u64) -> (Vec<Frame>, Option<Option<String>>) {
     let (mut frames, begun) = (Vec::new(), Instant::now());
     while swept.counts().whole < volumes && begun.elapsed() < Duration::from_secs(120) {
@@ -120,7 +120,7 @@ fn angle_of(frame: &Frame) -> f64 {
     f64::from_le_bytes(*frame.bytes.first_chunk().expect("at least an angle"))
 }
 
-/// Most frames show what lies at their slice, swept their way, and there is no lag between forth and back.
+/// Most frames show their own slice, in their own direction, and forward and backward sweeps have no lag.
 fn hold_against_the_truth(frames: &[Frame], filled: u64) {
     let middle = |frame: &Frame| (frame.slice as f64 - (SLICES as f64 - 1.0) / 2.0) * PITCH;
     let off = |frame: &Frame| angle_of(frame) - middle(frame);
@@ -218,7 +218,7 @@ fn frames_without_a_motor_position_are_reported_at_once() {
     assert!(eventually(|| !simulator.turning()));
 }
 
-/// The demonstration: the phantom's frames have no place of their own, and come back to it.
+/// The frames of the phantom lose their positions and are put back in place.
 #[test]
 fn the_phantom_on_a_free_running_array_is_reassembled() {
     let simulator = simulated(None);
@@ -236,6 +236,6 @@ fn the_phantom_on_a_free_running_array_is_reassembled() {
         wanted.is_some_and(|w| w.bytes == frame.bytes && w.backward == frame.backward)
     };
     let (right, all) = (frames.iter().filter(right).count(), frames.len());
-    // A frame whose first line fell between two slices may go to the other one.
+    // A frame whose first line is between two slices may be put into the other one.
     assert!(all >= 74 && right * 5 >= all * 4, "{right} of {all} are where they were taken");
 }

@@ -1,4 +1,4 @@
-//! Sweeps both ways, and which geometry wins.
+//! Sweeps in both directions, and which geometry has precedence.
 
 use super::recordings::*;
 const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\

@@ -1,4 +1,4 @@
-//! Which slots the filters of a chain take turns with, and how much of a slice each of them makes.
+//! The slots that the filters of a chain alternate between, and how much of a slice each of them writes.
 
 use super::{fan, scene};
 use crate::common::probes::voxels;
@@ -22,7 +22,7 @@ fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
     assert_eq!(link("load_slice", 0), (Slot::Frames, Slot::SliceA));
     assert_eq!(link("median_slice", 0), (Slot::SliceA, Slot::SliceB));
     assert_eq!(link("sigma_slice", 0), (Slot::SliceB, Slot::SliceA));
-    // Four dispatches are one step and one link.
+    // Four dispatches are one step and one filter of the chain.
     for iteration in 0..4 {
         assert_eq!(link("aos_slice", iteration), (Slot::SliceA, Slot::SliceB));
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
@@ -78,13 +78,13 @@ fn renderings_with_several_rays_or_planes_use_an_intermediate_slot() {
     assert_eq!(of("mode = 'plane'\nray = { rays = 2 }"), Slot::Picture, "planes cast no rays");
 }
 
-/// A slice of 400 x 400 of which columns and rows from `low` up to `high` are seen.
+/// A slice of 400 x 400 of which columns and rows from `low` up to `high` are visible.
 fn seen(filters: &str, low: u32, high: u32) -> Scene {
     let scene = scene(voxels([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
     Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..scene }
 }
 
-/// How many columns and rows around what is seen a pass makes, by when it takes whole workgroups of 32 more: to the left and right, above
+/// How many columns and rows around the visible bounds a pass writes, from where complete workgroups of 32 are added: to the left and right, above
 /// and below.
 fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
     let whole = seen(filters, 192, 224);

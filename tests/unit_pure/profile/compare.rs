@@ -14,7 +14,7 @@ fn line<'a>(comparison: &'a Comparison, name: &str) -> &'a Line {
     comparison.lines.iter().find(|l| l.name == name).expect("line")
 }
 
-/// In how many of the pairs of identical runs anything is called different.
+/// The number of pairs of identical runs in which anything is called different.
 fn false_alarms(seed: u64, noise: Noise) -> u32 {
     let mut random = Random(seed);
     let alarm = |_: &u32| {
@@ -75,7 +75,7 @@ fn a_pass_that_is_ten_percent_slower_is_found_and_so_is_a_faster_one() {
     assert!(times * 20 > PAIRS * 19, "{times} of {PAIRS}");
 }
 
-/// Without its second hurdle the test would fail under drift: the simulation can fail.
+/// Without its second criterion the test would fail under drift: the simulation can fail.
 #[test]
 fn the_rank_test_alone_is_not_enough() {
     let mut random = Random(4);
@@ -218,7 +218,7 @@ fn other_devices_and_programs_are_compared_with_a_warning() {
     new.device.name = "another".into();
     new.device.clocks = None;
     new.program = "echolume 0.2.0, release".into();
-    // The same settings, written otherwise.
+    // The same settings, written differently.
     new.scene = format!("# resolved\n{}", old.scene);
     let notes = compared(&old, &new).notes;
     assert_eq!(

@@ -22,7 +22,7 @@ fn without_stamps() -> Profile {
 fn json_round_trips_without_a_change() {
     let mut random = Random(82);
     let mut odd = measured();
-    // Fractions that are off by one bit when a reader rounds carelessly.
+    // Fractions that are off by one bit if a reader rounds carelessly.
     odd.passes[0].samples_ns.iter_mut().for_each(|ns| *ns = random.between(0.0, 1e7));
     odd.passes[1].filtered = None;
     odd.cpu_ns = Vec::new();
@@ -65,7 +65,7 @@ fn other_versions_other_files_and_contradictions_are_refused() {
     assert!(broken(|p| p.ceilings.as_mut().unwrap().fetch.low = f64::INFINITY).starts_with("fetch: ceiling"));
 }
 
-/// A file of the version before has neither CPU time nor a camera that turns.
+/// A file of the previous version has neither CPU time nor a rotating camera.
 #[test]
 fn a_profile_of_the_previous_version_is_read() {
     let mut before = measured();

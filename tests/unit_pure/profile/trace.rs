@@ -1,4 +1,4 @@
-//! Traces by the rules of the Trace Event Format.
+//! Traces obey the rules of the Trace Event Format.
 
 use super::simulated::{Random, pass, profile};
 use echolume::profile::Profile;
@@ -18,7 +18,7 @@ fn events(profile: &Profile, spans: &[Span]) -> Vec<Value> {
     trace["traceEvents"].as_array().expect("events").clone()
 }
 
-/// Whole ns of a number of microseconds, as Perfetto reads it; it must hold them exactly.
+/// Integer ns from a number of microseconds, as Perfetto reads it; they must be exact.
 fn ns(value: &Value) -> i64 {
     let us = value.as_f64().expect("a number");
     let ns = (us * 1e3).round();

@@ -2,14 +2,14 @@
 
 use super::*;
 
-/// A value that is there, with at most so many below it, and more than so many not above it.
+/// True if `value` occurs, at most `below` values are smaller, and more than `below` are not larger.
 fn is_ranked(values: &[f64], rank: usize, value: f64) -> bool {
     let below = values.iter().filter(|v| **v < value).count();
     let not_above = values.iter().filter(|v| **v <= value).count();
     values.contains(&value) && below <= rank && rank < not_above
 }
 
-/// Beyond the border the nearest pixel stands in.
+/// Beyond the border the nearest pixel is repeated.
 fn clamped(source: &Texels, x: usize, y: usize, radius: i64) -> Vec<f64> {
     let (x, y) = (x as i64, y as i64);
     (-radius..=radius)
@@ -31,7 +31,7 @@ fn a_median_has_as_many_below_as_above() {
     assert_eq!((got.one(0, 0, 0), got.one(1, 1, 0), got.one(2, 2, 0)), (2.0, 9.0, 9.0));
 }
 
-/// Of an even number of hits the lower middle one; of a majority of misses a miss.
+/// The median of an even number of hits is the lower of the middle two; a majority of misses gives a miss.
 #[test]
 fn a_median_of_distances_lets_misses_vote_first() {
     for edge in [3, 5] {
@@ -72,7 +72,7 @@ fn a_gaussian_spreads_a_point_by_its_weights_along_its_own_axis() {
         });
         same(&got, &expected, name);
         assert!((got.values.iter().sum::<f64>() - 1.0).abs() < 1e-12, "what there is stays");
-        // A slope stays inside; at the border only what is there is weighed.
+        // A slope is kept inside; at the border only existing pixels are weighted.
         let slope = plane([9, 9], |x, y| if axis == "lateral" { x as f64 } else { y as f64 });
         let got = filtered(&scene, name, &slope);
         let first = (1..4).map(|i| i as f64 * weights()[3 + i]).sum::<f64>() / weights()[3..].iter().sum::<f64>();
@@ -113,7 +113,7 @@ fn a_gaussian_across_slices_writes_only_the_slices_of_its_dispatch() {
     }
 }
 
-/// Every hit of a window weighs by how near it lies and how alike it is; misses stay and weigh nothing.
+/// Every hit of a window is weighted by its distance and its similarity; misses stay and have no weight.
 #[test]
 fn a_bilateral_filter_weighs_by_place_and_by_distance() {
     let source = holed([9, 8], 7);
@@ -133,7 +133,7 @@ fn a_bilateral_filter_weighs_by_place_and_by_distance() {
         if here < MISS { sum / weights } else { MISS }
     });
     same(&got, &expected, "bilateral");
-    // Two plates further apart than any weight stay what they are.
+    // Two plates further apart than any weight are not changed.
     let plates = plane([6, 4], |x, _| if x < 3 { 20.0 } else { 60.0 });
     same(
         &filtered(&distances([6, 4], "bilateral = { pixels = 1.0, distance = 1.0 }"), "bilateral_distance", &plates),
@@ -142,7 +142,7 @@ fn a_bilateral_filter_weighs_by_place_and_by_distance() {
     );
 }
 
-/// The mean of those in a window that lie within a range; the four neighbours' where no more than K of its pixels do.
+/// The mean of the pixels of a window within the range; the mean of the four neighbours if no more than K pixels are.
 fn lee(source: &Texels, radius: usize, few: usize, range: impl Fn(f64) -> f64) -> (Texels, usize) {
     let lone = std::cell::Cell::new(0);
     let texels = plane([source.size[0], source.size[1]], |x, y| {
@@ -194,7 +194,7 @@ fn a_sigma_filter_of_distances_ignores_misses() {
         same(&got, &expected, "distances");
         assert!(lone > 0);
     }
-    // A hit between misses, and one whose only like is itself among others: the one stays, the other takes its neighbours'.
+    // A hit between misses is kept; a hit that is similar only to itself takes the mean of its neighbours.
     let lonely = rows([[MISS, MISS, MISS], [MISS, 7.0, MISS], [MISS, MISS, MISS]]);
     let scene = distances([3, 3], "sigma = { window = 3, sigma = 0.1 }");
     same(&filtered(&scene, "sigma_distance", &lonely), &lonely, "a lone hit");

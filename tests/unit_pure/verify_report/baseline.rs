@@ -1,4 +1,4 @@
-//! Runs against earlier ones.
+//! Runs compared with earlier ones.
 
 use super::profile;
 use super::profile::Random;
@@ -16,7 +16,7 @@ fn told(compared: &Compared) -> Vec<(Class, String)> {
     compared.changes.iter().map(|c| (c.class, c.to_string())).collect()
 }
 
-/// A run with the errors of another and its own times, from the same one.
+/// Two runs with the same errors and different times of the same distribution.
 fn changed(change: impl Fn(&mut Run)) -> Compared {
     let old = run(1);
     let mut new = old.clone();

@@ -5,7 +5,7 @@ use echolume::verify::report::json::{MOST_OUTCOMES, MOST_SAMPLES, from_json, to_
 use echolume::verify::report::{Figure, Run, Unit};
 use proptest::prelude::*;
 
-/// The numbers that JSON knows no numbers for make runs unequal to themselves: equal by their text.
+/// Non-finite numbers make runs unequal to themselves: they are compared by their text.
 fn comes_back(run: &Run) {
     let text = to_json(run).expect("JSON");
     let again = from_json(&text).expect("run");
