@@ -1,9 +1,9 @@
-//! Settings chosen by what a report measured.
+//! Settings chosen from the measurements of a report.
 
 use crate::common::program::*;
 use std::fs;
 
-/// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.
+/// An error report of the bone with one dial: 20 ms by default, 8 ms with longer steps.
 pub fn error_report(volume: &str) -> String {
     let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
         let time = ms * 1e6;

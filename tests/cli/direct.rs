@@ -1,4 +1,4 @@
-//! A monitor that is not there. Only names that no monitor has: a machine that has one would show things on it.
+//! A missing monitor. Only names that no monitor has: a machine with a monitor would show something on it.
 
 use crate::common::program::*;
 use std::process::Command;
@@ -10,7 +10,7 @@ fn a_missing_monitor_is_reported_in_one_line() {
     let nowhere = [&DIRECT[..], &["no such monitor", "--size", "640x480", "--refresh", "60"]].concat();
     let ran = run(&nowhere);
     refuses(&nowhere, &ran, 1, &[]);
-    // A driver may know monitors and have none, or know none.
+    // A driver may support monitors and have none, or not support them.
     let why = ["no monitor is connected", "no monitor is called", "VK_KHR_display", "VK_KHR_surface"];
     assert!(why.iter().any(|why| ran.2.contains(why)), "{ran:?}");
     let blind = finish(without_device(Command::new(PROGRAM).args(&nowhere)));

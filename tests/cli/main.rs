@@ -1,4 +1,4 @@
-//! The program as a user meets it: what it answers to right and wrong commands, and what it leaves behind.
+//! The program as a user sees it: its answers to correct and wrong commands, and the files that it leaves.
 
 mod budget;
 #[path = "../common/mod.rs"]
@@ -282,7 +282,7 @@ fn no_file_is_needed_to_see_a_face_and_a_phantom_is_a_recording_like_any_other()
 #[test]
 fn the_program_needs_no_source_tree_no_path_and_no_place() {
     let folder = Folder::new("moved");
-    // By another process: a file that this one has open for writing could not be started.
+    // Copied by another process: a file that this one has open for writing could not be executed.
     assert!(Command::new("cp").args([PROGRAM, &folder.path("moved")]).status().expect("run cp").success());
     let mut command = Command::new(folder.path("moved"));
     command.args(["render", BONE, "-o", "p.png", "--size", "64x48"]).env("PATH", "").current_dir(&folder.0);

@@ -1,4 +1,4 @@
-//! Half the rays along each edge while a view moves: the same view, near enough, and back to all of it.
+//! Half the rays along each edge while a view moves: nearly the same view, and full resolution afterwards.
 
 use crate::common::gpu::*;
 use echolume::gpu::Renderer;

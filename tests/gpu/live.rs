@@ -1,4 +1,4 @@
-//! Frames that arrive while pictures are drawn: what is shown is what was sent, whole, on one, two and three queues.
+//! Frames that arrive while pictures are drawn: pictures show complete sent volumes, on one, two and three queues.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
@@ -13,8 +13,8 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// A device whose one queue stands for so many: the layers of 1.3.239 know no timeline semaphores, so where one queue plays several
-/// they call everything between submissions a hazard. Anything else fails the test all the same.
+/// A device whose single queue acts as several: the layers of 1.3.239 ignore timeline semaphores, so they report every pair of
+/// submissions as a hazard then. Any other message fails the test.
 struct Playing {
     device: Device,
     queues: usize,
@@ -38,7 +38,7 @@ impl Drop for Playing {
     }
 }
 
-/// A source that says what it was told to, one thing after such a pause, and can wait or not.
+/// A source that yields prepared events with pauses, and can wait or not.
 pub struct Told(pub VecDeque<Event>, pub Duration, pub bool);
 
 impl Live for Told {
@@ -52,7 +52,7 @@ impl Live for Told {
     }
 }
 
-/// The wobbler, whose motor goes on during a frame.
+/// The wobbler with a motor that moves during a frame.
 fn moving(share: f64) -> Probe {
     let probe = wobbler();
     Probe { advance: Advance::Same(share * probe.slices.pitch()), ..probe }
@@ -76,7 +76,7 @@ pub fn settings(toml: &str) -> Settings {
     .expect("settings")
 }
 
-/// A volume of a sweep, its frames in order of acquisition: every second one backwards, each sample from its place.
+/// A volume of a sweep with its frames in order of acquisition: every second one backwards, each sample from its position.
 pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
     let (slices, bytes) = (9, 24 * 64);
     let frame = |n: u32| {
@@ -88,7 +88,7 @@ pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
     (0..slices).map(frame).collect()
 }
 
-/// Each slice carries the number of its sweep.
+/// The samples of each slice hold the number of its sweep.
 pub fn stamped(number: u32) -> Vec<Frame> {
     volume(number, |_, _| 10 * number as u8 + 5)
 }
@@ -98,7 +98,7 @@ pub fn speckled(number: u32) -> Vec<Frame> {
     volume(number, |slice, i| (hash(slice, i).wrapping_mul(2_654_435_761) >> 24) as u8)
 }
 
-/// Drives a stream to its end; `each` looks at it after each picture.
+/// Steps a stream to its end; `each` runs after each picture.
 pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> Vec<String> {
     let (mut faults, begun) = (Vec::new(), Instant::now());
     loop {
@@ -114,7 +114,7 @@ pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) 
 }
 
 pub fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
-    // Where each frame is shown there is time for a picture between some of them.
+    // With rolling updates there is time for a picture between some frames.
     let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
     stream_of(device, Told(events.into(), pause, true), settings, options)
 }
@@ -132,7 +132,7 @@ pub fn volume_of(renderer: &mut Renderer) -> Texels {
     renderer.read(Slot::Volume).expect("read").expect("there")
 }
 
-/// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
+/// Prevents a picture of two sweeps: each slice holds the number of its sweep, and the device draws slower than frames arrive.
 #[test]
 fn a_complete_volume_never_mixes_frames_of_two() {
     for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
@@ -164,8 +164,8 @@ fn a_complete_volume_never_mixes_frames_of_two() {
     }
 }
 
-/// Prevents work that grows with time: once all ways of a sweep have been seen, frames and pictures take no memory of the device, no
-/// pipeline and no wait for all of it.
+/// Prevents work that grows with time: once all sweep directions have occurred, frames and pictures need no device memory, no
+/// pipeline and no wait for the device to be idle.
 #[test]
 fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
     let device = Device::new();
@@ -183,7 +183,7 @@ fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
         let (mut before, mut pictures) = (None, 0);
         run(&mut stream, |_, shown| {
             pictures += 1;
-            // Forwards, backwards, and rolling a mixture.
+            // Forward, backward, and mixed while rolling.
             if shown.volume >= 2 {
                 assert_eq!(*before.get_or_insert_with(count), count(), "{update:?}: {toml}");
             }
@@ -192,7 +192,7 @@ fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
     }
 }
 
-/// Prevents rolling volumes that end otherwise than whole ones, and slices that are made anew for no reason.
+/// Prevents rolling volumes that end differently from complete ones, and slices that are filtered again without a need.
 #[test]
 fn a_rolling_volume_shows_each_frame_and_ends_as_the_complete_one() {
     for queues in 1..=3 {

@@ -1,4 +1,4 @@
-//! How the volume is stored for the rays: frames that are slices already are copied, and quads of neighbours are what eight texels are.
+//! The storage of the volume for the rays: frames in the volume's format are copied, and packed neighbours equal eight texels.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
@@ -40,7 +40,7 @@ fn frames_in_the_volume_format_are_copied_without_a_pass() {
                 let format = Slot::Frames.format(&scene);
                 assert_eq!(slice.encode(format), frame.encode(format), "{format:?}, slice {z}");
             }
-            // The same through a pass, into a format that is finer than either.
+            // The same through a pass, into a finer format.
             let passed = scene.settings.clone();
             let mut passed = Scene::new(scene.geometry.clone(), scene.input, passed).expect("scene");
             passed.settings.slices.format = echolume::scene::VolumeFormat::R32f;
@@ -148,7 +148,7 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));
     assert_eq!(packs(&renderer), software, "a GPU filters by itself");
     assert!(difference(&renderer.picture().expect("picture"), &first).1 <= 1.0);
-    // A single slice that is new is packed alone.
+    // Only the new slice is packed.
     renderer.frame(7, &frames[3].encode(Format::R8), 0).expect("frame");
     renderer.show(0).expect("show");
     let changed = renderer.picture().expect("picture");

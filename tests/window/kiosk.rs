@@ -1,9 +1,9 @@
-//! A kiosk that something is missing from says what, goes on trying, and needs nobody when it is there.
+//! A kiosk reports what is missing, retries, and continues by itself once it is there.
 
 use crate::desktop::*;
 use std::fs;
 
-/// Whether there is a banner of a fault: its red frame.
+/// True if a banner of a fault is shown: its red frame.
 fn is_amiss(view: &View) -> bool {
     let Some(seen) = view.look() else { return false };
     seen.rgba.chunks(4).filter(|p| p[0] == 240 && p[1] == 96 && p[2] == 84).count() > 300

@@ -1,4 +1,4 @@
-//! What a window manager does to a window.
+//! Actions of a window manager on a window.
 
 use crate::desktop::*;
 use x11rb::connection::Connection;

@@ -1,4 +1,4 @@
-//! What `echolume filter` computes and measures: every filter against its f64 reference, ratios of regions, growth of windows.
+//! Results of `echolume filter`: every filter against its f64 reference, figures of regions, growth of windows.
 
 use super::*;
 
@@ -34,7 +34,7 @@ fn figures_of_regions_equal_those_of_the_files() {
             assert!(off < 2e-3, "{when}: {got:?} is not {expected:?}");
         }
     }
-    // Smoothing takes noise away: otherwise the two lines are of the same picture.
+    // Smoothing removes noise: otherwise the two lines are of the same picture.
     let snr = |when: &str| {
         let line = said.lines().find_map(|l| l.strip_prefix(&format!("region {when}"))).expect("a line");
         line.split_whitespace().nth(2).and_then(|w| w.parse::<f64>().ok()).expect("a ratio")
@@ -77,7 +77,7 @@ fn every_filter_name_gives_the_filter_of_the_settings() {
     }
 }
 
-/// Every slot of a picture's way through stage 1, in f64.
+/// Every slot of stage 1 for a picture, in f64.
 fn reference(
     grey: &Grey,
     slices: &str,

@@ -1,4 +1,4 @@
-//! What `echolume filter` says to wrong files and flags, and that it leaves nothing behind.
+//! Answers of `echolume filter` to wrong files and flags; it leaves no file behind.
 
 use super::*;
 
@@ -100,7 +100,7 @@ fn no_wrong_flag_is_taken_for_a_default() {
         refused(&[&[&input, "-o", &output, "--filter", "median"], &flags[..]].concat(), 2, &[named]);
     }
     assert_eq!(folder.names().len(), 1, "something was written");
-    // What clap refuses shows the usage.
+    // Refusals of clap show the usage.
     for arguments in [
         vec![],
         vec![&*input, "--filter", "median"],
