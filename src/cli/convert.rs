@@ -1,13 +1,13 @@
 //! `echolume convert`.
 
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{Output, check_outputs};
 use crate::files::signals::Writing;
 use crate::probe::Geometry;
 use crate::source::convert::{Volume, VolumeFile, lattice};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::PathBuf;
 
 /// What messages call it.
@@ -58,7 +58,7 @@ impl Convert {
             Geometry::Cartesian(grid) => grid.spacing.into_iter().fold(f64::INFINITY, f64::min),
         };
         let grid = lattice(&geometry, self.spacing.unwrap_or(usual)).map_err(|e| input(format!("--spacing {e}")))?;
-        self.check_targets(&[(OUTPUT, Some(&self.output))], &*recording)?;
+        self.check_outputs(&[(OUTPUT, Some(&self.output))], &*recording)?;
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
         let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
@@ -78,9 +78,9 @@ impl Convert {
         Ok(())
     }
 
-    fn check_targets(&self, targets: &[Target], recording: &dyn Source) -> Result<(), Failure> {
+    fn check_outputs(&self, targets: &[Output], recording: &dyn Source) -> Result<(), Failure> {
         let read = recording.files();
-        targets::check(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
+        check_outputs(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
     }
 
     /// The frames of all whole volumes.
@@ -90,7 +90,7 @@ impl Convert {
         }
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
         let beside = sequence::beside(&self.output);
-        self.check_targets(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
+        self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
         let bar = indicatif::ProgressBar::new(volumes as u64).with_message("volumes");

@@ -1,7 +1,7 @@
 //! `echolume devices`.
 
-use super::{Failure, failed, say};
 use crate::gpu::{Choice, context, select};
+use crate::terminal::{Failure, failed, say};
 
 #[derive(clap::Args)]
 pub struct Devices {

@@ -1,6 +1,6 @@
 //! `echolume filter`: the 2D filters of slices on an ordinary picture.
 
-use super::{Failure, failed, input, say, targets};
+use crate::args::{check_outputs, open_device};
 use crate::gpu::{Choice, Context, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
@@ -8,6 +8,7 @@ use crate::picture::{self, grey::Grey};
 use crate::profile::pass_times;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
+use crate::terminal::{Failure, failed, input, say};
 use crate::thesis_tables::measure_growth::{Row, measure, scene};
 use crate::thesis_tables::window_growth;
 use std::path::PathBuf;
@@ -107,9 +108,9 @@ impl Filter {
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
         let scene = scene(&grey, settings).map_err(input)?;
-        targets::check(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
+        check_outputs(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
 
-        let context = super::look::open_device(self.device.clone(), self.validate)?;
+        let context = open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
         let colour = if grey.from_colour { ", colour became grey by the weights of Rec. 709" } else { "" };
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);

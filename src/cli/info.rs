@@ -1,7 +1,7 @@
 //! `echolume info FILE`.
 
-use super::{Failure, input, say};
 use crate::source;
+use crate::terminal::{Failure, input, say};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

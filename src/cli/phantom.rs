@@ -1,8 +1,8 @@
 //! `echolume phantom`.
 
-use super::{Failure, failed, input, say};
 use crate::picture::check_target;
 use crate::source::phantom::{Body, Options, Phantom};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -1,10 +1,10 @@
 //! `echolume probe`: the motor.
 
-use super::serial::{Serial, fault, table};
-use super::{Failure, failed, input, say, targets};
+use crate::args::{SerialArgs, check_outputs, motor_failure, motor_table};
 use crate::files::replace;
 use crate::files::signals::Held;
 use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
+use crate::terminal::{Failure, failed, input, say};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
@@ -53,7 +53,7 @@ struct Line {
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     #[command(flatten)]
-    serial: Serial,
+    serial: SerialArgs,
 }
 
 #[derive(Args)]
@@ -113,11 +113,11 @@ impl Line {
 
     /// The table of the probe file, or where nothing is moved any module's at the usual address.
     fn any_table(&self) -> Result<MotorTable, Failure> {
-        Ok(table(self.probe.as_ref())?.unwrap_or(MotorTable { module: None, ..MotorTable::default() }))
+        Ok(motor_table(self.probe.as_ref())?.unwrap_or(MotorTable { module: None, ..MotorTable::default() }))
     }
 
     fn table(&self) -> Result<MotorTable, Failure> {
-        table(self.probe.as_ref())?
+        motor_table(self.probe.as_ref())?
             .ok_or_else(|| input("--probe FILE is needed: its [motor] table says how far to turn"))
     }
 }
@@ -135,8 +135,8 @@ fn ports() -> Result<(), Failure> {
 
 fn status(line: &Line) -> Result<(), Failure> {
     let table = line.any_table()?;
-    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
-    let status = drive.status().map_err(fault)?;
+    let mut drive = Drive::open(&line.settings(), &table).map_err(motor_failure)?;
+    let status = drive.status().map_err(motor_failure)?;
     say!("module: {}", status.module);
     if line.probe.is_some() {
         say!("angle: {:.3} deg, if home was found since it is on", status.angle);
@@ -161,14 +161,14 @@ fn status(line: &Line) -> Result<(), Failure> {
 
 fn home(line: &Line) -> Result<(), Failure> {
     let table = line.table()?;
-    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
-    drive.home().map_err(fault)?;
-    say!("home: found; the array is at {:.3} deg", drive.status().map_err(fault)?.angle);
+    let mut drive = Drive::open(&line.settings(), &table).map_err(motor_failure)?;
+    drive.home().map_err(motor_failure)?;
+    say!("home: found; the array is at {:.3} deg", drive.status().map_err(motor_failure)?.angle);
     Ok(())
 }
 
 fn stop(line: &Line) -> Result<(), Failure> {
-    Drive::stop_at(&line.settings(), &line.any_table()?).map_err(fault)?;
+    Drive::stop_at(&line.settings(), &line.any_table()?).map_err(motor_failure)?;
     say!("stopped");
     Ok(())
 }
@@ -179,10 +179,10 @@ impl SweepArguments {
         let sweep = Sweep { angle: self.angle, rate: self.rate, volumes: self.volumes };
         // Before the port is touched.
         let speed = sweep.speed(&table, settings.round_trip()).map_err(input)?;
-        targets::check(&[("--positions", self.positions.as_deref())], self.line.probe.as_deref())?;
-        let mut drive = Drive::open(&settings, &table).map_err(fault)?;
+        check_outputs(&[("--positions", self.positions.as_deref())], self.line.probe.as_deref())?;
+        let mut drive = Drive::open(&settings, &table).map_err(motor_failure)?;
         if !self.homed {
-            drive.home().map_err(fault)?;
+            drive.home().map_err(motor_failure)?;
         }
         say!("sweep: {} deg at {} volumes/s, {speed:.1} deg/s at most", self.angle, self.rate);
         let (mut positions, mut passes, start) = (Vec::new(), 0, Instant::now());
@@ -205,7 +205,7 @@ impl SweepArguments {
             {
                 say!("swept: {passes} volumes; the motor was stopped by {signal}");
             }
-            Err(error) => return Err(fault(error)),
+            Err(error) => return Err(motor_failure(error)),
         }
         kept.map_err(failed)
     }
@@ -225,7 +225,7 @@ impl Simulate {
         use crate::probe::motor::simulate::{Options, Simulator};
         let held = Held::take();
         let options = Options {
-            table: table(self.probe.as_ref())?.unwrap_or_default(),
+            table: motor_table(self.probe.as_ref())?.unwrap_or_default(),
             fault: self.fault,
             no_watchdog: self.no_watchdog,
         };

@@ -1,13 +1,11 @@
 //! `echolume stream`.
 
-use super::arriving::Arriving;
-use super::look::Look;
-use super::turns::Turns;
-use super::{Failure, failed, input, say, unheard};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::files::signals::Held;
 use crate::gpu::Context;
 use crate::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
 use crate::picture;
+use crate::terminal::{Failure, failed, input, is_closed, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -28,11 +26,11 @@ const EVERY: Duration = Duration::from_secs(1);
 )]
 pub struct Stream {
     #[command(flatten)]
-    source: Arriving,
+    source: SourceArgs,
     #[command(flatten)]
-    look: Look,
+    scene: SceneArgs,
     #[command(flatten)]
-    turns: Turns,
+    stream: StreamArgs,
     /// Write each picture into this folder (PNG, named by its volume; rolling: by its number)
     #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
     out: Option<PathBuf>,
@@ -55,8 +53,8 @@ pub struct Stream {
 
 impl Stream {
     pub fn run(&self) -> Result<(), Failure> {
-        let update = self.turns.update()?;
-        let settings = self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
+        let update = self.stream.update()?;
+        let settings = self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -65,10 +63,10 @@ impl Stream {
             check_record(file, self.source.path())?;
         }
         let source = self.source.open()?;
-        let mut context = self.look.device(self.validate)?;
+        let mut context = self.scene.open_device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let (images, queues) = (self.turns.images, self.turns.queues());
+        let (images, queues) = (self.stream.images, self.stream.queues());
         let options = Options { update, images, queues, ..Options::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.go(&mut stream, update, &mut context);
@@ -93,7 +91,7 @@ impl Stream {
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() && lost_at != Some(pictures) => {
                     tracing::warn!("{lost}; going on with the next volume on the device opened anew");
                     lost_at = Some(pictures);
-                    *context = self.look.device(self.validate)?;
+                    *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
                     continue;
                 }
@@ -129,7 +127,7 @@ impl Stream {
                 break None;
             }
             // Whoever read the lines has gone, and nothing else is kept.
-            let is_for_nobody = self.null && self.record.is_none() && unheard();
+            let is_for_nobody = self.null && self.record.is_none() && is_closed();
             if is_for_nobody || signals.signal().is_some() {
                 break None;
             }
@@ -154,7 +152,7 @@ impl Stream {
         }
         match end {
             None => Ok(()),
-            Some(why) => Err(failed(format!("{}: {why}", self.source.shown()))),
+            Some(why) => Err(failed(format!("{}: {why}", self.source.name()))),
         }
     }
 

@@ -1,10 +1,10 @@
 //! `echolume support-bundle`.
 
-use super::arriving::Arriving;
-use super::{Failure, failed, input, say};
+use crate::args::SourceArgs;
 use crate::kiosk::bundle::Bundle;
 use crate::kiosk::config::Config;
 use crate::picture;
+use crate::terminal::{Failure, failed, input, say};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -57,7 +57,8 @@ impl SupportBundle {
         }
         let mut bundle = Bundle::new(self.config.as_deref());
         let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::USUAL));
-        if let Some(Err(Failure::Input(fault))) = Config::read(config).ok().map(|config| Arriving::configured(&config))
+        if let Some(Err(Failure::Input(fault))) =
+            Config::read(config).ok().map(|config| SourceArgs::from_config(&config))
         {
             bundle.note(&format!("configuration: {fault}"));
         }

@@ -1,15 +1,13 @@
 //! `echolume view`.
 
-use super::arriving::Arriving;
-use super::look::Look;
-use super::report_error::{nanoseconds, read};
-use super::shown::{Place, Wanted};
-use super::turns::Turns;
-use super::{Failure, failed, input, say};
+use super::view_config::{ConsoleConfig, WindowConfig};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs};
+use crate::error_report::command::{nanoseconds, read};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::Room;
+use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
@@ -29,9 +27,9 @@ use std::time::Duration;
 )]
 pub struct View {
     #[command(flatten)]
-    source: Arriving,
+    source: SourceArgs,
     #[command(flatten)]
-    look: Look,
+    scene: SceneArgs,
     /// No way out but the configured keys (Ctrl+Alt+Q); a source or a configuration that fails is tried again for ever, and why is shown
     #[arg(long)]
     kiosk: bool,
@@ -64,7 +62,7 @@ pub struct View {
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     scale: f32,
     #[command(flatten)]
-    turns: Turns,
+    stream: StreamArgs,
     /// Time of a picture that is held while the view moves, such as 16ms; none: full quality always
     #[arg(long, value_name = "TIME", default_value = "33ms")]
     budget: String,
@@ -104,12 +102,12 @@ impl View {
                 usual(why);
             }));
         }
-        let (kiosk, device) = (self.kiosk, self.look.device.clone());
+        let (kiosk, device) = (self.kiosk, self.scene.device.clone());
         let mut place = match self.config() {
             None => self.place()?,
-            Some(Ok(config)) => Place::configured(&config)?,
+            Some(Ok(config)) => WindowConfig::configured(&config)?,
             // Why is shown on the screen.
-            Some(Err(_)) if kiosk => Place::configured(&Config::default())?,
+            Some(Err(_)) if kiosk => WindowConfig::configured(&Config::default())?,
             Some(Err(fault)) => return Err(input(fault)),
         };
         if self.direct || place.direct.is_some() {
@@ -137,7 +135,7 @@ impl View {
                 Err(failure) => {
                     let why = failure.message();
                     tracing::error!("{why}");
-                    (Wanted::nothing(), Some(view.amiss(why)))
+                    (ConsoleConfig::nothing(), Some(view.amiss(why)))
                 }
             };
             let (open, options) = wanted.options(factor, wake, amiss);
@@ -161,12 +159,12 @@ impl View {
     }
 
     /// Everything that is wanted, as it is written now.
-    fn wanted(&self) -> Result<Wanted, Failure> {
+    fn wanted(&self) -> Result<ConsoleConfig, Failure> {
         let usual = Config::default();
         let (mut wanted, exit) = match self.config() {
             Some(config) => {
                 let config = config.map_err(input)?;
-                (Wanted::configured(&config, &self.look)?, config.keys.exit)
+                (ConsoleConfig::configured(&config, &self.scene)?, config.keys.exit)
             }
             None => (self.flagged()?, usual.keys.exit),
         };
@@ -176,18 +174,18 @@ impl View {
         // Without a kiosk the end of the source is the end.
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
-        (options.images, options.queues) = (self.turns.images, self.turns.queues());
+        (options.images, options.queues) = (self.stream.images, self.stream.queues());
         Ok(wanted)
     }
 
     /// The same from flags alone.
-    fn flagged(&self) -> Result<Wanted, Failure> {
+    fn flagged(&self) -> Result<ConsoleConfig, Failure> {
         if let Some(file) = &self.record {
             super::stream::check_record(file, self.source.path())?;
         }
         let options = Options {
-            settings: self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
-            update: self.turns.update()?,
+            settings: self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
+            update: self.stream.update()?,
             cine: Room { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,
@@ -197,16 +195,16 @@ impl View {
             scale: self.scale,
             ..Options::usual()
         };
-        Ok(Wanted { source: Some(self.source.clone()), first: None, options })
+        Ok(ConsoleConfig { source: Some(self.source.clone()), first: None, options })
     }
 
-    fn place(&self) -> Result<Place, Failure> {
+    fn place(&self) -> Result<WindowConfig, Failure> {
         if !(0.5..=4.0).contains(&self.scale) {
             return Err(input(format!("--scale {}: must lie in 0.5..=4", self.scale)));
         }
-        let mut place = Place::usual();
-        if self.look.has_size() {
-            place.shape.size = self.look.layers(false, &[])?.finish().map_err(input)?.picture.size;
+        let mut place = WindowConfig::usual();
+        if self.scene.has_size() {
+            place.shape.size = self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size;
         }
         place.shape.full_screen = self.kiosk || self.monitor.is_some();
         place.shape.monitor = self.monitor.clone();
@@ -220,8 +218,8 @@ impl View {
             return Err(input(format!("--refresh {hz}: must lie in 1..=1000")));
         }
         let configured = configured.unwrap_or_default();
-        let size = match self.look.has_size() {
-            true => Some(self.look.layers(false, &[])?.finish().map_err(input)?.picture.size),
+        let size = match self.scene.has_size() {
+            true => Some(self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size),
             false => configured.size,
         };
         let monitor = self.monitor.clone().or(configured.monitor);

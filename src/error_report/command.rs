@@ -1,11 +1,11 @@
 //! `echolume report error`.
 
-use super::asked::Asked;
-use super::{Failure, failed, input, say};
+use crate::args::InputArgs;
 use crate::error_report::{self, Measure, choose, dials, measure, plot};
 use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
+use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest report that is read, bytes.
@@ -19,9 +19,9 @@ const LONGEST: u64 = 64 << 20;
                         echolume report error sweep.mha --preset fetal --mode vr --under-error 0.01\n  \
                         echolume report error --under-time 16ms"
 )]
-pub struct Error {
+pub struct ErrorReport {
     #[command(flatten)]
-    asked: Asked,
+    input: InputArgs,
     /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick, or
     /// all; may be given again
     #[arg(long, value_name = "NAME", default_value = "all")]
@@ -49,7 +49,7 @@ pub struct Error {
     from: Option<PathBuf>,
 }
 
-impl Error {
+impl ErrorReport {
     pub fn run(&self) -> Result<(), Failure> {
         let measure = match self.measure.as_str() {
             "rmse" => Measure::Rmse,
@@ -82,20 +82,20 @@ impl Error {
             "converged" => measure::Held::Converged,
             other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
         };
-        let (mut source, scene) = self.asked.open()?;
+        let (mut source, scene) = self.input.open()?;
         if let Some(folder) = &self.output {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let dials = self.dials(&scene)?;
-        let context = self.asked.device(false)?;
+        let context = self.input.open_device(false)?;
         let mut frames = Vec::new();
-        self.asked.frames(&mut *source, |frame| {
+        self.input.for_each_frame(&mut *source, |frame| {
             frames.push(frame);
             Ok(())
         })?;
-        let layers = self.asked.layers()?;
-        let (repeats, frames, shown) = (self.repeat, &frames[..], self.asked.shown());
+        let layers = self.input.layers()?;
+        let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
         let asked =
             measure::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
         let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
@@ -143,14 +143,14 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
 }
 
 /// A stored report.
-pub(super) fn read(file: &Path) -> Result<error_report::Report, Failure> {
+pub(crate) fn read(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
     error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }
 
 /// A time such as 16ms, 0.25s or 250us.
-pub(super) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
+pub(crate) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
     let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
     let parsed =
         units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));

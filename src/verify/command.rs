@@ -1,9 +1,10 @@
 //! `echolume verify`.
 
-use super::{Failure, failed, input, say, targets};
+use crate::args::check_outputs;
 use crate::files::signals::Held;
 use crate::files::{read_text, replace};
 use crate::gpu::{Choice, Context, ContextOptions, GpuError};
+use crate::terminal::{Failure, failed, input, say};
 use crate::verify::report::baseline::{self, Compared, compare};
 use crate::verify::report::{Level, Outcome, Run, Verdict, html, json, junit, words};
 use crate::verify::self_test::{self, Caught};
@@ -88,7 +89,7 @@ impl Verify {
         }
         let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
-        targets::check(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
+        check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // What was not asked for is not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.looks_at(o)));

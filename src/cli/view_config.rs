@@ -1,14 +1,13 @@
 //! What a view is made of, whether flags or a configuration say so.
 
-use super::arriving::Arriving;
-use super::look::Look;
 use super::view::rungs;
-use super::{Failure, input};
+use crate::args::{SceneArgs, SourceArgs};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
 use crate::live::cine::Room;
 use crate::source::live::Live;
+use crate::terminal::{Failure, input};
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::source_supervisor::Open;
 use crate::ui::window::{self, Make, Shape};
@@ -19,19 +18,23 @@ use std::time::SystemTime;
 const SIZE: [u32; 2] = [1280, 800];
 
 /// The device and the window: what stays as it was at the start.
-pub struct Place {
+pub struct WindowConfig {
     pub device: ContextOptions,
     pub shape: Shape,
     /// A monitor that no desktop holds, instead of a window.
     pub direct: Option<display::Wanted>,
 }
 
-impl Place {
-    pub fn usual() -> Place {
+impl WindowConfig {
+    pub fn usual() -> WindowConfig {
         let device = ContextOptions { device: Choice::Best, validation: false };
         let (monitor, pace, time) = (None, PresentMode::Fifo, None);
         let direct = None;
-        Place { device, direct, shape: Shape { size: SIZE, full_screen: false, monitor, pace, stays: false, time } }
+        WindowConfig {
+            device,
+            direct,
+            shape: Shape { size: SIZE, full_screen: false, monitor, pace, stays: false, time },
+        }
     }
 
     /// Runs what is made there until someone leaves.
@@ -53,8 +56,8 @@ impl Place {
         }
     }
 
-    pub fn configured(config: &Config) -> Result<Place, Failure> {
-        let mut place = Place::usual();
+    pub fn configured(config: &Config) -> Result<WindowConfig, Failure> {
+        let mut place = WindowConfig::usual();
         let display = &config.display;
         place.shape.size = display.size;
         place.shape.full_screen = display.full_screen;
@@ -77,23 +80,23 @@ impl Place {
 }
 
 /// Everything else.
-pub struct Wanted {
+pub struct ConsoleConfig {
     /// None: there is nothing to see.
-    pub source: Option<Arriving>,
+    pub source: Option<SourceArgs>,
     /// It was opened before there was a window.
     pub first: Option<Box<dyn Live>>,
     pub options: Options,
 }
 
-impl Wanted {
+impl ConsoleConfig {
     /// Nothing to see, for a console that only says why; also without a configuration there is a way out.
-    pub fn nothing() -> Wanted {
+    pub fn nothing() -> ConsoleConfig {
         let exit = Config::default().keys.exit;
         let options = Options { panels: false, exit, is_kiosk: true, ..Options::usual() };
-        Wanted { source: None, first: None, options }
+        ConsoleConfig { source: None, first: None, options }
     }
 
-    pub fn configured(config: &Config, look: &Look) -> Result<Wanted, Failure> {
+    pub fn configured(config: &Config, look: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.refuse(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
         let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
@@ -110,15 +113,15 @@ impl Wanted {
             scale: display.scale as f32,
             ..Options::usual()
         };
-        Ok(Wanted { source: Some(Arriving::configured(config)?), first: None, options })
+        Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
     /// With its source open.
     ///
     /// # Errors
     /// Why it cannot be opened.
-    pub fn opened(mut self) -> Result<Wanted, Failure> {
-        self.first = self.source.as_ref().map(Arriving::open).transpose()?;
+    pub fn opened(mut self) -> Result<ConsoleConfig, Failure> {
+        self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
         Ok(self)
     }
 
@@ -127,7 +130,7 @@ impl Wanted {
         let (source, first) = (self.source, Mutex::new(self.first));
         let open: Open = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
             Some(source) => Ok(source),
-            None => match source.as_ref().map(Arriving::open) {
+            None => match source.as_ref().map(SourceArgs::open) {
                 Some(opened) => opened.map_err(Failure::message),
                 None => Err("there is no source".into()),
             },

@@ -1,14 +1,12 @@
 //! `echolume profile`.
 
-use super::asked::Asked;
-use super::look::open_device;
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{InputArgs, Output, check_outputs, open_device};
 use crate::files::{read_text, replace};
 use crate::gpu::Choice;
 use crate::profile as model;
 use crate::profile::measure;
 use crate::profile::{compare, formats, table, trace};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest profile that is read, bytes.
@@ -22,7 +20,7 @@ const LONGEST: u64 = 256 << 20;
                         echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)")]
 pub struct Profile {
     #[command(flatten)]
-    asked: Asked,
+    input: InputArgs,
     /// Volumes measured
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10000))]
     repeat: u32,
@@ -74,22 +72,22 @@ impl Profile {
     }
 
     fn measure(&self) -> Result<(), Failure> {
-        let (mut source, mut scene) = self.asked.open()?;
+        let (mut source, mut scene) = self.input.open()?;
         scene.settings.slices.still |= self.still;
-        let targets: [Target; 4] = [
+        let targets: [Output; 4] = [
             ("--json", self.json.as_deref()),
             ("--csv", self.csv.as_deref()),
             ("--csv-samples", self.csv_samples.as_deref()),
             ("--trace", self.trace.as_deref()),
         ];
-        self.asked.check_targets(&targets, &*source)?;
+        self.input.check_outputs(&targets, &*source)?;
         if !self.turn.is_finite() {
             return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
         }
-        let context = self.asked.device(false)?;
+        let context = self.input.open_device(false)?;
         // One volume, kept for all repeats.
         let mut frames = Vec::new();
-        self.asked.frames(&mut *source, |frame| {
+        self.input.for_each_frame(&mut *source, |frame| {
             frames.push(frame);
             Ok(())
         })?;
@@ -98,7 +96,7 @@ impl Profile {
             warm_up: self.warm_up as usize,
             still: self.still,
             turn: self.turn,
-            input: self.asked.shown(),
+            input: self.input.name(),
             ceilings: !self.no_ceilings,
         };
         let against = match &self.against {
@@ -131,7 +129,7 @@ impl Profile {
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
-        targets::check(&[("--json", self.json.as_deref())], [old, new])?;
+        check_outputs(&[("--json", self.json.as_deref())], [old, new])?;
         let (old, new) = (read(old)?, read(new)?);
         self.judge(&old, &new)
     }
