@@ -1,6 +1,6 @@
-//! Stiff and extreme cases of light, samples and distance maps, one test a case. Cases of time stamps are in `echolume verify`, those of geometry and pictures
-//! in `extreme_geometry`, those of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot pixels, windows wider
-//! than the picture) in `filters` and, against every reference, in `passes`.
+//! Stiff and extreme cases of light, samples and distance maps, one test a case. Cases of time stamps are in `echolume verify`, those of
+//! geometry and pictures in `extreme_geometry`, those of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot
+//! pixels, windows wider than the picture) in `filters` and, against every reference, in `passes`.
 
 use crate::common::gpu::*;
 use crate::common::program;
