@@ -6,7 +6,7 @@ use crate::gpu::{Choice, Context, ContextOptions, Fetch, GpuError, select};
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom};
-use crate::source::phantom_source::Played;
+use crate::source::phantom_source::PhantomSource;
 use crate::source::{self, Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
@@ -100,7 +100,7 @@ impl InputArgs {
     fn source(&self) -> Result<Box<dyn Source>, Failure> {
         match &self.input {
             Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
-            None => Ok(Box::new(Played::new(Phantom::new(phantom::Options::default()).map_err(input)?))),
+            None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
     }
 

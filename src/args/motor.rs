@@ -1,9 +1,11 @@
 //! Arguments of commands that drive the motor of a probe: the serial line, and a motor that sweeps the array while frames arrive.
 
 use crate::probe::ProbeFile;
-use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Parity, Settings, StopBits, Sweep, Turning};
+use crate::probe::motor::{
+    BackgroundSweep, Drive, Fault, MotorError, MotorTable, Parity, PortSettings, StopBits, Sweep,
+};
 use crate::source::live::Live;
-use crate::source::motor_tracking::{Clock, Options, Swept};
+use crate::source::motor_tracking::{Clock, MotorTracked, MotorTrackingOptions};
 use crate::terminal::{Failure, failed, input};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -40,7 +42,7 @@ pub struct MotorArgs {
 /// A sweep that the motor can carry out. The port is not open yet.
 pub struct PlannedSweep<'a> {
     arguments: &'a MotorArgs,
-    settings: Settings,
+    settings: PortSettings,
     table: MotorTable,
     sweep: Sweep,
     /// Speed between the acceleration ramps, degrees per second.
@@ -66,7 +68,7 @@ impl MotorArgs {
     ) -> Result<Option<PlannedSweep<'_>>, Failure> {
         let (Some(port), Some(rate)) = (&self.motor, self.sweeps) else { return Ok(None) };
         self.check()?;
-        let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::beside)) else {
+        let Some(file) = probe.map(Path::to_path_buf).or(recording.and_then(ProbeFile::find_for)) else {
             return Err(input("--motor needs --probe FILE, whose [motor] table says how far to turn"));
         };
         let probe = ProbeFile::read(&file).map_err(input)?;
@@ -85,18 +87,18 @@ impl MotorArgs {
 
 impl PlannedSweep<'_> {
     /// Opens the port and starts homing, then sweeping.
-    pub fn start(&self) -> Result<Turning, Failure> {
+    pub fn start(&self) -> Result<BackgroundSweep, Failure> {
         let drive = Drive::open(&self.settings, &self.table).map_err(motor_failure)?;
-        Turning::start(drive, self.sweep, self.arguments.homed).map_err(failed)
+        BackgroundSweep::start(drive, self.sweep, self.arguments.homed).map_err(failed)
     }
 
-    /// Wraps `source` so that each frame gets its place from the motor. `holds`: see [`Options::holds`].
-    pub fn track(&self, source: Box<dyn Live>, motor: Turning, holds: bool) -> Box<dyn Live> {
+    /// Wraps `source` so that each frame gets its place from the motor. `holds`: see [`MotorTrackingOptions::holds`].
+    pub fn track(&self, source: Box<dyn Live>, motor: BackgroundSweep, holds: bool) -> Box<dyn Live> {
         let clock = match self.arguments.stamps {
             true => Clock::Stamp,
             false => Clock::Arrival { delay: self.arguments.delay * 1e-3 },
         };
-        Box::new(Swept::new(source, motor, Options { clock, holds }))
+        Box::new(MotorTracked::new(source, motor, MotorTrackingOptions { clock, holds }))
     }
 }
 
@@ -126,8 +128,8 @@ enum ParityName {
 
 impl SerialArgs {
     /// The settings of the port at `port`.
-    pub fn settings(&self, port: &str) -> Settings {
-        Settings {
+    pub fn settings(&self, port: &str) -> PortSettings {
+        PortSettings {
             path: port.into(),
             baud: self.baud,
             parity: match self.parity {

@@ -7,10 +7,10 @@ use crate::probe::Geometry;
 use crate::source::Source;
 use crate::source::freehand;
 use crate::source::igtl::{Network, NetworkOptions, Poses};
-use crate::source::live::{Live, Paced, Playback};
+use crate::source::live::{Live, Playback, PlaybackSource};
 use crate::source::motor_tracking::FreeRunning;
 use crate::source::phantom::{self, Phantom};
-use crate::source::phantom_source::Kept;
+use crate::source::phantom_source::CachedPhantom;
 use crate::source::piped::Piped;
 use crate::terminal::{Failure, failed, input};
 use clap::Parser;
@@ -134,7 +134,7 @@ impl SourceArgs {
             let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
             // The frame rate of a free-running probe is limited by the speed of sound.
             let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
-            Box::new(Paced::new(recording, self.playback(rate)?, self.rounds))
+            Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))
         };
         match sweep {
             Some(sweep) => {
@@ -158,11 +158,12 @@ impl SourceArgs {
 
     /// The phantom: its volumes in a loop, or with a motor the frames that the moving array acquires.
     fn phantom(&self, sweep: Option<&PlannedSweep>) -> Result<Box<dyn Live>, Failure> {
-        let options = phantom::Options { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::Options::default() };
+        let options =
+            phantom::PhantomOptions { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::PhantomOptions::default() };
         let Some(sweep) = sweep else {
             let playback = self.playback(self.rate.or(Some(PHANTOM_RATE)))?;
             let phantom = Phantom::new(options).map_err(input)?;
-            return Ok(Box::new(Paced::new(Box::new(Kept::new(phantom)), playback, u32::MAX)));
+            return Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(phantom)), playback, u32::MAX)));
         };
         if self.rate.is_some() || self.real_time {
             return Err(input(
@@ -188,7 +189,8 @@ impl SourceArgs {
         };
         let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
         let widest_hole = positive("--hole", self.hole, 0.0)?;
-        options.freehand = freehand::Options { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
+        options.freehand =
+            freehand::CompoundingOptions { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
         Ok(options)
     }
 

@@ -26,16 +26,16 @@ pub struct Render {
     /// The picture to write (PNG)
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
-    /// Print the plan: passes, bytes, and why each is there or not; render nothing
+    /// Print the plan without rendering: passes, bytes, and the reason for each pass
     #[arg(long)]
     explain: bool,
-    /// Write every slot as a picture into this folder
+    /// Write every slot (GPU resource) as a picture into this folder
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
-    /// Take the most accurate settings that a report of errors found to need less time, such as 16ms; flags and --set override
+    /// Use the most accurate settings that take less time, such as 16ms, by an error report; flags and --set override
     #[arg(long, value_name = "TIME", requires = "report")]
     budget: Option<String>,
-    /// The error.json that `echolume report error -o DIR` wrote of this recording on this device
+    /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
     /// Print the time of every pass
@@ -89,7 +89,7 @@ impl Render {
         }
     }
 
-    /// The recording and its scene, within the budget if one is set.
+    /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open() };
         let time = nanoseconds("--budget", budget)?;
@@ -99,7 +99,7 @@ impl Render {
         if there != here {
             let shown = |[x, y, z]: [u32; 3]| format!("{x}x{y}x{z}");
             let fault = format!(
-                "--report {}: is of a volume of {}, this one has {}",
+                "--report {}: is for a volume of {}, this one has {}",
                 file.display(),
                 shown(there),
                 shown(here)

@@ -21,44 +21,43 @@ const LONGEST: u64 = 256 << 20;
 pub struct Profile {
     #[command(flatten)]
     input: InputArgs,
-    /// Volumes measured
+    /// Number of volumes to measure
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10000))]
     repeat: u32,
-    /// Volumes rendered before that: they compile shaders and wake clocks
+    /// Number of warm-up volumes: the driver compiles shaders and the clocks rise
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     warm_up: u32,
-    /// Send the frames once and measure the picture alone
+    /// Upload the frames once and measure only the picture
     #[arg(long)]
     still: bool,
-    /// Turn the view by this much before each volume, so that every picture is from another angle: the camera's azimuth, that
-    /// of the planes where planes are cut
+    /// Rotate the view by this angle before each volume: the azimuth of the camera, or of the planes
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     turn: f64,
-    /// Leave out measuring what bounds the device (copies, samples, fetches)
+    /// Do not measure the device's ceilings (copies, samples, fetches)
     #[arg(long)]
     no_ceilings: bool,
-    /// Write everything measured, to be compared later
+    /// Write all measurements (JSON), for --compare
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write one line a pass
+    /// Write one line per pass (CSV)
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write one line a pass and repeat
+    /// Write one line per pass and repeat (CSV)
     #[arg(long, value_name = "FILE")]
     csv_samples: Option<PathBuf>,
     /// Write a trace for Perfetto or Chrome
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Compare two profiles pass by pass instead of measuring; exit code 1 on a regression
+    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression
     #[arg(long, num_args = 2, value_names = ["OLD", "NEW"])]
     compare: Option<Vec<PathBuf>>,
-    /// Measure on this device too, in turns with the other, and compare them
+    /// Measure on this device too, alternating with the other, and compare them
     #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
     against: Option<Choice>,
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,
-    /// Compare also what was measured on other scenes or sizes
+    /// Compare also profiles of different scenes or sizes
     #[arg(long)]
     force: bool,
 }
@@ -85,7 +84,7 @@ impl Profile {
             return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
         }
         let context = self.input.open_device(false)?;
-        // One volume, kept for all repeats.
+        // All repeats use the same volume.
         let mut frames = Vec::new();
         self.input.for_each_frame(&mut *source, |frame| {
             frames.push(frame);
@@ -134,7 +133,7 @@ impl Profile {
         self.judge(&old, &new)
     }
 
-    /// Prints what differs; fails on a regression.
+    /// Prints the differences. Fails on a regression.
     fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
         let options = compare::Options { threshold: self.threshold, force: self.force, ..compare::Options::default() };
         let compared = compare::compare(old, new, &options).map_err(input)?;

@@ -9,7 +9,7 @@ use crate::thesis_tables::measure::{Asked, growth, run};
 use crate::thesis_tables::{csv, markdown};
 use std::path::{Path, PathBuf};
 
-/// Volumes rendered in each row before times count: they compile shaders and wake clocks.
+/// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.
 const WARM_UP: usize = 1;
 
 #[derive(clap::Args)]
@@ -21,18 +21,18 @@ const WARM_UP: usize = 1;
                         echolume report tables scan.png --quick --repeat 3"
 )]
 pub struct ThesisTables {
-    /// PNG, JPEG, PNM or BMP for Tables 7-9
+    /// Pictures for Tables 7-9: PNG, JPEG, PNM or BMP
     pictures: Vec<PathBuf>,
-    /// Volumes measured in each row
+    /// Number of volumes measured in each row
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
     /// Write the tables to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Write Tables 3-6 to this file, too, and Tables 7-9 to NAME.growth.csv beside it
+    /// Write Tables 3-6 also to this file, and Tables 7-9 to NAME.growth.csv next to it
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Volumes of a quarter of the edge and frames of 64 lines, to try
+    /// Quick trial: volumes of a quarter of the edge length, frames of 64 lines
     #[arg(long)]
     quick: bool,
     /// Vulkan device, by number or part of its name (see `echolume devices`)

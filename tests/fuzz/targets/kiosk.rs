@@ -2,7 +2,7 @@
 
 use super::told;
 use echolume::kiosk::config::Config;
-use echolume::kiosk::redacted::Redactor;
+use echolume::kiosk::redaction::Redactor;
 use std::path::Path;
 
 /// An accepted configuration round-trips, and gives arguments and layers.

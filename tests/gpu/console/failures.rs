@@ -35,7 +35,7 @@ fn a_lost_source_is_awaited_and_the_picture_stays() {
     desk.console.command(&Command::Turn([20.0, 5.0]), Instant::now());
     desk.rest();
     assert!(last.as_ref() != Some(&desk.picture()));
-    assert_eq!(desk.console.stream().cine().kept().len(), 3, "volumes of three sources");
+    assert_eq!(desk.console.stream().cine().volumes().len(), 3, "volumes of three sources");
 }
 
 /// Prevents an accidental touch from ending a kiosk, and a kiosk that cannot be ended.

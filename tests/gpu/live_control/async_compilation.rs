@@ -10,13 +10,13 @@ use echolume::scene::{Scene, VolumeFormat};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-fn waking() -> (Arc<AtomicU64>, live::Options) {
+fn waking() -> (Arc<AtomicU64>, live::StreamOptions) {
     let woken = Arc::new(AtomicU64::new(0));
     let counted = woken.clone();
     let wake: Wake = Arc::new(move || {
         counted.fetch_add(1, Ordering::Relaxed);
     });
-    (woken, live::Options { wake: Some(wake), ..kept(Update::Whole) })
+    (woken, live::StreamOptions { wake: Some(wake), ..kept(Update::Whole) })
 }
 
 /// Prevents a view that stalls while shaders compile, for both sweep directions of the volumes that arrive meanwhile.
@@ -91,7 +91,7 @@ fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
     bench.frames(volume(1));
     assert!(bench.picture() == (1, expected[1].clone()));
     bench.stream.freeze(true);
-    bench.stream.show_kept(0);
+    bench.stream.show_cine_volume(0);
     assert!(bench.picture() == (0, expected[0].clone()));
     bench.stream.revive(&other).expect("made anew of what could be drawn");
     assert!(bench.picture() == (0, expected[0].clone()));
