@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 pub use super::files::*;
 pub use super::probes::wobbler;
-pub use super::scenes::*;
+pub use super::scenes::{BYTES, FLOATS, scene};
 pub use echolume::verify::built_in::{
     ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
 };

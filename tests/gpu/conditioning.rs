@@ -2,11 +2,12 @@
 //! that decimation does not move.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::{Array, Axis, Geometry, Motion, Probe};
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 
 /// One frame of a still linear array: slices equal the lines, so that depths can be read directly.
 fn probe(samples: usize, lines: usize) -> Probe {
@@ -213,7 +214,7 @@ fn conditioning_is_planned_only_where_it_changes_something() {
     }
     // A limit of lines has no effect where there are none; conditioning is refused there.
     let on_cartesian = |conditioning: &str| {
-        let settings: Settings = toml::from_str(&format!("conditioning = {{ {conditioning} }}")).expect("settings");
+        let settings = settings(&format!("conditioning = {{ {conditioning} }}"));
         Scene::new(cartesian([700, 8, 3]), BYTES, settings)
     };
     assert!(!conditions(&on_cartesian("samples = 512").expect("a limit")));
@@ -241,7 +242,7 @@ fn impossible_conditioning_is_refused_by_name() {
         ("tgc = [{ depth = nan, gain = 1 }]", "conditioning.tgc", "0..="),
         ("tgc = [{ depth = 1, gain = inf }]", "conditioning.tgc", "-120..=120"),
     ] {
-        let settings: Settings = toml::from_str(&format!("conditioning = {{ {asked} }}")).expect("settings");
+        let settings = settings(&format!("conditioning = {{ {asked} }}"));
         let refused = Scene::new(Geometry::Sweep(probe(10_000, 4)), BYTES, settings).expect_err(asked).to_string();
         assert!(refused.contains(field) && refused.contains(fault), "{asked}: {refused}");
     }

@@ -2,17 +2,14 @@
 //! names the fault.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::plan::Plan;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::reference;
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 use std::f64::consts::PI;
-
-fn settings(toml: &str) -> Settings {
-    toml::from_str(toml).expect("settings")
-}
 
 /// A speck of tissue in fluid, smooth over a few samples of any lattice: a function of the indices of the frame.
 fn tissue(scene: &Scene) -> Vec<Texels> {

@@ -1,11 +1,12 @@
 //! The sigma filters: known answers, extremes, misses, refusals; plans of every filter in a row.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
 use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
 use echolume::plan::Plan;
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 use std::collections::BTreeMap;
 
 pub const CENTRES: [&str; 4] = ["median", "perona-malik", "gradient-inverse", "nagao-matsuyama"];
@@ -230,7 +231,7 @@ fn filter_settings_beyond_a_limit_are_refused_by_name_and_limit() {
         ("slices = { smooth = { kernel = 4 } }", ["slices.smooth.kernel", "3 or 5"]),
         ("slices = { smooth = { kernel = 3, depth = 1.0 } }", ["slices.smooth.kernel", "instead"]),
     ] {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings = settings(toml);
         let error = Scene::new(cartesian([8, 8, 8]), BYTES, settings).expect_err(toml).to_string();
         assert!(words.iter().all(|w| error.contains(w)) && !error.contains('\n'), "{toml}: {error}");
     }

@@ -1,6 +1,7 @@
 //! Frames that arrive while pictures are drawn: pictures show complete sent volumes, on one, two and three queues.
 
 use crate::common::gpu::*;
+use crate::common::scenes;
 use echolume::gpu::{Options, Renderer};
 use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
 use echolume::passes::{Slot, Texels};
@@ -69,11 +70,10 @@ pub fn header(share: f64) -> Header {
 
 pub fn settings(toml: &str) -> Settings {
     let small = "picture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8'";
-    toml::from_str(&match toml.split_once("slices.") {
+    scenes::settings(&match toml.split_once("slices.") {
         Some((before, after)) => format!("{before}\n{small}, {after} }}"),
         None => format!("{toml}\n{small} }}"),
     })
-    .expect("settings")
 }
 
 /// A volume of a sweep with its frames in order of acquisition: every second one backwards, each sample from its position.

@@ -1,10 +1,11 @@
 //! Planes and slabs show objects in their true positions.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Grid, Probe};
-use echolume::scene::{Input, Scene, Settings};
+use echolume::scene::{Input, Scene};
 use echolume::source::Recording;
 use glam::{DVec2, DVec3};
 
@@ -124,7 +125,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
                  region = {{ lateral = [{}, {}], depth = [{}, {}], elevation = [{}, {}] }}",
                 x - 5.0, x + 5.0, depth - 5.0, depth + 5.0, z - 5.0, z + 5.0
             );
-            let settings: Settings = toml::from_str(&toml.replace(",  }", " }")).expect("settings");
+            let settings = settings(&toml.replace(",  }", " }"));
             let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
             let renderer = match &mut renderer {
                 Some(renderer) => {

@@ -1,20 +1,20 @@
 //! Real and simulated recordings against known facts.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Probe};
-use echolume::scene::{Input, Scene, Settings, SliceGrid};
+use echolume::scene::{Input, Scene, SliceGrid};
 use echolume::source::Recording;
 use glam::DVec3;
 
 /// The conversion that the PLUS toolkit stored beside the frames: 820 x 616 pixels of 0.15 mm, apex at (410, 87).
 fn plus_scene(recording: &Recording) -> Scene {
     let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let settings: Settings =
-        toml::from_str("mode = 'vr'\nslices = { format = 'r32f', everything = true }\npicture = { size = [8, 8] }")
-            .unwrap();
+    let settings =
+        settings("mode = 'vr'\nslices = { format = 'r32f', everything = true }\npicture = { size = [8, 8] }");
     let mut scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
     scene.apron = 0.0;
     let origin = [-(410.0 - 0.5) * 0.15, 10.0 - 87.0 * 0.15];
@@ -87,8 +87,7 @@ pub fn wobbler_volume(device: &Device, file: &str, more: &str) -> (Probe, Scene,
     let mut recording = Recording::open(&data(file), None).expect("recording");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let slices = "slices = { format = 'r32f', pixels = 700 }";
-    let settings: Settings =
-        toml::from_str(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}")).unwrap();
+    let settings = settings(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}"));
     let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
     let mut renderer = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
     while let Some(frame) = recording.next_frame().expect("frame") {

@@ -1,10 +1,11 @@
 //! Pictures of several planes: lines, tiles, passes that run for them and run again, and refused settings.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use crate::planes::picture;
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
-use echolume::scene::{PlaneName, Scene, SceneError, Settings};
+use echolume::scene::{PlaneName, Scene, SceneError};
 use glam::DVec3;
 
 /// A black volume shows only lines: their centre of light along a row or column is the position of the other plane.
@@ -207,7 +208,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         ("mode = 'cube'\ncube = { tilt = { top = [85, 0] } }", "cube.tilt.top"),
         ("mode = 'cube'\ncube = { shading = 1.5 }", "cube.shading"),
     ] {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings = settings(toml);
         let Err(SceneError { field: named, fault }) = Scene::new(Geometry::Sweep(wobbler()), BYTES, settings) else {
             panic!("{toml} was not refused")
         };

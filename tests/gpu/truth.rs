@@ -1,10 +1,11 @@
 //! The surface detector on the simulated sweep, against the head that was simulated.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::chain::distance_end;
 use echolume::passes::{Slot, Texels, is_hit};
-use echolume::scene::{Input, Scene, Settings};
+use echolume::scene::{Input, Scene};
 use echolume::source::Recording;
 use glam::{DVec2, DVec3};
 
@@ -129,7 +130,7 @@ fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
     for detector in ["threshold", "adaptive", "lasting"] {
         let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
         let input = Input { stored: recording.stored_type(), range: recording.range() };
-        let mut settings: Settings = toml::from_str(SETTINGS).expect("settings");
+        let mut settings = settings(SETTINGS);
         settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
         let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
         let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");

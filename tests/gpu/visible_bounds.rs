@@ -2,6 +2,7 @@
 //! bit, and frames are requested again only if more becomes visible.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::chain::rectangle;
 use echolume::passes::{DispatchArgs, Slot, Texels};
@@ -85,7 +86,7 @@ fn random_scene(geometry: &Geometry, noise: &mut Noise) -> Scene {
         "mode = '{mode}'\nslices.pixels = 120\nsurface.rough = {rough}\n{ray}\n{start}\n{clip}\nregion = {{ {} }}",
         sides.join(", ")
     );
-    let settings = toml::from_str(&toml).expect("settings");
+    let settings = settings(&toml);
     // A start depth below the region, or a face that leaves nothing, is refused: then only the region is set.
     Scene::new(geometry.clone(), BYTES, settings)
         .unwrap_or_else(|_| scene(geometry.clone(), BYTES, &format!("mode = '{mode}'\nslices.pixels = 120")))
@@ -123,12 +124,7 @@ fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
             for _ in 0..4000 {
                 let Some(at) = sampled(&scene, &mut noise).and_then(|place| texel(&scene, place)) else { continue };
                 let mixed = mixed(&scene, at);
-                assert!(
-                    scene.seen.holds(&mixed),
-                    "{name}: {at:?} is not of {:?}\n{}",
-                    scene.seen,
-                    toml::to_string(&scene.settings).unwrap()
-                );
+                assert!(scene.seen.holds(&mixed), "{name}: {at:?} is not of {:?}\n{:?}", scene.seen, scene.settings);
                 let old = found.unwrap_or(mixed);
                 found = Some(VisibleBounds {
                     low: std::array::from_fn(|a| old.low[a].min(mixed.low[a])),

@@ -2,7 +2,7 @@
 
 use crate::common::gpu::Device;
 use crate::common::probes::wobbler;
-use crate::common::scenes::FLOATS;
+use crate::common::scenes::{self, FLOATS};
 use echolume::probe::{Axis, Geometry, Indices, Probe};
 use echolume::scene::{Scene, Settings};
 use echolume::source::Frame;
@@ -29,7 +29,7 @@ pub fn probe() -> Probe {
 }
 
 pub fn scene(toml: &str) -> Scene {
-    scene_of(toml::from_str(toml).expect("settings"))
+    scenes::scene(Geometry::Sweep(probe()), FLOATS, toml)
 }
 
 pub fn scene_of(settings: Settings) -> Scene {

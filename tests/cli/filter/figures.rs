@@ -1,6 +1,8 @@
 //! Results of `echolume filter`: every filter against its f64 reference, figures of regions, growth of windows.
 
 use super::*;
+use crate::common::probes::voxels;
+use crate::common::scenes::scene;
 
 #[test]
 fn figures_of_regions_equal_those_of_the_files() {
@@ -82,13 +84,11 @@ fn reference(
     grey: &Grey,
     slices: &str,
 ) -> std::collections::BTreeMap<echolume::passes::Slot, echolume::passes::Texels> {
-    use echolume::probe::{Geometry, Grid};
     let size = [grey.width as usize, grey.height as usize, 1];
-    let grid = Geometry::Cartesian(Grid { size, spacing: [1.0; 3], origin: [0.0; 3] });
     let stored = if grey.sixteen { echolume::source::StoredType::U16 } else { echolume::source::StoredType::U8 };
     let input = echolume::scene::Input { stored, range: [0.0, grey.white()] };
     let toml = format!("mode = 'plane'\npicture = {{ size = [1, 1] }}\nslices = {{ format = 'r32f', {slices} }}");
-    let scene = echolume::scene::Scene::new(grid, input, toml::from_str(&toml).expect("settings")).expect("scene");
+    let scene = scene(voxels(size), input, &toml);
     let frame = echolume::passes::Texels { size, channels: 1, values: grey.shares() };
     echolume::reference::render(&scene, &[frame])
 }

@@ -6,6 +6,7 @@ mod idle;
 mod monkey;
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
@@ -29,7 +30,7 @@ pub const SIZE: [u32; 2] = [80, 72];
 const LATER: Duration = Duration::from_millis(300);
 
 pub fn plain() -> Settings {
-    toml::from_str("mode = 'sr'\nslices = { pixels = 40, format = 'r8' }").expect("settings")
+    settings("mode = 'sr'\nslices = { pixels = 40, format = 'r8' }")
 }
 
 /// Without a screen, a budget or a second source.

@@ -2,6 +2,7 @@
 
 use super::{fan, scene};
 use crate::common::probes::voxels;
+use crate::common::scenes;
 use echolume::passes::chain::{
     copied, distance_end, distance_link, picture_end, picture_link, rectangle, rendered, slice_link,
 };
@@ -49,10 +50,7 @@ fn an_empty_chain_leaves_its_slot_unchanged() {
 
 #[test]
 fn frames_are_copied_where_the_volume_has_their_format() {
-    let of = |stored, range, toml: &str| {
-        let settings = toml::from_str(toml).expect("settings");
-        copied(&Scene::new(voxels([8, 8, 5]), Input { stored, range }, settings).expect("scene"))
-    };
+    let of = |stored, range, toml: &str| copied(&scenes::scene(voxels([8, 8, 5]), Input { stored, range }, toml));
     let (bytes, words) = ([0.0, 255.0], [0.0, 65535.0]);
     let format = |format: &str| format!("slices = {{ format = '{format}' }}");
     assert_eq!(of(StoredType::U8, bytes, &format("r8")), Some(Slot::Volume));
