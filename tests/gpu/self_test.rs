@@ -1,4 +1,4 @@
-//! Whether the self-test of `echolume verify` can fail. That what it plants is caught is `cli`'s to say.
+//! The self-test of `echolume verify` can fail. The tests of `cli` check that its injected faults are caught.
 
 use crate::common::gpu::chosen;
 use echolume::gpu::ContextOptions;
@@ -10,14 +10,14 @@ fn options() -> ContextOptions {
     ContextOptions { device: chosen(), validation: false }
 }
 
-/// Looked at with `--nocapture`: which check caught what.
+/// For output with `--nocapture`: which check caught which fault.
 fn told(caught: &Caught) {
     println!("{:5.2} s  {:36} {}: {}", caught.seconds, caught.fault, caught.by.as_deref().unwrap_or("-"), caught.found);
 }
 
-/// Prevents that everything is called caught.
+/// Prevents a self-test that reports everything as caught.
 #[test]
-fn a_fault_without_effect_is_reported_as_uncaught() {
+fn an_injected_fault_without_effect_is_reported_as_uncaught() {
     let faults = [
         InjectedFault {
             name: "nowhere",
