@@ -16,16 +16,21 @@ mod report;
 mod report_error;
 mod report_tables;
 mod serial;
+#[cfg(feature = "view")]
 mod shown;
 mod stream;
 mod support_bundle;
 mod targets;
 mod turns;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
+#[cfg(not(feature = "view"))]
+#[path = "no_view.rs"]
 mod view;
 
+use crate::kiosk::rotating::{self, Rotating};
 use clap::{Parser, Subcommand};
-use echolume::kiosk::rotating::{self, Rotating};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -96,6 +101,7 @@ enum Command {
     /// Render frames as they arrive: the phantom, a recording, a pipe, a scanner on the network
     Stream(Box<stream::Stream>),
     /// Show them on a screen, to be turned by hand
+    #[cfg_attr(not(feature = "view"), command(hide = true, disable_help_flag = true))]
     View(Box<view::View>),
     /// Run the 2D filters on an ordinary picture, and measure what they do
     Filter(Box<filter::Filter>),

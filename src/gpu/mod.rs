@@ -4,6 +4,7 @@
 //! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`measured`] what those said; [`timeline`] what is done;
 //! [`renderer`] the four stages; [`single`] one pass alone, for tests; [`window`] what shows their pictures.
 
+pub mod barrier_recorder;
 pub mod context;
 pub mod error;
 pub mod faults;
@@ -11,17 +12,20 @@ pub mod formats;
 #[cfg(feature = "hot-reload")]
 pub mod hot_reload;
 pub mod measured;
-pub mod order;
+pub mod pass_runner;
 pub mod pipelines;
 pub mod recorder;
 pub mod renderer;
 pub mod resources;
 pub mod select;
-pub mod single;
 pub mod slots;
 pub mod timeline;
 pub mod timing;
+#[cfg(feature = "view")]
 pub mod window;
+#[cfg(not(feature = "view"))]
+#[path = "no_window.rs"]
+mod window;
 
 pub use context::{Context, ContextOptions};
 pub use error::GpuError;

@@ -1,6 +1,5 @@
 //! Keys that are pressed together, as words: `ctrl+alt+q`.
 
-use crate::ui::input::{Key, Modifiers};
 use std::fmt;
 use std::str::FromStr;
 
@@ -30,6 +29,34 @@ const NAMES: &[(&str, Key)] = &[
 ];
 /// Keyboards have at most so many function keys.
 const FUNCTION_KEYS: u8 = 24;
+
+/// A key by what is printed on it, whatever is held with it: letters are lower-case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Key {
+    Char(char),
+    Function(u8),
+    Escape,
+    Enter,
+    Tab,
+    Space,
+    Backspace,
+    Delete,
+    Left,
+    Right,
+    Up,
+    Down,
+    PageUp,
+    PageDown,
+    Home,
+    End,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Modifiers {
+    pub shift: bool,
+    pub control: bool,
+    pub alt: bool,
+}
 
 /// A key and what is held with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

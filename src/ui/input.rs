@@ -1,5 +1,7 @@
 //! What hands do, whatever told of it: a window, or input devices where there is none. Places are in pixels from the upper left corner.
 
+pub use crate::kiosk::chord::{Key, Modifiers};
+
 /// Something that was done by hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
@@ -59,32 +61,4 @@ pub enum Phase {
     Up,
     /// The finger is taken for something else, such as a palm.
     Gone,
-}
-
-/// A key by what is printed on it, whatever is held with it: letters are lower-case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Key {
-    Char(char),
-    Function(u8),
-    Escape,
-    Enter,
-    Tab,
-    Space,
-    Backspace,
-    Delete,
-    Left,
-    Right,
-    Up,
-    Down,
-    PageUp,
-    PageDown,
-    Home,
-    End,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Modifiers {
-    pub shift: bool,
-    pub control: bool,
-    pub alt: bool,
 }

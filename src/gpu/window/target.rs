@@ -46,6 +46,10 @@ impl Target {
         }
     }
 
+    pub fn is_monitor(&self) -> bool {
+        matches!(self, Target::Monitor(_))
+    }
+
     /// A surface on it for this device.
     ///
     /// # Errors
