@@ -83,6 +83,10 @@ fn describe_command(command: &[String], index: &mut String, page: &mut String) {
 
 #[test]
 fn generated_command_line_page_is_what_the_program_prints() {
+    // The page shows the default features.
+    if cfg!(not(feature = "view")) || cfg!(feature = "hot-reload") {
+        return;
+    }
     let (mut index, mut page) = (String::new(), String::new());
     describe_command(&[], &mut index, &mut page);
     for name in ["render", "stream", "view", "verify", "profile", "report error", "probe simulate"] {
@@ -197,7 +201,9 @@ fn described_types() -> BTreeMap<String, Described> {
             let (name, attributes, body) = match item {
                 Item::Struct(item) => {
                     let all_default = argument(&serde_arguments(&item.attrs), "default").is_some();
-                    let Fields::Named(fields) = item.fields else { panic!("{file}: {} has no named fields", item.ident) };
+                    let Fields::Named(fields) = item.fields else {
+                        panic!("{file}: {} has no named fields", item.ident)
+                    };
                     let keys = fields.named.into_iter().map(|field| {
                         let arguments = serde_arguments(&field.attrs);
                         for (name, _) in &arguments {
@@ -216,7 +222,8 @@ fn described_types() -> BTreeMap<String, Described> {
                     let rule = serde_arguments(&item.attrs);
                     let choices = item.variants.into_iter().map(|variant| {
                         let arguments = serde_arguments(&variant.attrs);
-                        let aliases = arguments.iter().filter(|(name, _)| name == "alias").map(|(_, alias)| alias.clone());
+                        let aliases =
+                            arguments.iter().filter(|(name, _)| name == "alias").map(|(_, alias)| alias.clone());
                         Choice {
                             name: renamed(&variant.ident.to_string(), argument(&rule, "rename_all")),
                             aliases: aliases.collect(),
@@ -271,6 +278,22 @@ fn type_words(of: &Type, types: &BTreeMap<String, Described>) -> String {
         ("DVec3", None) => "3 x number".to_string(),
         (name, None) if types.contains_key(name) => format!("[{name}](#{})", slug(name)),
         (name, _) => panic!("a setting of type {name} cannot be described: add it to tests/docs.rs"),
+    }
+}
+
+/// The first sentence about a type of the settings; nothing of others.
+fn type_summary(of: &Type, types: &BTreeMap<String, Described>) -> String {
+    if matches!(of, Type::Array(_)) {
+        return String::new();
+    }
+    match parts(of) {
+        (_, Some(inner)) => type_summary(inner, types),
+        (name, None) => {
+            match types.get(&name).map(|t| t.doc.split_once(". ").map_or(t.doc.as_str(), |(first, _)| first)) {
+                Some(first) if !first.is_empty() => format!("{}.", first.trim_end_matches('.')),
+                _ => String::new(),
+            }
+        }
     }
 }
 
@@ -360,7 +383,8 @@ impl SettingsPage<'_> {
                         (false, value) => value_words(value),
                     };
                     let of = type_words(&key.of, types);
-                    writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&key.doc)).expect("text");
+                    writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&key.doc))
+                        .expect("text");
                 }
             }
             Body::Enum(choices) => {
@@ -470,6 +494,20 @@ fn links(text: &str) -> Vec<String> {
     inline.chain(tags).map(str::to_string).collect()
 }
 
+/// Paths of this repository that a page names in `...`, without those that stand for several.
+fn paths(text: &str) -> Vec<String> {
+    let mut is_code = false;
+    let mut found = Vec::new();
+    for line in text.lines() {
+        is_code ^= line.starts_with("```");
+        let spans = line.split('`').skip(1).step_by(2).filter(|_| !is_code);
+        let spans = spans.filter(|span| !span.contains([' ', '*', '{', '<']));
+        let folders = ["src/", "glsl/", "spirv/", "tests/", "benches/", "tools/", "docs/"];
+        found.extend(spans.filter(|span| folders.iter().any(|f| span.starts_with(f))).map(str::to_string));
+    }
+    found
+}
+
 fn pages() -> Vec<String> {
     let mut pages = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(str::to_string).to_vec();
     pages.extend(files("docs", "md"));
@@ -508,6 +546,10 @@ fn every_link_leads_somewhere() {
                 assert!(anchors(&read(&path)).contains(&anchor), "{page}: {path} has no heading #{anchor}");
             }
             count += 1;
+        }
+        // CHANGELOG.md may name what was there once.
+        for path in paths(&read(&page)).into_iter().filter(|_| page != "CHANGELOG.md") {
+            assert!(top().join(&path).exists(), "{page} names {path}, which is not there");
         }
     }
     assert!(count > 100, "only {count} links: are they read at all?");
@@ -549,6 +591,7 @@ fn readme_is_short_and_says_what_must_be_said() {
 fn links_are_found_and_checked_as_code_hosts_do() {
     let page = "# A `b` of c-d: e!\n[x](docs/a.md#b) `[no](no)` ![p](p.png)\n```sh\n# [no](no)\n```\n<img src=\"q.png\" width=\"9\">\n    [no](no)\n";
     assert_eq!(links(page), ["docs/a.md#b", "p.png", "q.png"]);
+    assert_eq!(paths("`src/lib.rs` `src/*.rs` src/no\n```\n`src/no`\n```\n`tools/`"), ["src/lib.rs", "tools/"]);
     assert_eq!(anchors(page).into_iter().collect::<Vec<_>>(), ["a-b-of-c-d-e"]);
     assert_eq!(meant("docs/x.md", "../README.md#y"), ("README.md".to_string(), Some("y".to_string())));
     assert_eq!(meant("docs/x.md", "#y"), ("docs/x.md".to_string(), Some("y".to_string())));
