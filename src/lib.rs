@@ -20,6 +20,8 @@
 #![deny(unsafe_code)]
 
 #[forbid(unsafe_code)]
+mod args;
+#[forbid(unsafe_code)]
 pub mod barriers;
 #[forbid(unsafe_code)]
 pub mod cli;
@@ -61,6 +63,8 @@ pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
 #[cfg(feature = "view")]
+#[forbid(unsafe_code)]
+mod terminal;
 #[forbid(unsafe_code)]
 pub mod thesis_tables;
 #[forbid(unsafe_code)]

@@ -20,7 +20,7 @@ use super::times::Times;
 use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
 use crate::scene::Settings;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ pub struct Options {
     /// Volume images that take turns, 2 or 3.
     pub images: u32,
     pub queues: Option<usize>,
-    pub cine: Room,
+    pub cine: CineLimits,
     /// Time of a picture that is held while the view moves.
     pub budget: Option<Duration>,
     pub rungs: Vec<Rung>,
@@ -73,7 +73,7 @@ impl Options {
             update: Update::Whole,
             images: 3,
             queues: None,
-            cine: Room::default(),
+            cine: CineLimits::default(),
             budget: None,
             rungs: super::quality_ladder::built_in(),
             retry: None,
@@ -186,7 +186,7 @@ impl Console {
         let is_panelled = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
         controls.resize(panels::place(size, options.scale, is_panelled).1);
-        let streamed = live::Options {
+        let streamed = live::StreamOptions {
             update: options.update,
             images: options.images,
             queues: options.queues,
