@@ -1,27 +1,25 @@
 //! The pages that a reader meets: docs/cli.md and docs/settings.md are what the program and the settings types say (`tools/docs` writes
 //! them again), README.md stays short, and no link leads nowhere.
 
+use crate::common::files::repository;
+use crate::common::program::PROGRAM;
 use echolume::scene::Settings;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use syn::punctuated::Punctuated;
 use syn::{Attribute, Expr, ExprLit, Fields, Item, Lit, Meta, Token, Type};
 
-fn top() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
-
 fn read(name: &str) -> String {
-    std::fs::read_to_string(top().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    std::fs::read_to_string(repository(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
 /// Names of the files directly below a folder that end in `.ending`, sorted, with the folder in front.
 fn files(folder: &str, ending: &str) -> Vec<String> {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(top().join(folder)).expect(folder) {
+    for entry in std::fs::read_dir(repository(folder)).expect(folder) {
         let path = entry.expect("entry").path();
         if path.extension().is_some_and(|e| e == ending) {
             found.push(format!("{folder}/{}", path.file_name().expect("name").to_string_lossy()));
@@ -34,9 +32,9 @@ fn files(folder: &str, ending: &str) -> Vec<String> {
 /// Compares a generated page with the file, or writes the file where UPDATE_DOCS is set.
 fn hold(name: &str, page: &str) {
     if std::env::var_os("UPDATE_DOCS").is_some() {
-        return std::fs::write(top().join(name), page).expect(name);
+        return std::fs::write(repository(name), page).expect(name);
     }
-    let kept = std::fs::read_to_string(top().join(name)).unwrap_or_default();
+    let kept = std::fs::read_to_string(repository(name)).unwrap_or_default();
     let differs = kept.lines().zip(page.lines()).position(|(kept, page)| kept != page);
     let line = differs.unwrap_or_else(|| kept.lines().count().min(page.lines().count()));
     let at = |text: &str| text.lines().nth(line).unwrap_or("nothing").to_string();
@@ -53,7 +51,7 @@ fn hold(name: &str, page: &str) {
 
 /// What the program prints for `--help`, 100 columns wide, without spaces at line ends.
 fn help(command: &[String]) -> String {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_echolume"));
+    let mut program = Command::new(PROGRAM);
     let output = program.args(command).arg("--help").env("COLUMNS", "100").env_remove("RUST_LOG").output();
     let output = output.expect("the program starts");
     assert!(output.status.success(), "{command:?} --help: {}", String::from_utf8_lossy(&output.stderr));
@@ -541,7 +539,7 @@ fn every_link_leads_somewhere() {
                 continue;
             }
             let (path, anchor) = meant(&page, &link);
-            assert!(top().join(&path).exists(), "{page}: {link} leads to {path}, which is not there");
+            assert!(repository(&path).exists(), "{page}: {link} leads to {path}, which is not there");
             if let Some(anchor) = anchor {
                 assert!(anchors(&read(&path)).contains(&anchor), "{page}: {path} has no heading #{anchor}");
             }
@@ -549,7 +547,7 @@ fn every_link_leads_somewhere() {
         }
         // CHANGELOG.md may name what was there once.
         for path in paths(&read(&page)).into_iter().filter(|_| page != "CHANGELOG.md") {
-            assert!(top().join(&path).exists(), "{page} names {path}, which is not there");
+            assert!(repository(&path).exists(), "{page} names {path}, which is not there");
         }
     }
     assert!(count > 100, "only {count} links: are they read at all?");
