@@ -585,6 +585,51 @@ fn readme_is_short_and_says_what_must_be_said() {
     }
 }
 
+/// Every Rust source below `src/place`, a folder or a file without its ending.
+fn sources(place: &Path) -> String {
+    if place.with_extension("rs").is_file() {
+        return std::fs::read_to_string(place.with_extension("rs")).expect("source");
+    }
+    let entries = std::fs::read_dir(place).unwrap_or_else(|e| panic!("{}: {e}", place.display()));
+    let mut text = String::new();
+    for path in entries.map(|entry| entry.expect("entry").path()) {
+        if path.is_dir() {
+            text += &sources(&path);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            text += &std::fs::read_to_string(&path).expect("source");
+        }
+    }
+    text
+}
+
+#[test]
+fn walks_through_the_code_name_functions_that_exist() {
+    let page = read("docs/architecture.md");
+    let walks = page.split("\n## ").filter(|part| part.starts_with("A frame,") || part.starts_with("A scene,"));
+    let mut count = 0;
+    for row in walks.flat_map(|walk| walk.lines()).filter(|line| line.starts_with("| `")) {
+        let cell = row.split('|').nth(1).expect("a cell");
+        // The first name of a cell begins with its module; those behind it are of the same module.
+        let mut module = String::new();
+        for name in cell.split('`').skip(1).step_by(2) {
+            let parts: Vec<&str> = name.split("::").collect();
+            if let Some(first) = parts.first().filter(|_| parts.len() > 1) {
+                module = (*first).to_string();
+            }
+            let function = parts.last().expect("a name");
+            let text = sources(&repository("src").join(&module));
+            let is_there = ["(", "<"].iter().any(|end| text.contains(&format!("fn {function}{end}")));
+            assert!(is_there, "docs/architecture.md: src/{module} has no function {function} ({name})");
+            let of = parts.iter().rev().nth(1).filter(|of| of.starts_with(char::is_uppercase));
+            let types = ["struct", "trait", "enum"];
+            let is_known = of.is_none_or(|of| types.iter().any(|kind| text.contains(&format!("{kind} {of}"))));
+            assert!(is_known, "docs/architecture.md: src/{module} has no type {of:?} ({name})");
+            count += 1;
+        }
+    }
+    assert!(count > 20, "only {count} functions: are the walks read at all?");
+}
+
 #[test]
 fn links_are_found_and_checked_as_code_hosts_do() {
     let page = "# A `b` of c-d: e!\n[x](docs/a.md#b) `[no](no)` ![p](p.png)\n```sh\n# [no](no)\n```\n<img src=\"q.png\" width=\"9\">\n    [no](no)\n";
