@@ -220,11 +220,11 @@ fn described_types() -> BTreeMap<String, Described> {
                     let rule = serde_arguments(&item.attrs);
                     let choices = item.variants.into_iter().map(|variant| {
                         let arguments = serde_arguments(&variant.attrs);
-                        let aliases =
-                            arguments.iter().filter(|(name, _)| name == "alias").map(|(_, alias)| alias.clone());
+                        let name = renamed(&variant.ident.to_string(), argument(&rule, "rename_all"));
+                        let aliases = arguments.into_iter().filter(|(key, alias)| key == "alias" && *alias != name);
                         Choice {
-                            name: renamed(&variant.ident.to_string(), argument(&rule, "rename_all")),
-                            aliases: aliases.collect(),
+                            aliases: aliases.map(|(_, alias)| alias).collect(),
+                            name,
                             doc: doc(&variant.attrs),
                             is_default: variant.attrs.iter().any(|attribute| attribute.path().is_ident("default")),
                             of: variant.fields.into_iter().next().map(|field| field.ty),
