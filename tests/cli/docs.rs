@@ -381,7 +381,8 @@ impl SettingsPage<'_> {
                         (false, value) => value_words(value),
                     };
                     let of = type_words(&key.of, types);
-                    writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&key.doc))
+                    let about = if key.doc.is_empty() { type_summary(&key.of, types) } else { key.doc.clone() };
+                    writeln!(self.text, "| `{}` | {of} | {} | {} |", key.name, cell(&value), cell(&about))
                         .expect("text");
                 }
             }
