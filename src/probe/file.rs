@@ -604,7 +604,10 @@ mod writing_tests {
             let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
             let (read, read_volumes) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
             assert!(is_same(&Probe { advance: read_volumes.advance(0, &read.slices), ..read }, &probe), "{text}");
-            assert_eq!((read_volumes.both_ways, read_volumes.first_backward), (volumes.both_ways, volumes.first_backward));
+            assert_eq!(
+                (read_volumes.both_ways, read_volumes.first_backward),
+                (volumes.both_ways, volumes.first_backward)
+            );
             assert_eq!(file.range(), Some([3.0, 250.0]));
         }
         let irregular = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };

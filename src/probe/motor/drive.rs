@@ -188,7 +188,12 @@ impl Drive {
         Ok(())
     }
 
-    fn sweep_all(&mut self, sweep: &Sweep, start: Instant, on_position: &mut dyn FnMut(Position)) -> Result<usize, Fault> {
+    fn sweep_all(
+        &mut self,
+        sweep: &Sweep,
+        start: Instant,
+        on_position: &mut dyn FnMut(Position),
+    ) -> Result<usize, Fault> {
         let speed = sweep.speed(&self.table, self.guard.port().settings().round_trip())?;
         self.set_watchdog()?;
         for side in [Side::Left, Side::Right] {

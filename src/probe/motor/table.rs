@@ -174,7 +174,7 @@ impl MotorTable {
             ("motor.search_speed_deg_per_s", self.speed_register(self.search_speed())),
         ];
         for (field, register) in registers {
-                // The largest pps values are those of the modules' own ramp generators, 2^24 - 1.
+            // The largest pps values are those of the modules' own ramp generators, 2^24 - 1.
             let most = if self.units == Units::Tmc429 { 2047.0 } else { 16_777_215.0 };
             if !(1.0..=most).contains(&register) {
                 return Err((field, format!("makes {register:.1} in the module, which takes 1 to {most}")));

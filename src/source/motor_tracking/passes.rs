@@ -87,8 +87,13 @@ impl Passes {
                     return;
                 }
                 let near = Candidate { step: step.round().clamp(0.0, last) as usize, angle, frame };
-                let mut current =
-                    self.current.take().unwrap_or(Pass { number: pass, direction, nearest: None, emitted: None, slices: 0 });
+                let mut current = self.current.take().unwrap_or(Pass {
+                    number: pass,
+                    direction,
+                    nearest: None,
+                    emitted: None,
+                    slices: 0,
+                });
                 match current.nearest.take() {
                     Some(other) if near.step < other.step => {
                         counts.late += 1;
