@@ -1,0 +1,186 @@
+//! What a picture is read by: a scale in every tile, which way the volume is turned, and what its colours mean.
+
+use super::state::{Facts, rect};
+use super::theme::{FAINT, SMALL, TEXT};
+use crate::passes::postprocess::tone;
+use crate::scene::{Layout, Mode, Scene, transfer};
+use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
+use glam::DVec3;
+
+/// Lengths that a scale bar may have, mm.
+const LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
+
+pub fn paint(ui: &Ui, facts: &Facts, scale: f32) {
+    let Some(scene) = facts.scene else { return };
+    let picture = rect(facts, scale);
+    // While the window is being resized the scene has another size for a moment.
+    if scene.picture_size() != facts.picture.1 {
+        return;
+    }
+    let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
+    let [width, height] = scene.picture_size().map(f64::from);
+    let tile = |corner: [f64; 2], size: [f64; 2]| {
+        let at = picture.min + vec2(corner[0] as f32, corner[1] as f32) / scale;
+        Rect::from_min_size(at, vec2(size[0] as f32, size[1] as f32) / scale)
+    };
+    if scene.cuts_planes() {
+        let sheet = scene.sheet();
+        // The tiles of tomography all have the same scale, and the first one says it.
+        let told = if scene.settings.mode == Mode::Tomography { 1 } else { sheet.tiles.len() };
+        for shown in sheet.tiles.iter().take(told) {
+            let area = tile(shown.corner.map(f64::from), shown.size.map(f64::from));
+            let per_point = sheet.pixel * f64::from(scale);
+            match shown.plane.down.y > 0.99 {
+                true => {
+                    let top = shown.plane.at.y - depth_offset(scene) - sheet.pixel * f64::from(shown.size[1]) / 2.0;
+                    ruler(&painter, area, top, per_point);
+                }
+                false => bar(&painter, area, per_point),
+            }
+        }
+    }
+    if !scene.is_flat() {
+        let split = if scene.settings.layout == Layout::Four { 2.0 } else { 1.0 };
+        let corner = [(width - width / split).floor(), (height - height / split).floor()];
+        let area = tile(corner, [width - corner[0], height - corner[1]]);
+        bar(&painter, area, rendered_pixel(scene, width - corner[0]) * f64::from(scale));
+        axes(&painter, area, scene);
+    }
+    colours(&painter, picture, scene);
+}
+
+/// What has to be taken from a place's depth to get it from the probe's face, mm.
+fn depth_offset(scene: &Scene) -> f64 {
+    scene.probe().map_or(0.0, |probe| probe.array_radius())
+}
+
+/// mm of a picture's pixel where the camera looks; `width`: of the rendered tile.
+fn rendered_pixel(scene: &Scene, width: f64) -> f64 {
+    let rays = &scene.rays;
+    let apart = match rays.is_perspective {
+        true => rays.direction_dx.length() * (rays.target - rays.origin).dot(rays.forward),
+        false => rays.origin_dx.length(),
+    };
+    apart * f64::from(scene.ray_size()[0]) / width.max(1.0)
+}
+
+fn line(painter: &Painter, from: Pos2, to: Pos2) {
+    // Dark beside bright: to be seen on any echo.
+    painter.line_segment([from, to], Stroke::new(4.0, Color32::from_black_alpha(150)));
+    painter.line_segment([from, to], Stroke::new(1.5, TEXT));
+}
+
+fn text(painter: &Painter, at: Pos2, align: Align2, words: &str, colour: Color32) {
+    let font = FontId::proportional(SMALL);
+    painter.text(at + vec2(1.0, 1.0), align, words, font.clone(), Color32::from_black_alpha(200));
+    painter.text(at, align, words, font, colour);
+}
+
+/// Depth below the probe's face along the left edge: a tick each cm, a number each other one. `top`: depth at the upper edge, mm.
+fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
+    let bottom = top + f64::from(area.height()) * per_point;
+    if !(per_point > 0.0 && bottom > top && bottom - top < 1e4) {
+        return;
+    }
+    // So far apart that numbers have room.
+    let step = LENGTHS.into_iter().find(|mm| mm / per_point >= 34.0).unwrap_or(200.0);
+    let x = area.left() + 6.0;
+    let at = |depth: f64| area.top() + ((depth - top) / per_point) as f32;
+    let from = ((top.max(0.0) / step).ceil() * step).max(0.0);
+    let mut depth = from;
+    while depth <= bottom {
+        let y = at(depth);
+        line(painter, pos2(x, y), pos2(x + 9.0, y));
+        if y > area.top() + 8.0 && y < area.bottom() - 8.0 {
+            let unit = if depth == from { " mm" } else { "" };
+            text(painter, pos2(x + 13.0, y), Align2::LEFT_CENTER, &format!("{depth:.0}{unit}"), TEXT);
+        }
+        depth += step;
+    }
+}
+
+/// A length in the lower right corner.
+fn bar(painter: &Painter, area: Rect, per_point: f64) {
+    if !(per_point > 0.0 && per_point.is_finite()) {
+        return;
+    }
+    let room = f64::from(area.width()) * 0.3 * per_point;
+    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= room) else { return };
+    let width = (mm / per_point) as f32;
+    let right = pos2(area.right() - 16.0, area.bottom() - 16.0);
+    let left = right - vec2(width, 0.0);
+    line(painter, left, right);
+    for end in [left, right] {
+        line(painter, end - vec2(0.0, 5.0), end + vec2(0.0, 5.0));
+    }
+    text(painter, left + vec2(width / 2.0, -8.0), Align2::CENTER_BOTTOM, &format!("{mm} mm"), TEXT);
+}
+
+/// The volume's axes as the camera sees them, in the lower left corner.
+fn axes(painter: &Painter, area: Rect, scene: &Scene) {
+    const ARM: f64 = 34.0;
+    let centre = area.left_bottom() + vec2(58.0, -58.0);
+    painter.circle_filled(centre, 50.0, Color32::from_black_alpha(110));
+    let rays = &scene.rays;
+    let named = [
+        (DVec3::X, "lateral", Color32::from_rgb(235, 110, 100)),
+        (DVec3::Y, "depth", Color32::from_rgb(120, 205, 120)),
+        (DVec3::Z, "elevation", Color32::from_rgb(110, 160, 245)),
+    ];
+    let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
+        .iter()
+        .map(|(axis, name, colour)| {
+            let seen = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
+            (axis.dot(rays.forward), seen, *name, *colour)
+        })
+        .collect();
+    // Those that point away first, and fainter.
+    arms.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (away, arm, name, colour) in arms {
+        let colour = colour.gamma_multiply((1.0 - 0.45 * away.max(0.0)) as f32);
+        painter.line_segment([centre, centre + arm], Stroke::new(3.5, colour));
+        painter.circle_filled(centre + arm, 4.0, colour);
+        // Seen from its end an arm has no length, and no room for a name.
+        if arm.length() > 9.0 {
+            let out = arm.normalized() * 11.0;
+            text(painter, centre + arm + out, Align2::CENTER_CENTER, &name[..1].to_uppercase(), colour);
+        }
+    }
+}
+
+/// What the values are shown as, from the lowest to the highest of the window.
+fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
+    let settings = &scene.settings;
+    let window = match settings.mode {
+        // A lit surface has the light's colours, which mean nothing else.
+        Mode::Surface if settings.layout == Layout::Single => return,
+        Mode::Volume | Mode::Mixed => settings.volume.window,
+        Mode::Mip | Mode::MinIp | Mode::Mean => settings.projection.window,
+        Mode::Cube => settings.cube.window,
+        _ => settings.planes.window,
+    };
+    let table = scene.composites().then(|| transfer::table(&settings.volume.transfer, settings.volume.threshold));
+    let ramp = |value: f64| {
+        let Some(table) = &table else { return [value; 3] };
+        let last = table.len() - 1;
+        let [r, g, b, absorption] = table[((value * last as f64).round() as usize).min(last)];
+        // What is never seen is shown faintly: the bar says that it is left out.
+        [r, g, b].map(|c| if absorption > 0.0 { c } else { 0.15 * c })
+    };
+    const STEPS: usize = 64;
+    let height = (picture.height() * 0.3).clamp(60.0, 220.0);
+    let area = Rect::from_min_size(pos2(picture.right() - 34.0, picture.top() + 26.0), vec2(16.0, height));
+    for n in 0..STEPS {
+        let value = (n as f64 + 0.5) / STEPS as f64;
+        let [r, g, b] = tone::toned(scene, ramp(value)).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        let low = area.bottom() - height * n as f32 / STEPS as f32;
+        let part = Rect::from_min_max(pos2(area.left(), low - height / STEPS as f32 - 0.5), pos2(area.right(), low));
+        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+    }
+    painter.rect_stroke(area, 0.0, Stroke::new(1.0, FAINT), egui::StrokeKind::Outside);
+    for (value, y, align) in
+        [(window[1], area.top(), Align2::RIGHT_TOP), (window[0], area.bottom(), Align2::RIGHT_BOTTOM)]
+    {
+        text(painter, pos2(area.left() - 6.0, y), align, &format!("{:.0}", value * 255.0), TEXT);
+    }
+}

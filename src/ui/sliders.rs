@@ -1,0 +1,471 @@
+//! The sliders of a scanner: one table of what they are called, what they may be set to, and what of the settings they are.
+
+use crate::scene::{
+    Bilateral, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin, Smooth, Transfer,
+};
+
+/// Where a slider stands in a panel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    Image,
+    Surface,
+    Volume,
+    Light,
+    Planes,
+    Filters,
+    Quality,
+}
+
+impl Group {
+    /// In the order in which they are shown, with their names.
+    pub const ALL: [(Group, &'static str); 7] = [
+        (Group::Image, "Image"),
+        (Group::Surface, "Surface"),
+        (Group::Volume, "Volume"),
+        (Group::Light, "Light"),
+        (Group::Planes, "Planes"),
+        (Group::Filters, "Filters"),
+        (Group::Quality, "Quality"),
+    ];
+}
+
+use Group::{Filters, Image, Light, Planes, Quality, Surface, Volume};
+
+pub struct Slider {
+    pub name: &'static str,
+    /// Of its value; empty where it has none.
+    pub unit: &'static str,
+    pub group: Group,
+    /// What it may be set to with any volume; [`Slider::range_in`] knows one volume.
+    pub range: [f64; 2],
+    /// What a key or a notch moves it by.
+    pub step: f64,
+    /// Stage 1 runs anew: slices are filtered otherwise, or others are seen (unless `slices.everything` made them all).
+    pub reruns_frames: bool,
+    applies: fn(&Settings) -> bool,
+    get: fn(&Settings) -> f64,
+    write: fn(&mut Settings, f64),
+    within: fn(&Scene) -> [f64; 2],
+}
+
+impl Slider {
+    /// Whether the picture depends on it.
+    pub fn applies(&self, settings: &Settings) -> bool {
+        (self.applies)(settings)
+    }
+
+    /// May lie outside of the range where a scene file asked for more than a slider gives.
+    pub fn get(&self, settings: &Settings) -> f64 {
+        (self.get)(settings)
+    }
+
+    /// Takes the nearest value in range; what is no number changes nothing.
+    pub fn set(&self, settings: &mut Settings, value: f64) {
+        if !value.is_nan() {
+            (self.write)(settings, value.clamp(self.range[0], self.range[1]));
+        }
+    }
+
+    /// What it may be set to with this volume: never empty.
+    pub fn range_in(&self, scene: &Scene) -> [f64; 2] {
+        let [low, high] = (self.within)(scene);
+        let low = self.range[0].max(low).min(self.range[1]);
+        [low, self.range[1].min(high).max(low)]
+    }
+
+    const fn of(
+        mut self,
+        applies: fn(&Settings) -> bool,
+        get: fn(&Settings) -> f64,
+        set: fn(&mut Settings, f64),
+    ) -> Self {
+        (self.applies, self.get, self.write) = (applies, get, set);
+        self
+    }
+
+    const fn within(mut self, within: fn(&Scene) -> [f64; 2]) -> Slider {
+        self.within = within;
+        self
+    }
+
+    const fn reruns(mut self) -> Slider {
+        self.reruns_frames = true;
+        self
+    }
+}
+
+const fn slider(name: &'static str, unit: &'static str, group: Group, range: [f64; 2], step: f64) -> Slider {
+    let within: fn(&Scene) -> [f64; 2] = |_| [f64::NEG_INFINITY, f64::INFINITY];
+    Slider {
+        name,
+        unit,
+        group,
+        range,
+        step,
+        reruns_frames: false,
+        applies: |_| false,
+        get: |_| 0.0,
+        write: |_, _| {},
+        within,
+    }
+}
+
+/// Places in [`SLIDERS`] that keys and gestures know.
+pub const GAIN: usize = 0;
+pub const THRESHOLD: usize = 3;
+pub const PLANES_ZOOM: usize = 7;
+
+/// All sliders. Those of windows, thresholds and start depths are the shown mode's; a mixed picture has them for its surface, and
+/// once more for its veil.
+pub const SLIDERS: &[Slider] = &[
+    slider("Gain", "", Image, [-1.0, 1.0], 0.02).of(always, |s| s.post.brightness, |s, v| s.post.brightness = v),
+    slider("Contrast", "", Image, [0.0, 3.0], 0.05).of(always, |s| s.post.contrast, |s, v| s.post.contrast = v),
+    slider("Gamma", "", Image, [0.3, 3.0], 0.05).of(always, |s| s.post.gamma, |s, v| s.post.gamma = v),
+    slider("Threshold", "", Image, [0.0, 1.0], 0.005).of(has_threshold, threshold, set_threshold),
+    slider("Window low", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[0], |s, v| set_low(window_mut(s), v)),
+    slider("Window high", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[1], |s, v| set_high(window_mut(s), v)),
+    slider("Start depth", "mm", Image, [0.0, 400.0], 1.0).within(depths).reruns().of(
+        |s| start(s).is_some(),
+        |s| start(s).flatten().unwrap_or(0.0),
+        set_start,
+    ),
+    slider("Planes zoom", "", Planes, [0.2, 20.0], 0.1).of(cuts, |s| s.planes.zoom, |s, v| s.planes.zoom = v),
+    slider("Slab", "mm", Planes, [0.0, 40.0], 0.5).of(cuts, |s| s.planes.thickness, |s, v| s.planes.thickness = v),
+    slider("Spacing", "mm", Planes, [0.0, 40.0], 0.5).of(
+        |s| s.mode == Mode::Tomography,
+        |s| s.planes.spacing.unwrap_or(0.0),
+        |s, v| s.planes.spacing = above(v, 0.1),
+    ),
+    slider("Planes azimuth", "°", Planes, [-180.0, 180.0], 5.0).of(
+        cuts,
+        |s| s.planes.azimuth,
+        |s, v| s.planes.azimuth = v,
+    ),
+    slider("Planes tilt", "°", Planes, [-180.0, 180.0], 5.0).of(cuts, |s| s.planes.tilt, |s, v| s.planes.tilt = v),
+    slider("Planes roll", "°", Planes, [-180.0, 180.0], 5.0).of(cuts, |s| s.planes.roll, |s, v| s.planes.roll = v),
+    slider("Planes window low", "", Planes, [0.0, 1.0], 0.01).of(
+        is_four,
+        |s| s.planes.window[0],
+        |s, v| set_low(&mut s.planes.window, v),
+    ),
+    slider("Planes window high", "", Planes, [0.0, 1.0], 0.01).of(
+        is_four,
+        |s| s.planes.window[1],
+        |s, v| set_high(&mut s.planes.window, v),
+    ),
+    slider("Cut left", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset(c, 0, c.settings.cube.inset.right))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.left, |s, v| s.cube.inset.left = v),
+    slider("Cut right", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset(c, 0, c.settings.cube.inset.left))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.right, |s, v| s.cube.inset.right = v),
+    slider("Cut near", "mm", Planes, [0.0, 400.0], 1.0).within(|c| inset(c, 1, c.settings.cube.inset.far)).reruns().of(
+        is_cube,
+        |s| s.cube.inset.near,
+        |s, v| s.cube.inset.near = v,
+    ),
+    slider("Cut far", "mm", Planes, [0.0, 400.0], 1.0).within(|c| inset(c, 1, c.settings.cube.inset.near)).reruns().of(
+        is_cube,
+        |s| s.cube.inset.far,
+        |s, v| s.cube.inset.far = v,
+    ),
+    slider("Cut bottom", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset(c, 2, c.settings.cube.inset.top))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.bottom, |s, v| s.cube.inset.bottom = v),
+    slider("Cut top", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset(c, 2, c.settings.cube.inset.bottom))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.top, |s, v| s.cube.inset.top = v),
+    slider("Face shading", "", Planes, [0.0, 1.0], 0.05).of(is_cube, |s| s.cube.shading, |s, v| s.cube.shading = v),
+    slider("Opacity", "", Volume, [0.01, 1.0], 0.02).of(has_opacity, opacity, set_opacity),
+    slider("Opacity of a hit", "", Volume, [0.01, 1.0], 0.02).of(
+        is_first_hit,
+        |s| s.volume.hit,
+        |s, v| s.volume.hit = v,
+    ),
+    slider("Veil", "", Volume, [0.0, 1.0], 0.05).of(is_mixed, |s| s.volume.veil, |s, v| s.volume.veil = v),
+    slider("Veil threshold", "", Volume, [0.0, 1.0], 0.01).of(
+        is_mixed,
+        |s| s.volume.threshold,
+        |s, v| s.volume.threshold = v,
+    ),
+    slider("Veil window low", "", Volume, [0.0, 1.0], 0.01).of(
+        is_mixed,
+        |s| s.volume.window[0],
+        |s, v| set_low(&mut s.volume.window, v),
+    ),
+    slider("Veil window high", "", Volume, [0.0, 1.0], 0.01).of(
+        is_mixed,
+        |s| s.volume.window[1],
+        |s, v| set_high(&mut s.volume.window, v),
+    ),
+    slider("Veil start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depths).reruns().of(
+        is_mixed,
+        |s| s.volume.start_depth.unwrap_or(0.0),
+        |s, v| s.volume.start_depth = above(v, 1e-9),
+    ),
+    slider("Surface median", "px", Surface, [0.0, 31.0], 2.0).of(
+        lit,
+        |s| f64::from(s.distance.median),
+        |s, v| s.distance.median = odd(v),
+    ),
+    slider("Surface smoothing", "px", Surface, [0.0, 10.0], 0.5).of(
+        lit,
+        |s| s.distance.bilateral.map_or(0.0, |b| b.pixels),
+        set_bilateral,
+    ),
+    slider("Surface edge", "mm", Surface, [0.1, 20.0], 0.2).of(
+        |s| lit(s) && s.distance.bilateral.is_some(),
+        |s| s.distance.bilateral.map_or(0.1, |b| b.distance),
+        set_edge,
+    ),
+    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.ambient, |s, v| s.light.ambient = v),
+    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
+    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.specular, |s, v| s.light.specular = v),
+    slider("Shadow", "", Light, [0.0, 1.0], 0.05).of(
+        lit,
+        |s| s.light.shadow.map_or(0.0, |l| l.strength),
+        |s, v| s.light.shadow = kept(s.light.shadow, v, |l: &mut Shadow| &mut l.strength),
+    ),
+    slider("Occlusion", "", Light, [0.0, 4.0], 0.1).of(
+        lit,
+        |s| s.light.occlusion.map_or(0.0, |l| l.strength),
+        |s, v| s.light.occlusion = kept(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength),
+    ),
+    slider("Translucency", "", Light, [0.0, 1.0], 0.05).of(
+        lit,
+        |s| s.light.skin.map_or(0.0, |l| l.translucency),
+        |s, v| s.light.skin = kept(s.light.skin, v, |l: &mut Skin| &mut l.translucency),
+    ),
+    slider("Smoothing", "mm", Filters, [0.0, 3.0], 0.1).within(smoothings).reruns().of(
+        always,
+        smoothing,
+        set_smoothing,
+    ),
+    slider("Median", "", Filters, [0.0, 1.0], 1.0).reruns().of(
+        always,
+        |s| f64::from(u8::from(s.slices.median)),
+        |s, v| s.slices.median = v >= 0.5,
+    ),
+    slider("Speckle", "", Filters, [0.0, 0.5], 0.01).reruns().of(
+        always,
+        |s| s.slices.sigma.map_or(0.0, |f| f.sigma),
+        |s, v| s.slices.sigma = sigma(s.slices.sigma, v),
+    ),
+    slider("Picture speckle", "", Filters, [0.0, 0.5], 0.01).of(
+        always,
+        |s| s.post.sigma.map_or(0.0, |f| f.sigma),
+        |s, v| s.post.sigma = sigma(s.post.sigma, v),
+    ),
+    slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
+        casts,
+        |s| s.ray.step.unwrap_or(0.0),
+        |s, v| s.ray.step = above(v, 0.05),
+    ),
+    slider("Field of view", "°", Quality, [0.0, 90.0], 5.0).of(
+        casts,
+        |s| s.camera.field_of_view,
+        |s, v| s.camera.field_of_view = above(v, 1.0).unwrap_or(0.0),
+    ),
+    slider("Rays a pixel", "", Quality, [1.0, 4.0], 1.0).of(
+        |s| casts(s) && !s.ray.half,
+        |s| f64::from(s.ray.rays),
+        |s, v| s.ray.rays = if s.ray.half { 1 } else { v.round() as u32 },
+    ),
+];
+
+fn always(_: &Settings) -> bool {
+    true
+}
+
+fn casts(s: &Settings) -> bool {
+    !s.mode.is_flat()
+}
+
+fn cuts(s: &Settings) -> bool {
+    s.mode.is_flat() || is_four(s)
+}
+
+fn is_four(s: &Settings) -> bool {
+    s.layout == Layout::Four
+}
+
+fn is_cube(s: &Settings) -> bool {
+    s.mode == Mode::Cube
+}
+
+fn is_mixed(s: &Settings) -> bool {
+    s.mode == Mode::Mixed
+}
+
+fn is_first_hit(s: &Settings) -> bool {
+    s.mode == Mode::Volume && s.volume.shading == Shading::FirstHit
+}
+
+fn lit(s: &Settings) -> bool {
+    matches!(s.mode, Mode::Surface | Mode::Mixed) || is_first_hit(s)
+}
+
+/// A filter or a step that is off below its least value.
+fn above(value: f64, least: f64) -> Option<f64> {
+    (value >= least).then_some(value)
+}
+
+/// The odd window that is nearest; 0 is none.
+fn odd(value: f64) -> u32 {
+    if value < 2.0 { 0 } else { 2 * ((value - 1.0) / 2.0).round() as u32 + 1 }
+}
+
+/// The same look with another strength. It stays where its strength is 0, which no pass runs for: its other numbers are kept.
+fn kept<T: Copy + Default>(look: Option<T>, value: f64, part: fn(&mut T) -> &mut f64) -> Option<T> {
+    if look.is_none() && value == 0.0 {
+        return None;
+    }
+    let mut look = look.unwrap_or_default();
+    *part(&mut look) = value;
+    Some(look)
+}
+
+fn sigma(filter: Option<Sigma>, value: f64) -> Option<Sigma> {
+    (value > 0.0).then(|| Sigma { sigma: value, ..filter.unwrap_or_default() })
+}
+
+fn window(s: &Settings) -> [f64; 2] {
+    match s.mode {
+        Mode::Surface | Mode::Mixed => s.surface.window,
+        Mode::Volume => s.volume.window,
+        Mode::Mip | Mode::MinIp | Mode::Mean => s.projection.window,
+        Mode::Plane | Mode::Orthogonal | Mode::Tomography => s.planes.window,
+        Mode::Cube => s.cube.window,
+    }
+}
+
+fn window_mut(s: &mut Settings) -> &mut [f64; 2] {
+    match s.mode {
+        Mode::Surface | Mode::Mixed => &mut s.surface.window,
+        Mode::Volume => &mut s.volume.window,
+        Mode::Mip | Mode::MinIp | Mode::Mean => &mut s.projection.window,
+        Mode::Plane | Mode::Orthogonal | Mode::Tomography => &mut s.planes.window,
+        Mode::Cube => &mut s.cube.window,
+    }
+}
+
+/// One grey level of 8 bits, rounded up: a narrower window shows nothing but black and white.
+const NARROWEST: f64 = 0.005;
+
+fn set_low(window: &mut [f64; 2], value: f64) {
+    let low = value.min(window[1] - NARROWEST);
+    if low < window[1] {
+        window[0] = low;
+    }
+}
+
+fn set_high(window: &mut [f64; 2], value: f64) {
+    let high = value.max(window[0] + NARROWEST);
+    if window[0] < high {
+        window[1] = high;
+    }
+}
+
+fn has_threshold(s: &Settings) -> bool {
+    matches!(s.mode, Mode::Surface | Mode::Mixed | Mode::Volume)
+}
+
+fn threshold(s: &Settings) -> f64 {
+    if s.mode == Mode::Volume { s.volume.threshold } else { s.surface.threshold }
+}
+
+fn set_threshold(s: &mut Settings, value: f64) {
+    match s.mode {
+        Mode::Volume => s.volume.threshold = value,
+        // A detector that fires at nothing finds its surface where the ray begins.
+        _ => s.surface.threshold = value.max(0.005),
+    }
+}
+
+/// That of the mode, if it has one.
+fn start(s: &Settings) -> Option<Option<f64>> {
+    match s.mode {
+        Mode::Surface | Mode::Mixed => Some(s.surface.start_depth),
+        Mode::Volume => Some(s.volume.start_depth),
+        Mode::Mip | Mode::MinIp | Mode::Mean => Some(s.projection.start_depth),
+        _ => None,
+    }
+}
+
+fn set_start(s: &mut Settings, value: f64) {
+    let value = above(value, 1e-9);
+    match s.mode {
+        Mode::Surface | Mode::Mixed => s.surface.start_depth = value,
+        Mode::Volume => s.volume.start_depth = value,
+        Mode::Mip | Mode::MinIp | Mode::Mean => s.projection.start_depth = value,
+        _ => {}
+    }
+}
+
+/// Depths below the face that leave 1 mm of the region.
+fn depths(scene: &Scene) -> [f64; 2] {
+    [f64::NEG_INFINITY, super::view::below_face(scene, scene.high).y - 1.0]
+}
+
+/// What a face can be pushed in along an axis and leave 2 mm between it and the one across.
+fn inset(scene: &Scene, axis: usize, across: f64) -> [f64; 2] {
+    [0.0, (scene.high - scene.low)[axis] - across - 2.0]
+}
+
+/// The largest opacity of the points. Named functions have theirs.
+fn opacity(s: &Settings) -> f64 {
+    match &s.volume.transfer {
+        Transfer::Points(points) => points.iter().map(|p| p.opacity).fold(0.0, f64::max),
+        Transfer::Named(_) => 0.0,
+    }
+}
+
+fn has_opacity(s: &Settings) -> bool {
+    matches!(s.mode, Mode::Volume | Mode::Mixed) && opacity(s) > 0.0
+}
+
+fn set_opacity(s: &mut Settings, value: f64) {
+    let largest = opacity(s);
+    if let Transfer::Points(points) = &mut s.volume.transfer
+        && largest > 0.0
+    {
+        points.iter_mut().for_each(|p| p.opacity = (p.opacity / largest * value).min(1.0));
+    }
+}
+
+fn set_bilateral(s: &mut Settings, value: f64) {
+    let filter = s.distance.bilateral.unwrap_or(Bilateral { pixels: 0.0, distance: 2.0, repeat: 1 });
+    s.distance.bilateral = above(value, 0.1).map(|pixels| Bilateral { pixels, ..filter });
+}
+
+fn set_edge(s: &mut Settings, value: f64) {
+    if let Some(filter) = &mut s.distance.bilateral {
+        filter.distance = value;
+    }
+}
+
+fn smoothing(s: &Settings) -> f64 {
+    s.slices.smooth.map_or(0.0, |f| f.lateral.max(f.depth))
+}
+
+/// Keeps the proportions of a Gaussian that was there; a new one is round in the plane and joins neighbouring slices.
+fn set_smoothing(s: &mut Settings, value: f64) {
+    let Some(wide) = above(value, 1e-3) else { return s.slices.smooth = None };
+    let (filter, was) = (s.slices.smooth.unwrap_or_default(), smoothing(s));
+    let scaled = |deviation: f64, most: f64| if was > 0.0 { (deviation * (wide / was)).min(most) } else { most };
+    s.slices.smooth = Some(Smooth {
+        lateral: scaled(filter.lateral, wide),
+        depth: scaled(filter.depth, wide),
+        elevation: if was > 0.0 { scaled(filter.elevation, 8.0) } else { filter.elevation.max(1.0) },
+        kernel: None,
+    });
+}
+
+/// What a Gaussian may be on slices of this pitch, mm.
+fn smoothings(scene: &Scene) -> [f64; 2] {
+    [0.0, MAX_DEVIATION * scene.grid.pitch[0].min(scene.grid.pitch[1])]
+}
