@@ -204,7 +204,7 @@ fn dropping_the_source_stops_the_motor_while_it_looks_for_home_too() {
 fn what_the_motor_cannot_place_is_told_at_once() {
     let simulator = Arc::new(simulated(None));
     for (motion, named) in
-        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be whole")]
+        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be complete")]
     {
         let wide = Axis::centred(20f64.to_radians(), 9);
         let header = header(Probe { motion, slices: wide, ..probe() });

@@ -1,4 +1,4 @@
-//! What is amiss, reported at most once a second each, with how often it was.
+//! Faults of the network source. Each kind is reported at most once a second, with its count.
 
 use crate::files::escaped;
 use std::time::{Duration, Instant};
