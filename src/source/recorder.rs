@@ -128,7 +128,7 @@ impl Writer {
     }
 
     /// Removes the incomplete file.
-    pub fn discard(self) {
+    pub(crate) fn discard(self) {
         // If it cannot be removed, nothing else can be done.
         let _ = std::fs::remove_file(&self.path);
     }
@@ -199,7 +199,7 @@ pub struct Reader {
 
 impl Reader {
     /// True if a file begins as a `.frames` file.
-    pub fn is_one(start: &[u8]) -> bool {
+    pub(crate) fn is_one(start: &[u8]) -> bool {
         start.starts_with(MAGIC)
     }
 

@@ -22,7 +22,7 @@ pub struct Sequence {
 }
 
 /// The path of the probe file of a sequence.
-pub fn probe_file_path(path: &Path) -> PathBuf {
+pub(crate) fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
     path.with_file_name(name)

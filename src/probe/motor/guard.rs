@@ -62,7 +62,7 @@ impl Guard {
     ///
     /// # Errors
     /// As [`Guard::ask`].
-    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+    pub(crate) fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
         self.interrupted()?;
         self.port.ask_raw(request)
     }
@@ -91,7 +91,7 @@ impl Guard {
     }
 
     /// The motor has stopped by itself at its target.
-    pub fn at_rest(&mut self) {
+    pub(crate) fn at_rest(&mut self) {
         (self.moving, self.searching) = (false, false);
     }
 

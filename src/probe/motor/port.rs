@@ -117,7 +117,7 @@ impl Port {
     ///
     /// # Errors
     /// [`Fault::NoReply`], [`Fault::Unplugged`].
-    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+    pub(crate) fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
         let mut received = self.send(request)?;
         let until = Instant::now() + self.settings.timeout;
         while received.len() < LENGTH && self.receive(&mut received, until)? {}
@@ -127,7 +127,7 @@ impl Port {
     }
 
     /// The next request is sent at once, even if the reply to an earlier one may still arrive.
-    pub fn hurry(&mut self) {
+    pub(crate) fn hurry(&mut self) {
         self.late = false;
     }
 

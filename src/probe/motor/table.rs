@@ -220,7 +220,7 @@ impl MotorTable {
     }
 
     /// One microstep/s in the module's unit.
-    pub fn speed_scale(&self) -> f64 {
+    pub(crate) fn speed_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
             // TMC429 data sheet: v = clock * velocity / (2^pulse_divisor * 2048 * 32).
@@ -229,7 +229,7 @@ impl MotorTable {
     }
 
     /// One microstep/s2 in the module's unit.
-    pub fn acceleration_scale(&self) -> f64 {
+    pub(crate) fn acceleration_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
             // TMC429 data sheet: a = clock^2 * acceleration / 2^(pulse_divisor + ramp_divisor + 29).

@@ -120,7 +120,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub fn vector(&mut self, field: &'static str) -> Result<[f32; 3], Fault> {
+    pub(crate) fn vector(&mut self, field: &'static str) -> Result<[f32; 3], Fault> {
         Ok([self.f32(field)?, self.f32(field)?, self.f32(field)?])
     }
 

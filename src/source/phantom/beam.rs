@@ -47,7 +47,7 @@ impl Beam {
     }
 
     /// In f32, for bodies that need no higher precision.
-    pub fn rough_place(&self, sample: usize) -> Vec3 {
+    pub(crate) fn rough_place(&self, sample: usize) -> Vec3 {
         self.place(sample).as_vec3()
     }
 

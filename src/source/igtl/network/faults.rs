@@ -69,7 +69,7 @@ impl Faults {
     }
 
     /// A fault whose kind was not reported within the last second.
-    pub fn due(&mut self) -> Option<String> {
+    pub(crate) fn due(&mut self) -> Option<String> {
         let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
         let mut faults = self.faults.iter_mut().zip(KINDS);
         let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
