@@ -73,10 +73,10 @@ impl SourceArgs {
             let text = error.to_string();
             // Usage and the hint to --help follow an empty line. They apply to a command line only.
             let text = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").replace("\n ", "");
-            input(config.refuse(&text))
+            input(config.flag_error(&text))
         })?;
         parsed.source.check().map_err(|failure| match failure {
-            Failure::Input(text) => input(config.refuse(&text)),
+            Failure::Input(text) => input(config.flag_error(&text)),
             failure => failure,
         })?;
         Ok(parsed.source)
