@@ -54,7 +54,7 @@ pub fn measured(report: &Report) -> Result<Vec<Rung>, String> {
     for choice in front.iter().rev() {
         let (share, before) = (choice.time / slowest, rungs.last().map_or(1.0, |r| r.share));
         if share <= 0.75 * before {
-            let words = choice.turned.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
+            let words = choice.changed.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
             rungs.push(Rung { words: words.join(", "), share, dials: Dials::Measured(choice.set.clone()) });
         }
     }
