@@ -149,9 +149,9 @@ fn rays(count: usize) -> Vec<Ray> {
         i += 1.0;
         let [a, b, c, d] = [1, 2, 3, 4].map(|k| (0.5 + i / g.powi(k)).fract());
         let on_sphere = |u: f64, v: f64| {
-            let (z, turn) = (1.0 - 2.0 * u, std::f64::consts::TAU * v);
+            let (z, angle) = (1.0 - 2.0 * u, std::f64::consts::TAU * v);
             let r = (1.0 - z * z).max(0.0).sqrt();
-            DVec3::new(r * turn.cos(), r * turn.sin(), z)
+            DVec3::new(r * angle.cos(), r * angle.sin(), z)
         };
         let (from, to) = (on_sphere(a, b) * RADIUS, on_sphere(c, d) * RADIUS);
         let path = from.distance(to);

@@ -1,5 +1,5 @@
-//! Error against run time (SPEC of the thesis' trade-offs): every dial of a scene turned, each place rendered, timed, and reference
-//! against the f64 reference, or where that is too slow against a converged picture whose own error is shown.
+//! Measures error against run time: renders and times every setting of every dial, and compares it with the f64 reference or, if that
+//! is too slow, with a converged picture whose own error is estimated.
 
 use super::dials::{Dial, Place};
 use crate::error_report::convergence::{self, Range};
