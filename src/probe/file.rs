@@ -1,19 +1,17 @@
 //! The probe file: a TOML that says where the scan lines and frames of a recording lie. Lengths in mm, angles in degrees.
 //!
-//! Numbers of samples, lines and frames are not in it: they come from the recording.
+//! The numbers of samples, lines and frames are not in it: they come from the recording.
 
-mod tables;
-mod text;
-
+use super::geometry::GeometryError;
 use super::motor::MotorTable;
 use super::{Advance, Array, Axis, Motion, Probe, Volumes};
-use crate::files;
-use crate::source::InputError;
+use crate::files::{self, InputError};
+use serde::Deserialize;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use tables::{ArrayKind, Direction, MotionKind, Tables};
 
 /// Longest probe file, in bytes.
-const LONGEST: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 /// Thickness of the slab that a lone frame is drawn as, mm.
 pub(crate) const SLAB: f64 = 1.0;
 
@@ -27,7 +25,7 @@ pub struct ProbeFile {
 impl ProbeFile {
     /// Reads and checks all that can be checked without the recording.
     pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
-        let text = files::read_text(path, LONGEST, "probe file").map_err(|e| InputError::new(path, "file", e))?;
+        let text = files::read_text(path, MAX_BYTES, "probe file").map_err(|e| InputError::new(path, "file", e))?;
         ProbeFile::parse(path, &text)
     }
 
@@ -170,11 +168,11 @@ impl ProbeFile {
             advance: Advance::None,
             sound_speed: self.tables.sound.speed_m_per_s,
         };
-        probe.check().map_err(|e| InputError::geometry(&self.path, &e))?;
+        probe.check().map_err(|e| geometry_error(&self.path, &e))?;
         for volume in 0..volumes.count.min(2) {
             let advance = volumes.advance(volume, &probe.slices);
             let moving = Probe { advance, ..probe.clone() };
-            moving.check().map_err(|e| InputError::geometry(&self.path, &e))?;
+            moving.check().map_err(|e| geometry_error(&self.path, &e))?;
         }
         Ok((probe, volumes))
     }
@@ -270,9 +268,217 @@ impl ProbeFile {
     }
 }
 
+/// A fault of the geometry as one of the file that it comes from.
+pub(crate) fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
+    InputError::new(file, error.field, &error.fault)
+}
+
 /// `count` positions over `span`, first to last, centred on zero. One position lies in the middle.
 fn spread(span: f64, count: usize) -> Axis {
     if count < 2 { Axis::centred(1.0, 1) } else { Axis::centred(span / (count - 1) as f64, count) }
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tables {
+    array: ArrayTable,
+    lines: LinesTable,
+    depth: DepthTable,
+    motion: MotionTable,
+    #[serde(default)]
+    sound: SoundTable,
+    #[serde(default)]
+    samples: SamplesTable,
+    motor: Option<MotorTable>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ArrayKind {
+    Curved,
+    Linear,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ArrayTable {
+    kind: ArrayKind,
+    radius_mm: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinesTable {
+    sector_angle_deg: Option<f64>,
+    width_mm: Option<f64>,
+    angles_deg: Option<Vec<f64>>,
+    positions_mm: Option<Vec<f64>>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DepthTable {
+    #[serde(default)]
+    start_mm: f64,
+    /// Distance between samples.
+    sample_pitch_mm: Option<f64>,
+    /// Depth of the last sample: dr = (d1 - d0) / (S - 1).
+    end_mm: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum MotionKind {
+    Fan,
+    Translated,
+    Still,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Direction {
+    #[default]
+    Forward,
+    Backward,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MotionTable {
+    kind: MotionKind,
+    wobble_radius_mm: Option<f64>,
+    fan_angle_deg: Option<f64>,
+    frame_angles_deg: Option<Vec<f64>>,
+    pitch_mm: Option<f64>,
+    frame_positions_mm: Option<Vec<f64>>,
+    thickness_mm: Option<f64>,
+    /// 0: all frames of the recording are one volume.
+    #[serde(default)]
+    frames_per_volume: usize,
+    /// Every second volume was swept backwards.
+    #[serde(default)]
+    both_ways: bool,
+    #[serde(default)]
+    first_direction: Direction,
+    #[serde(default)]
+    speed_ratio: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SoundTable {
+    speed_m_per_s: f64,
+}
+
+impl Default for SoundTable {
+    fn default() -> SoundTable {
+        SoundTable { speed_m_per_s: 1540.0 }
+    }
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SamplesTable {
+    range: Option<[f64; 2]>,
+}
+
+/// What is apart by no more, in rad or mm, is the same place: a file says angles in degrees.
+const SAME: f64 = 1e-9;
+
+impl ProbeFile {
+    /// The text that [`ProbeFile::read`] and [`ProbeFile::geometry`] make this probe and these volumes of again. `range`: the values that are
+    /// shown as 0 and 1. The probe is that of the first volume.
+    ///
+    /// # Errors
+    /// A probe that no file can say: an advance that is not the motor's at an even speed, tables longer than a file may be; in words.
+    pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
+        let gap = probe.slices.at(1.0) - probe.slices.at(0.0);
+        let advance = probe.slice_position(probe.lines.len() as f64, 0.0) - probe.slice_position(0.0, 0.0);
+        let speed_ratio = if probe.slices.len() > 1 { (advance / gap).abs() } else { 0.0 };
+        let text = written(probe, &Volumes { speed_ratio, ..volumes.clone() }, range);
+        let read = ProbeFile::parse(Path::new("probe.toml"), &text)
+            .and_then(|file| file.geometry(probe.samples, probe.lines.len(), volumes.frames * volumes.count));
+        let (read, there) = read.map_err(|e| format!("{}: {}", e.field(), e.fault()))?;
+        let read = Probe { advance: there.advance(0, &read.slices), ..read };
+        match is_same(probe, &read) && text.len() as u64 <= MAX_BYTES {
+            true => Ok(text),
+            false => Err("cannot be said by a probe file".into()),
+        }
+    }
+}
+
+fn written(probe: &Probe, volumes: &Volumes, [low, high]: [f64; 2]) -> String {
+    let mut text = String::from("# Lengths in mm, angles in degrees.\n");
+    let mut say = |line: std::fmt::Arguments| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{line}");
+    };
+    match probe.array {
+        Array::Curved { radius } => {
+            say(format_args!("[array]\nkind = \"curved\"\nradius_mm = {radius:?}\n\n[lines]"));
+            say(format_args!("{}\n", angles("sector_angle_deg", "angles_deg", &probe.lines)));
+        }
+        Array::Linear => {
+            say(format_args!("[array]\nkind = \"linear\"\n\n[lines]"));
+            let span = probe.lines.last() - probe.lines.first();
+            say(format_args!("{}\n", axis(("width_mm", span), "positions_mm", &probe.lines, 1.0)));
+        }
+    }
+    say(format_args!("[depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n", probe.start_depth, probe.sample_pitch));
+    match probe.motion {
+        Motion::Still { thickness } => say(format_args!("[motion]\nkind = \"still\"\nthickness_mm = {thickness:?}")),
+        Motion::Translated => {
+            say(format_args!("[motion]\nkind = \"translated\""));
+            say(format_args!("{}", axis(("pitch_mm", probe.slices.pitch()), "frame_positions_mm", &probe.slices, 1.0)));
+        }
+        Motion::Fan { wobble_radius } => {
+            say(format_args!("[motion]\nkind = \"fan\"\nwobble_radius_mm = {wobble_radius:?}"));
+            say(format_args!("{}", angles("fan_angle_deg", "frame_angles_deg", &probe.slices)));
+        }
+    }
+    let direction = if volumes.first_backward { "backward" } else { "forward" };
+    say(format_args!("frames_per_volume = {}\nboth_ways = {}", volumes.frames, volumes.both_ways));
+    say(format_args!("first_direction = \"{direction}\"\nspeed_ratio = {:?}\n", volumes.speed_ratio));
+    say(format_args!("[sound]\nspeed_m_per_s = {:?}\n\n[samples]\nrange = [{low:?}, {high:?}]", probe.sound_speed));
+    text
+}
+
+fn angles(even: &str, table: &str, positions: &Axis) -> String {
+    let span = (positions.last() - positions.first()).to_degrees();
+    axis((even, span), table, positions, 180.0 / std::f64::consts::PI)
+}
+
+/// One number for positions that are even and centred, otherwise all of them.
+fn axis((even, number): (&str, f64), table: &str, positions: &Axis, scale: f64) -> String {
+    let is_centred = (positions.first() + positions.last()).abs() <= SAME;
+    match positions {
+        Axis::Even { .. } if is_centred => format!("{even} = {number:?}"),
+        _ => {
+            let all: Vec<String> =
+                (0..positions.len()).map(|k| format!("{:?}", positions.at(k as f64) * scale)).collect();
+            format!("{table} = [{}]", all.join(", "))
+        }
+    }
+}
+
+fn is_same(a: &Probe, b: &Probe) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(1.0);
+    let kinds = match (a.motion, b.motion) {
+        (Motion::Fan { wobble_radius: a }, Motion::Fan { wobble_radius: b }) => near(a, b),
+        (Motion::Still { thickness: a }, Motion::Still { thickness: b }) => near(a, b),
+        (a, b) => a == b,
+    };
+    let sizes = |p: &Probe| [p.samples, p.lines.len(), p.slices.len()];
+    let numbers = |p: &Probe| [p.array_radius(), p.start_depth, p.sample_pitch, p.sound_speed];
+    let last = a.lines.len() as f64;
+    kinds
+        && std::mem::discriminant(&a.array) == std::mem::discriminant(&b.array)
+        && sizes(a) == sizes(b)
+        && numbers(a).into_iter().zip(numbers(b)).all(|(a, b)| near(a, b))
+        && (0..a.lines.len()).map(|k| k as f64).all(|k| near(a.lines.at(k), b.lines.at(k)))
+        && (0..a.slices.len())
+            .map(|k| k as f64)
+            .all(|k| [0.0, last].into_iter().all(|line| near(a.slice_position(line, k), b.slice_position(line, k))))
 }
 
 #[cfg(test)]
@@ -333,5 +539,64 @@ mod tests {
             assert!(error.starts_with("probe.toml: ") && error.contains(named), "{error}");
             assert_eq!(error.lines().count(), 1);
         }
+    }
+}
+
+#[cfg(test)]
+mod writing_tests {
+    use super::*;
+
+    fn probe() -> Probe {
+        let volumes = Volumes { speed_ratio: 0.4, ..Volumes::forward(7, 2) };
+        let slices = Axis::centred(0.03, 7);
+        Probe {
+            array: Array::Curved { radius: 39.8 },
+            lines: Axis::centred(0.011, 40),
+            start_depth: 1.5,
+            sample_pitch: 0.25,
+            samples: 100,
+            motion: Motion::Fan { wobble_radius: 20.0 },
+            advance: volumes.advance(0, &slices),
+            slices,
+            sound_speed: 1480.0,
+        }
+    }
+
+    #[test]
+    fn no_probe_is_written_that_is_read_as_another() {
+        let uneven = Axis::Table(vec![-0.1, -0.05, 0.01, 0.05, 0.06, 0.09, 0.2]);
+        let aside = Axis::Even { first: 0.01, pitch: 0.02, count: 40 };
+        let volumes = Volumes { both_ways: true, ..Volumes::forward(7, 2) };
+        let moving = Volumes { speed_ratio: 0.3, first_backward: true, ..volumes.clone() };
+        let linear =
+            Probe { array: Array::Linear, lines: Axis::centred(0.3, 40), motion: Motion::Translated, ..probe() };
+        for (probe, volumes) in [
+            (probe(), volumes.clone()),
+            (Probe { lines: aside, ..probe() }, volumes.clone()),
+            (Probe { slices: uneven.clone(), advance: moving.advance(0, &uneven), ..probe() }, moving),
+            (linear.clone(), volumes.clone()),
+            (
+                Probe { slices: Axis::Even { first: 4.0, pitch: 0.5, count: 7 }, advance: Advance::None, ..linear },
+                volumes,
+            ),
+            (
+                Probe {
+                    motion: Motion::Still { thickness: 2.5 },
+                    slices: Axis::centred(1.0, 1),
+                    advance: Advance::None,
+                    ..probe()
+                },
+                Volumes::forward(1, 3),
+            ),
+        ] {
+            let text = ProbeFile::to_toml(&probe, &volumes, [3.0, 250.0]).unwrap();
+            let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
+            let (read, there) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
+            assert!(is_same(&Probe { advance: there.advance(0, &read.slices), ..read }, &probe), "{text}");
+            assert_eq!((there.both_ways, there.first_backward), (volumes.both_ways, volumes.first_backward));
+            assert_eq!(file.range(), Some([3.0, 250.0]));
+        }
+        let astray = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
+        assert!(ProbeFile::to_toml(&astray, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
     }
 }

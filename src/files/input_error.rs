@@ -1,6 +1,5 @@
 //! What is wrong with an input, on one line.
 
-use crate::probe::GeometryError;
 use std::io;
 use std::path::Path;
 
@@ -39,11 +38,6 @@ impl InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
     }
 
-    /// The numbers of the file do not place its samples.
-    pub(crate) fn geometry(file: &Path, error: &GeometryError) -> InputError {
-        InputError::new(file, error.field, &error.fault)
-    }
-
     pub fn field(&self) -> &str {
         &self.field
     }
@@ -59,7 +53,7 @@ pub(crate) fn quoted(value: &str) -> String {
 }
 
 /// Control characters and other invisible ones as escapes, at most `longest` characters of the original.
-pub(super) fn escaped(text: &str, longest: usize) -> String {
+pub(crate) fn escaped(text: &str, longest: usize) -> String {
     let mut line = String::new();
     for (i, c) in text.chars().enumerate() {
         if i == longest {

@@ -1,17 +1,17 @@
 //! The phantom as a free-running probe: frame after frame as fast as sound allows, each of where the array really is.
 
+use crate::files::InputError;
 use crate::probe::motor::{ArrayState, PositionLog};
-use crate::source::live::{Event, Live, header_of};
+use crate::source::frame::{Frame, Header, Source};
+use crate::source::live::{Event, Live};
 use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::source::phantom_source::PhantomSource;
-use crate::source::recorder::Header;
-use crate::source::{Frame, InputError};
 use std::time::{Duration, Instant};
 
 /// Share of the way to the next slice that the motor may travel during a frame, for as many lines as that leaves time for.
-const RATIO: f64 = 0.75;
+const MAX_ADVANCE: f64 = 0.75;
 /// Fewest lines of a frame.
-const FEWEST: usize = 16;
+const MIN_LINES: usize = 16;
 
 /// The phantom, seen by an array that a motor turns: a demonstration of placing frames, and so its frames have no place.
 ///
@@ -42,8 +42,8 @@ impl FreeRunning {
             let frame_time = probe.acquisition_time() / probe.slices.len() as f64;
             Ok(speed.to_radians() * frame_time / probe.slices.pitch())
         };
-        let share = (RATIO / ratio(&options)?).min(1.0);
-        let lines = ((options.lines as f64 * share) as usize).max(FEWEST);
+        let share = (MAX_ADVANCE / ratio(&options)?).min(1.0);
+        let lines = ((options.lines as f64 * share) as usize).max(MIN_LINES);
         let options = PhantomOptions { lines, ..options };
         let speed_ratio = ratio(&options)?.min(1.0);
         Phantom::new(PhantomOptions { speed_ratio, ..options })
@@ -55,7 +55,7 @@ impl FreeRunning {
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));
         let probe = phantom.probe(0);
         let period = probe.acquisition_time() / probe.slices.len() as f64;
-        let header = header_of(&PhantomSource::new(phantom));
+        let header = PhantomSource::new(phantom).header();
         FreeRunning { header, watch, volumes, period, begun: false, next: None, count: 0 }
     }
 
