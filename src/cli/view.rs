@@ -3,7 +3,7 @@
 use super::view_config::{ConsoleConfig, WindowConfig};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::error_report::command::{nanoseconds, read};
-use crate::gpu::window::{PresentMode, display};
+use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
@@ -213,7 +213,7 @@ impl View {
     }
 
     /// The monitor and its mode. Flags override the configuration.
-    fn monitor_request(&self, configured: Option<display::Wanted>) -> Result<display::Wanted, Failure> {
+    fn monitor_request(&self, configured: Option<MonitorChoice>) -> Result<MonitorChoice, Failure> {
         if let Some(hz) = self.refresh.filter(|hz| !(1.0..=1000.0).contains(hz)) {
             return Err(input(format!("--refresh {hz}: must lie in 1..=1000")));
         }
@@ -223,7 +223,7 @@ impl View {
             false => configured.size,
         };
         let monitor = self.monitor.clone().or(configured.monitor);
-        Ok(display::Wanted { monitor, size, refresh: self.refresh })
+        Ok(MonitorChoice { monitor, size, refresh: self.refresh })
     }
 
     fn budget(&self) -> Result<Option<Duration>, Failure> {

@@ -2,8 +2,8 @@
 
 use super::view::rungs;
 use crate::args::{SceneArgs, SourceArgs};
-use crate::gpu::window::{PresentMode, display};
-use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
+use crate::gpu::window::{MonitorChoice, PresentMode};
+use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
@@ -22,13 +22,13 @@ pub struct WindowConfig {
     pub device: ContextOptions,
     pub shape: WindowOptions,
     /// A monitor without a desktop, instead of a window.
-    pub direct: Option<display::Wanted>,
+    pub direct: Option<MonitorChoice>,
 }
 
 impl WindowConfig {
     /// The default: the best device, a window of [`DEFAULT_SIZE`].
     pub fn usual() -> WindowConfig {
-        let device = ContextOptions { device: Choice::Best, validation: false };
+        let device = ContextOptions { device: DeviceChoice::Best, validation: false };
         let (monitor, present_mode, time) = (None, PresentMode::Fifo, None);
         let direct = None;
         WindowConfig {
@@ -75,7 +75,7 @@ impl WindowConfig {
             Present::Fifo => PresentMode::Fifo,
             Present::Mailbox => PresentMode::Mailbox,
         };
-        place.direct = config.display.direct.then(|| display::Wanted {
+        place.direct = config.display.direct.then(|| MonitorChoice {
             monitor: config.display.monitor.clone(),
             size: None,
             refresh: None,

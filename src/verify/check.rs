@@ -228,12 +228,12 @@ impl DeviceUnderTest {
     /// As [`DeviceUnderTest::new`].
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
         let context = Context::new(&self.options)?;
-        self.injected_fault.iter().for_each(|change| context.faults.plant(*change));
+        self.injected_fault.iter().for_each(|change| context.faults.inject_change(*change));
         self.prepare.iter().for_each(|prepare| prepare(&context));
         Ok(context)
     }
 
-    /// Options of new contexts.
+    /// RendererOptions of new contexts.
     pub fn options(&self) -> &ContextOptions {
         &self.options
     }
@@ -327,7 +327,7 @@ impl IsolatedContext {
 
 /// Validation messages without known false positives: hazards between submissions only if they are reliable.
 pub(super) fn credible_messages(context: &Context, mut messages: Vec<String>, hears_submissions: bool) -> Vec<String> {
-    if !hears_submissions || !context.hears_queues() {
+    if !hears_submissions || !context.validates_timelines() {
         messages.retain(|m| !(m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2")));
     }
     messages

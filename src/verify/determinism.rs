@@ -6,7 +6,7 @@ use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture};
 use super::render;
 use super::render::Drawn;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Picture;
 use crate::source::igtl::crc64;
@@ -100,7 +100,8 @@ fn send(renderer: &mut Renderer, of: &Drawn, variant: RenderVariant) -> Result<(
 
 /// Renders every mode, one after the other in one renderer.
 fn draw(context: &Arc<Context>, modes: &[Drawn], variant: RenderVariant) -> Result<Vec<Picture>, GpuError> {
-    let options = Options { queues: variant.queues, volume_images: variant.images, ..Options::default() };
+    let options =
+        RendererOptions { queues: variant.queues, volume_images: variant.images, ..RendererOptions::default() };
     let Some(first) = modes.first() else { return Ok(Vec::new()) };
     let mut renderer = Renderer::new(context, first.scene.clone(), &options)?;
     let picture = |of: &Drawn| {
@@ -129,7 +130,7 @@ fn render_variant(dut: &mut DeviceUnderTest, own: bool, variant: RenderVariant) 
 /// Renders every mode again: without changes, after selecting its image again, and after sending its frames again.
 fn again(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, modes) = (Findings::default(), dut.modes()?);
-    let options = Options { queues: Some(1), ..Options::default() };
+    let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
     let (mut compared, mut wrong) = (0, 0);
     let Some(first) = modes.first() else { return Ok(findings) };
     let mut renderer = Renderer::new(&dut.context, first.scene.clone(), &options)?;

@@ -6,12 +6,12 @@ use super::built_in::{BYTES, FLOATS, frames, scene, wall, wobbler};
 use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{count_figure, expect_same_picture};
 use super::render;
-use crate::gpu::faults::{Failure, Seam};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::faults::{InjectedFailure, InjectionPoint};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Geometry, Grid};
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::{MAX_PICTURE, Scene};
 use crate::verify::report::{Fault, Figure, Level, Unit, Worst};
 use std::sync::Arc;
@@ -64,8 +64,8 @@ fn every_allocation(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let before = context.allocated();
     let mut refused = 0;
     for after in 0..1000 {
-        context.faults.inject(Seam::Allocate, after, Failure::OutOfDeviceMemory.result());
-        let made = Renderer::new(context, case.scene.clone(), &Options::default());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
+        let made = Renderer::new(context, case.scene.clone(), &RendererOptions::default());
         context.faults.forget();
         match made {
             Ok(_) => break,
@@ -95,9 +95,9 @@ fn a_change(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let step = if dut.level == Level::Quick { 4 } else { 1 };
     let mut refused = 0;
     for after in (0..1000).step_by(step) {
-        let mut renderer = render::sent(context, &small.scene, &small.frames, &Options::default())?;
+        let mut renderer = render::sent(context, &small.scene, &small.frames, &RendererOptions::default())?;
         renderer.picture()?;
-        context.faults.inject(Seam::Allocate, after, Failure::OutOfDeviceMemory.result());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
         let changed = renderer.change(larger.scene.clone());
         context.faults.forget();
         let is_refused = changed.is_err();
@@ -128,7 +128,7 @@ fn a_change(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 fn submissions(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let mut all = 0;
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let isolated = IsolatedContext::of_queues(dut, queues)?;
         let case = case(&isolated.context, SMALL)?;
         let mut after = 0;
@@ -153,9 +153,9 @@ fn failed_once(
     after: u32,
 ) -> Result<bool, GpuError> {
     let format = Slot::Frames.format(&case.scene);
-    let options = Options { queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, case.scene.clone(), &options)?;
-    context.faults.inject(Seam::Submit, after, Failure::OutOfHostMemory.result());
+    context.faults.inject(InjectionPoint::Submit, after, InjectedFailure::OutOfHostMemory.result());
     let mut failed = 0;
     for (k, frame) in case.frames.iter().enumerate() {
         let bytes = frame.encode(format);
@@ -184,11 +184,11 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let case = case(context, SMALL)?;
     let before = context.allocated();
     for (what, seam, after, failure) in [
-        ("a device lost at a submission", Seam::Submit, 0, Failure::DeviceLost),
-        ("a device lost at a wait", Seam::Wait, 1, Failure::DeviceLost),
-        ("a device that does not come back", Seam::Wait, 1, Failure::TimeOut),
+        ("a device lost at a submission", InjectionPoint::Submit, 0, InjectedFailure::DeviceLost),
+        ("a device lost at a wait", InjectionPoint::Wait, 1, InjectedFailure::DeviceLost),
+        ("a device that does not come back", InjectionPoint::Wait, 1, InjectedFailure::TimeOut),
     ] {
-        let mut renderer = render::sent(context, &case.scene, &case.frames, &Options::default())?;
+        let mut renderer = render::sent(context, &case.scene, &case.frames, &RendererOptions::default())?;
         renderer.picture()?;
         renderer.show(0)?;
         context.faults.inject(seam, after, failure.result());
@@ -199,7 +199,7 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
             Err(error) => {
                 let text = error.to_string();
                 let is_right_kind = match failure {
-                    Failure::TimeOut => matches!(error, GpuError::TimedOut { .. }),
+                    InjectedFailure::TimeOut => matches!(error, GpuError::TimedOut { .. }),
                     _ => error.is_device_lost(),
                 };
                 findings
@@ -226,7 +226,7 @@ fn unexpected_frames(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, isolated) = (Findings::default(), IsolatedContext::new(dut)?);
     let context = &isolated.context;
     let case = case(context, SMALL)?;
-    let mut renderer = render::sent(context, &case.scene, &case.frames, &Options::default())?;
+    let mut renderer = render::sent(context, &case.scene, &case.frames, &RendererOptions::default())?;
     let (frame_bytes, slices) = (renderer.frame_bytes(), case.scene.slices());
     let frame = vec![255; frame_bytes];
     let line = frame_bytes / case.scene.frame_size()[1] as usize;
@@ -271,7 +271,7 @@ fn cartesian_scene(size: [usize; 3], toml: &str) -> Result<Scene, GpuError> {
 /// Adds a fault unless the scene is refused by an error that contains `names`, without any allocation.
 fn refused(findings: &mut Findings, context: &Arc<Context>, what: &str, scene: Scene, names: [&str; 2]) {
     let before = context.counts.allocations.load(Ordering::Relaxed);
-    match Renderer::new(context, scene, &Options::default()) {
+    match Renderer::new(context, scene, &RendererOptions::default()) {
         Ok(_) => findings.expect(false, || format!("{what} was not refused")),
         Err(error) => {
             let text = error.to_string();
@@ -326,7 +326,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 
 /// More volume images than fit into device memory.
 fn beyond_memory(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
-    if dut.context.candidate.shares_memory() {
+    if dut.context.candidate.has_unified_memory() {
         return Ok(Findings::left_out(
             "a device in the machine's memory is handed out more than there is, and killed for it",
         ));
@@ -338,7 +338,7 @@ fn beyond_memory(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let scene = cartesian_scene([edge; 3], toml)?;
     let images = context.memory() / (edge as u64).pow(3) + 2;
     let before = context.allocated();
-    let options = Options { volume_images: images as u32, ..Options::default() };
+    let options = RendererOptions { volume_images: images as u32, ..RendererOptions::default() };
     match Renderer::new(context, scene, &options) {
         Ok(_) => findings.expect(false, || format!("{images} volumes of {edge}^3 bytes were not refused")),
         Err(error) => {

@@ -5,7 +5,7 @@ use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{count_figure, picture_comparison, picture_difference};
 use super::render;
 use super::render::stored_reference_picture;
-use crate::gpu::{Context, Fetch, GpuError, Options, formats};
+use crate::gpu::{Context, GpuError, RendererOptions, TexelAccess, formats};
 use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::plan::Plan;
@@ -31,25 +31,26 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// Lists supported and missing features as notes; features that a built-in scene needs and that are missing are faults.
 fn uses(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, context) = (Findings::default(), &dut.context);
-    for of in formats::abilities(context) {
-        let [columns, rows, edge] = of.largest;
-        let missing = if of.cannot.is_empty() { String::new() } else { format!("; not {}", of.cannot.join(", ")) };
-        let can = of.can.join(", ");
+    for of in formats::format_support(context) {
+        let [columns, rows, edge] = of.max_extent;
+        let missing =
+            if of.unsupported.is_empty() { String::new() } else { format!("; not {}", of.unsupported.join(", ")) };
+        let can = of.supported.join(", ");
         findings.notes.push(format!("{}: {can}{missing}; {columns}x{rows}, {edge}^3", of.format));
     }
-    let fetch = Fetch::of(&context.candidate);
-    findings.notes.push(format!("{}; automatic sampling: {}", fetch.words(), fetch.sampling().words()));
+    let fetch = TexelAccess::for_device(&context.candidate);
+    findings.notes.push(format!("{}; automatic sampling: {}", fetch.describe(), fetch.sampling().words()));
     findings.notes.push(format!(
         "{} queues; time stamps of {} bits, {} ns a tick",
         context.queue_count(),
         context.candidate.valid_bits(),
         context.limits.timestamp_period
     ));
-    findings.notes.extend(context.candidate.without.iter().map(|what| format!("without {what}")));
+    findings.notes.extend(context.candidate.missing_optional.iter().map(|what| format!("without {what}")));
     let scenes = dut.scenes();
     let mut refused = Vec::new();
     for (name, scene) in scenes.iter() {
-        let scene = formats::suited(context, fetch, scene.clone());
+        let scene = formats::adapt_scene(context, fetch, scene.clone());
         let fits = formats::check(context, &Plan::new(&scene), &scene);
         refused.extend(fits.err().map(|error| format!("'{name}': {error}")));
     }
@@ -117,9 +118,9 @@ fn volume(dut: &mut DeviceUnderTest, format: &str, allowed: [f64; 2]) -> Result<
         let expected = stored_reference_picture(&exact, &frames);
         for sampling in ["hardware", "exact", "quads"] {
             let scene = small(mode, format, &format!("sampling = '{sampling}'"))?;
-            for fetch in [Fetch::Textures, Fetch::Storage] {
-                let what = format!("{mode} in {format}, {sampling}, {}", fetch.words());
-                let options = Options { fetch: Some(fetch), ..Options::default() };
+            for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
+                let what = format!("{mode} in {format}, {sampling}, {}", fetch.describe());
+                let options = RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
                 match render::sent(&dut.context, &scene, &frames, &options) {
                     Ok(mut renderer) => largest.add(&mut findings, &what, &expected, &renderer.picture()?, allowed),
                     // The fetch was requested explicitly, so there is no fallback.
@@ -137,28 +138,38 @@ fn volume(dut: &mut DeviceUnderTest, format: &str, allowed: [f64; 2]) -> Result<
 struct MissingFeature {
     name: &'static str,
     change: fn(&mut Context),
-    options: Options,
+    options: RendererOptions,
     sampling: Option<Sampling>,
 }
 
 fn missing_features() -> Vec<MissingFeature> {
-    let plain = Options::default;
-    let reading = |fetch| Options { fetch: Some(fetch), ..Options::default() };
+    let plain = RendererOptions::default;
+    let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
     let of = |name, change, options, sampling| MissingFeature { name, change, options, sampling };
     vec![
-        of("no filter", formats::deny_filters, reading(Fetch::Textures), Some(Sampling::Exact)),
+        of("no filter", formats::disable_linear_filter, reading(TexelAccess::Textures), Some(Sampling::Exact)),
         // The maximum allocation holds the volume, but not four times as much.
-        of("no room for quads", |c| c.candidate.max_bytes = 80 << 10, reading(Fetch::Storage), Some(Sampling::Exact)),
-        of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(Fetch::Storage), None),
-        of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(Fetch::Storage), None),
-        of("texels by texelFetch", |_| (), reading(Fetch::Textures), None),
-        of("texels by imageLoad", |_| (), reading(Fetch::Storage), None),
+        of(
+            "no room for quads",
+            |c| c.candidate.max_bytes = 80 << 10,
+            reading(TexelAccess::Storage),
+            Some(Sampling::Exact),
+        ),
+        of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(TexelAccess::Storage), None),
+        of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(TexelAccess::Storage), None),
+        of("texels by texelFetch", |_| (), reading(TexelAccess::Textures), None),
+        of("texels by imageLoad", |_| (), reading(TexelAccess::Storage), None),
         of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
-        of("one queue", |_| (), Options { queues: Some(1), ..plain() }, None),
+        of("one queue", |_| (), RendererOptions { queues: Some(1), ..plain() }, None),
         of("parameters 4096 bytes apart", |c| c.limits.min_uniform_buffer_offset_alignment = 4096, plain(), None),
         of("no time stamps", |c| c.candidate.queues.iter_mut().for_each(|q| q.valid_bits = 0), plain(), None),
-        of("no counts", |c| c.candidate.statistics = false, Options { spans: true, ..plain() }, None),
-        of("no clock in common", |c| c.candidate.calibrated = false, Options { spans: true, ..plain() }, None),
+        of("no counts", |c| c.candidate.pipeline_statistics = false, RendererOptions { spans: true, ..plain() }, None),
+        of(
+            "no clock in common",
+            |c| c.candidate.calibrated_timestamps = false,
+            RendererOptions { spans: true, ..plain() },
+            None,
+        ),
     ]
 }
 
@@ -185,7 +196,7 @@ fn fallbacks(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
             findings.expect(missing.sampling.is_none_or(|expected| expected == sampling), || {
                 format!("{what}: samples are taken {}", sampling.words())
             });
-            took = format!("samples {}, {}", sampling.words(), renderer.fetch().words());
+            took = format!("samples {}, {}", sampling.words(), renderer.texel_access().describe());
         }
         findings.notes.push(format!("{}: {took}", missing.name));
         isolated.report_validation(&mut findings);

@@ -5,11 +5,11 @@ use super::built_in::{BYTES, Noise, scene, wall, wobbler};
 use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
 use super::render;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Level, PictureComparison};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// Runs a scenario on one, two and three queues.
 fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, GpuError> {
     let (mut findings, mut totals) = (Findings::default(), [0, 0]);
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let isolated = IsolatedContext::of_queues(dut, queues)?;
         let [compared, wrong] = scenario(&mut findings, &isolated, queues, dut.level)?;
         totals = [totals[0] + compared, totals[1] + wrong];
@@ -43,8 +43,8 @@ fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, 
     }
     add_picture_counts(&mut findings, totals[0], totals[1]);
     let there = dut.context.queue_count();
-    if there < MOST {
-        findings.notes.push(format!("queues for different work: {there} of {MOST}; one does what several would"));
+    if there < MAX_QUEUES {
+        findings.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
     }
     Ok(findings)
 }
@@ -83,7 +83,8 @@ fn volume_waited_for(
     scene: &Scene,
     frames: &[Vec<u8>],
 ) -> Result<(Picture, Option<Texels>), GpuError> {
-    let mut renderer = Renderer::new(context, scene.clone(), &Options { queues: Some(1), ..Options::default() })?;
+    let mut renderer =
+        Renderer::new(context, scene.clone(), &RendererOptions { queues: Some(1), ..RendererOptions::default() })?;
     for (k, frame) in frames.iter().enumerate() {
         renderer.frame(k as u32, frame, 0)?;
         renderer.take_times()?;
@@ -105,7 +106,7 @@ pub fn alternating_images(
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
     let expected: Result<Vec<_>, _> = volumes.iter().map(|frames| waited_for(context, &scene, frames)).collect();
     let expected = expected?;
-    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene, &options)?;
     send(&mut renderer, &volumes[0], 0)?;
     let mut wrong = 0;
@@ -133,7 +134,7 @@ fn replaced(
     let context = &isolated.context;
     let (scene, mut noise) = (made(PLAIN)?, Noise(5));
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
-    let options = Options { queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene.clone(), &options)?;
     let mut there = volumes[0].clone();
     send(&mut renderer, &there, 0)?;
@@ -171,7 +172,7 @@ fn any_order(
     for toml in [PLAIN, SMOOTH] {
         let scene = made(toml)?;
         let line = scene.frame_size()[0] as usize;
-        let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+        let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
         let mut renderer = Renderer::new(context, scene.clone(), &options)?;
         context.faults.slow_down("scan_convert", 4);
         for round in 0..if level == Level::Quick { 1 } else { 12 } {
@@ -224,7 +225,7 @@ fn any_order(
             }
         }
         context.faults.slow_down("", 1);
-        findings.expect(renderer.torn() > 0, || "no frame was given up".into());
+        findings.expect(renderer.incomplete_frames() > 0, || "no frame was given up".into());
     }
     Ok(totals)
 }
@@ -249,7 +250,7 @@ fn changes(
     for scene in &scenes {
         expected.push([render::picture(context, scene, &frames[0])?, render::picture(context, scene, &frames[1])?]);
     }
-    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scenes[0].clone(), &options)?;
     let (rounds, mut wrong, mut noise) = (if level == Level::Quick { 8 } else { 80 }, 0, Noise(23));
     for round in 0..rounds {

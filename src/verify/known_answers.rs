@@ -5,8 +5,8 @@ use super::check::{Check, DeviceUnderTest, Findings};
 use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_comparison};
 use super::passes::POISON;
 use super::render;
-use crate::gpu::renderer::size_of;
-use crate::gpu::{GpuError, Options, Renderer};
+use crate::gpu::resources::shape_size;
+use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::shade::shadow;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, is_hit};
@@ -274,7 +274,7 @@ fn volume_images(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
                 ray = { sampling = 'exact' }";
     let scene = made(block(0.5, [16, 16, 3]), toml)?;
     let levels = [40u8, 90, 200];
-    let options = Options { volume_images: levels.len() as u32, ..Options::default() };
+    let options = RendererOptions { volume_images: levels.len() as u32, ..RendererOptions::default() };
     let mut renderer = Renderer::new(&dut.context, scene.clone(), &options)?;
     for (image, level) in levels.iter().enumerate() {
         render::send(&mut renderer, &frames(&scene, |_| f64::from(*level) / 255.0), image as u32)?;
@@ -465,7 +465,7 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let writes = (shadow::PASS.writes)(&scene, &args);
     for bind in &writes {
-        expected.insert(bind.name, Texels::untouched(size_of(Slot::Shadow.shape(&scene)), 1));
+        expected.insert(bind.name, Texels::untouched(shape_size(Slot::Shadow.shape(&scene)), 1));
     }
     shadow::PASS.expected(&scene, &args, &inputs, &mut expected);
     let got = dut.pass_runner()?.run(&scene, &shadow::PASS, &args, &inputs, POISON)?;

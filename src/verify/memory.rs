@@ -5,7 +5,7 @@ use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
 use super::render;
 use crate::gpu::faults::Poison;
-use crate::gpu::{Context, GpuError, Options};
+use crate::gpu::{Context, GpuError, RendererOptions};
 use crate::passes::slots::Initializer;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
@@ -39,7 +39,7 @@ fn render_on(
 }
 
 fn draw(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<RenderedSlots, GpuError> {
-    let mut renderer = render::sent(context, scene, frames, &Options::default())?;
+    let mut renderer = render::sent(context, scene, frames, &RendererOptions::default())?;
     let picture = renderer.picture()?;
     let mut slots = Vec::new();
     for slot in renderer.plan().slots.clone() {
@@ -64,7 +64,7 @@ struct SlotDifference {
 fn slot_difference(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &Scene) -> SlotDifference {
     let mut apart = SlotDifference::default();
     let format = slot.format(scene);
-    let marks = Poison::BOTH.map(|poison| poison.seen_in(format));
+    let marks = Poison::BOTH.map(|poison| poison.texel_value(format));
     let is = |value: f64, mark: f64| value == mark || (value.is_nan() && mark.is_nan());
     for (i, zero) in zeros.values.iter().enumerate() {
         let got = poisoned.map(|texels| texels.values[i]);

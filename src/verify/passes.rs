@@ -6,7 +6,7 @@ use super::check::{Check, DeviceUnderTest, Findings};
 use super::compare::{Comparison, ExtraTolerance, compare_outputs, texel_comparison};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
-use crate::gpu::renderer::size_of;
+use crate::gpu::resources::shape_size;
 use crate::passes::preprocess::packed_neighbours;
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{Arrays, Bind, DispatchArgs, MISS, PASSES, Part, Pass, Slot, Texels};
@@ -51,7 +51,7 @@ pub fn run_with_reference(
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
-        expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+        expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
     }
     pass.expected(scene, &args, &inputs, &mut expected);
     let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
@@ -188,7 +188,7 @@ pub const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
 
 fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
     let format = bind.slot.format(scene);
-    let mut size = size_of(bind.slot.shape(scene));
+    let mut size = shape_size(bind.slot.shape(scene));
     if bind.part == Part::Layer {
         size[2] = 1;
     }
@@ -255,7 +255,7 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
         }
         for bind in (step.pass.writes)(scene, &args) {
             let channels = bind.slot.format(scene).channels();
-            outputs.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+            outputs.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
         }
         (step.pass.reference)(scene, &args, &inputs, &mut outputs);
         for bind in (step.pass.writes)(scene, &args) {
@@ -292,7 +292,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     if reads.iter().any(|b| b.slot == Slot::Quads) {
         let mut quads = Arrays::default();
         let channels = Slot::Quads.format(scene).channels();
-        quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
+        quads.insert("quads", Texels::untouched(shape_size(Slot::Quads.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
         (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
         inputs.insert("quads", quads.get("quads").clone());

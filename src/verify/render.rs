@@ -1,7 +1,7 @@
 //! Renders pictures for checks, on the device and by the f64 reference.
 
 use super::built_in;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
@@ -10,7 +10,12 @@ use crate::scene::Scene;
 use std::sync::Arc;
 
 /// A renderer that holds a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields.
-pub fn sent(context: &Arc<Context>, scene: &Scene, frames: &[Texels], options: &Options) -> Result<Renderer, GpuError> {
+pub fn sent(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Texels],
+    options: &RendererOptions,
+) -> Result<Renderer, GpuError> {
     let mut renderer = Renderer::new(context, scene.clone(), options)?;
     send(&mut renderer, frames, 0)?;
     Ok(renderer)
@@ -27,12 +32,12 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<()
 
 /// Renders one picture with a new renderer.
 pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Picture, GpuError> {
-    sent(context, scene, frames, &Options::default())?.picture()
+    sent(context, scene, frames, &RendererOptions::default())?.picture()
 }
 
 /// Contents of a slot after a picture.
 pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot) -> Result<Texels, GpuError> {
-    let mut renderer = sent(context, scene, frames, &Options::default())?;
+    let mut renderer = sent(context, scene, frames, &RendererOptions::default())?;
     renderer.picture()?;
     let missing = || GpuError::Broken(format!("no pass writes '{}'", slot.name()));
     renderer.read(slot)?.ok_or_else(missing)
@@ -50,7 +55,7 @@ pub struct Drawn {
 /// Renders every mode, one after the other in one renderer, in the simplest way: one volume image, one queue, frames in order.
 pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
     let mut renderer: Option<Renderer> = None;
-    let options = Options { queues: Some(1), ..Options::default() };
+    let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
     let draw = |spec: built_in::SceneSpec| {
         let scene = spec.build().map_err(GpuError::Broken)?;
         let frames = built_in::wall(&scene, 0);

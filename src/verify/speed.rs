@@ -68,7 +68,7 @@ fn time(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuE
     // Validation slows down commands and submissions, so times are measured without it.
     let own = dut.watched().then(|| Context::new(&ContextOptions { validation: false, ..dut.options().clone() }));
     let context = own.transpose()?.unwrap_or_else(|| dut.context.clone());
-    let samples = pass_runner::time(&context, scene, pass, repeats)?;
+    let samples = pass_runner::time_pass(&context, scene, pass, repeats)?;
     let mut findings = Findings::default();
     if samples.is_empty() {
         return Ok(Findings::left_out("the device has no time stamps"));

@@ -7,7 +7,7 @@ use super::compare::{add_picture_counts, count_figure, expect_same_picture};
 use super::failures::expect_memory_returned;
 use super::render;
 use crate::files::signals;
-use crate::gpu::{Context, Fetch, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TexelAccess};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::{Plan, Rerun};
@@ -152,8 +152,9 @@ impl Stress<'_> {
             self.running.swap_remove(gone);
         }
         let (images, scene) = (1 + self.pick(3), self.pick(self.scenes.len()));
-        let fetch = [None, Some(Fetch::Textures), Some(Fetch::Storage)][self.pick(3)];
-        let options = Options { volume_images: images as u32, fetch, ..Options::default() };
+        let fetch = [None, Some(TexelAccess::Textures), Some(TexelAccess::Storage)][self.pick(3)];
+        let options =
+            RendererOptions { volume_images: images as u32, texel_access: fetch, ..RendererOptions::default() };
         let renderer = Renderer::new(self.context, self.scenes[scene].clone(), &options)?;
         let running = RunningRenderer { renderer, scene, holds: vec![None; images], compiled: BTreeSet::new() };
         self.made += 1;

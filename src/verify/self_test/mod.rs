@@ -4,11 +4,11 @@
 mod injected_faults;
 
 use super::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
-use crate::barriers::oracle::Log;
-use crate::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
+use crate::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
 use crate::passes::fault_injection::InjectedFault;
 use crate::passes::{PASSES, Texels, is_hit};
 use crate::probe::Geometry;
+use crate::queues::oracle::SubmissionLog;
 use crate::scene::Scene;
 use crate::verify::check::{Check, DeviceUnderTest, Findings, credible_messages};
 use crate::verify::render;
@@ -115,7 +115,7 @@ impl DetectionSearch {
     fn detection(&mut self, fault: &InjectedFault) -> Result<Detection, GpuError> {
         let (begun, mut dut) = (Instant::now(), self.sound.with_fault(fault.change)?);
         let looked = self.look(fault, &mut dut);
-        let struck = dut.context.faults.struck();
+        let struck = dut.context.faults.change_count();
         let (by, message) = match looked {
             Ok((by, message)) => (Some(by), message),
             Err(Some(error)) => (None, format!("the device refused it, and no check compared anything: {error}")),
@@ -239,9 +239,9 @@ fn streamed(renderer: &mut Renderer, frames: &[Texels]) -> Result<(), GpuError> 
     renderer.picture().map(|_| ())
 }
 
-fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, Log), GpuError> {
+fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, SubmissionLog), GpuError> {
     let (scene, frames) = made(toml)?;
-    let options = Options { volume_images: 2, queues: Some(queues), log: true, ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), log: true, ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene, &options)?;
     streamed(&mut renderer, &frames)?;
     let log = renderer.log().cloned().unwrap_or_default();
@@ -256,11 +256,11 @@ fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
         for queues in counts {
             let (scene, log) = logged(&context, &toml, queues)?;
             let of = |what: String| format!("{name}, {queues} queues: {what}");
-            if let Some(hazard) = log.unordered(&scene) {
+            if let Some(hazard) = log.find_hazard(&scene) {
                 missed.get_or_insert(of(format!("nothing is left out, and {hazard:?}")));
             }
             for barrier in log.barriers() {
-                let unseen = log.without_barrier(barrier).unordered(&scene).is_none();
+                let unseen = log.without_barrier(barrier).find_hazard(&scene).is_none();
                 // A semaphore wait of the submission may already imply this barrier.
                 let may_be = !log.submissions[barrier.0].waits.is_empty();
                 implied += usize::from(unseen && may_be);
@@ -268,7 +268,7 @@ fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
                     missed.get_or_insert(of(format!("barrier {barrier:?} is not missed")));
                 }
             }
-            let unseen = |wait: &(usize, usize)| log.without_wait(*wait).unordered(&scene).is_none();
+            let unseen = |wait: &(usize, usize)| log.without_wait(*wait).find_hazard(&scene).is_none();
             missed = missed.or(log.waits().into_iter().find(unseen).map(|w| of(format!("wait {w:?} is not missed"))));
             (barriers, waits, runs) = (barriers + log.barriers().len(), waits + log.waits().len(), runs + 1);
         }
@@ -302,7 +302,7 @@ fn by_layer(options: &ContextOptions) -> Result<Detection, GpuError> {
     let recorded = |dropped: Option<u32>| -> Result<(u32, Vec<String>), GpuError> {
         let context = Context::new(options)?;
         let (scene, frames) = made(&toml)?;
-        let mut renderer = Renderer::new(&context, scene, &Options::default())?;
+        let mut renderer = Renderer::new(&context, scene, &RendererOptions::default())?;
         dropped.iter().for_each(|n| renderer.drop_barrier(*n));
         render::send(&mut renderer, &frames, 0)?;
         renderer.picture()?;

@@ -1,6 +1,7 @@
 //! Takes the place of `window` in a build without the feature `view`: there is no target, so nothing of this is ever called.
 
-use super::{Candidate, GpuError};
+use crate::gpu::device_selection::Candidate;
+use crate::gpu::error::GpuError;
 use ash::{Entry, Instance};
 use std::ffi::CStr;
 
@@ -11,7 +12,7 @@ impl Target {
         match *self {}
     }
 
-    pub fn note_lack(&self, _: &Entry, _: &Instance, _: &mut Candidate) {
+    pub fn check_support(&self, _: &Entry, _: &Instance, _: &mut Candidate) {
         match *self {}
     }
 

@@ -2,14 +2,16 @@
 //! ([`crate::barriers`]); between queues only semaphores do, and a submission waits for as much as it conflicts with and no more.
 //! Pure: the same for one, two and three queues, and tested without a GPU.
 
-use crate::barriers::{Access, Barrier, Tracker};
+pub mod oracle;
+
+use crate::barriers::{Access, Barrier, BarrierTracker};
 
 /// Most queues that are of use: copies, stage 1, and everything after it.
-pub const MOST: usize = 3;
+pub const MAX_QUEUES: usize = 3;
 
 /// What is to be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Work {
+pub enum QueueRole {
     /// What follows from volumes and pictures.
     Render,
     /// Stage 1 of a frame.
@@ -18,25 +20,25 @@ pub enum Work {
     Copy,
 }
 
-impl Work {
+impl QueueRole {
     /// The queue that does it where there are so many: number 0 renders, 1 takes frames in, 2 copies them.
     pub fn queue(self, queues: usize) -> usize {
-        (self as usize).min(queues.clamp(1, MOST) - 1)
+        (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
 }
 
 /// By queue, the last submission that is known to be done: the values of their timelines.
-type Clock = [u64; MOST];
+type Clock = [u64; MAX_QUEUES];
 
 /// Everything that queues do to the same slots.
 #[derive(Clone, Debug)]
-pub struct Queues {
+pub struct QueueTracker {
     each: Vec<Queue>,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Queue {
-    tracker: Tracker,
+    tracker: BarrierTracker,
     /// A submission is being recorded.
     recording: bool,
     /// What the submission that is being recorded touches.
@@ -54,17 +56,17 @@ pub struct Wait {
     pub value: u64,
 }
 
-impl Default for Queues {
+impl Default for QueueTracker {
     /// One for everything.
-    fn default() -> Queues {
-        Queues::new(1)
+    fn default() -> QueueTracker {
+        QueueTracker::new(1)
     }
 }
 
-impl Queues {
+impl QueueTracker {
     /// `count`: 1..=3.
-    pub fn new(count: usize) -> Queues {
-        Queues { each: vec![Queue::default(); count.clamp(1, MOST)] }
+    pub fn new(count: usize) -> QueueTracker {
+        QueueTracker { each: vec![Queue::default(); count.clamp(1, MAX_QUEUES)] }
     }
 
     pub fn count(&self) -> usize {
@@ -72,7 +74,7 @@ impl Queues {
     }
 
     /// The barrier that an operation of this queue needs in front of it, if any; the operation is then taken as recorded.
-    pub fn before(&mut self, queue: usize, accesses: &[Access]) -> Option<Barrier> {
+    pub fn record(&mut self, queue: usize, accesses: &[Access]) -> Option<Barrier> {
         let alone = self.count() == 1;
         let me = &mut self.each[queue];
         for access in accesses.iter().filter(|_| !alone) {
@@ -80,7 +82,7 @@ impl Queues {
                 me.open.push(access.clone());
             }
         }
-        me.tracker.before(accesses)
+        me.tracker.record(accesses)
     }
 
     /// A submission of this queue is recorded from here on. If the one before was not submitted, the next operation waits for everything
@@ -89,7 +91,7 @@ impl Queues {
         let me = &mut self.each[queue];
         if std::mem::replace(&mut me.recording, true) {
             me.open.clear();
-            me.tracker.doubt();
+            me.tracker.invalidate();
         }
     }
 
@@ -119,7 +121,7 @@ impl Queues {
         let mut after = self.each[queue].after;
         for wait in waits {
             let there = self.each[wait.queue].done.iter().find(|(_, value, _)| *value == wait.value);
-            let clock = there.map_or([0; MOST], |(_, _, clock)| *clock);
+            let clock = there.map_or([0; MAX_QUEUES], |(_, _, clock)| *clock);
             after = std::array::from_fn(|q| after[q].max(clock[q]));
             after[wait.queue] = after[wait.queue].max(wait.value);
         }
@@ -141,7 +143,7 @@ impl Queues {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::barriers::Worker;
+    use crate::barriers::PipelineStage;
     use crate::passes::{DispatchArgs, Frequency, PASSES, Slot};
     use crate::scene::Scene;
     use proptest::prelude::*;
@@ -149,8 +151,13 @@ mod tests {
     /// What was submitted: by which queue, at which value of its timeline, what it touches, and what it waited for.
     type Submission = (usize, u64, Vec<Access>, Vec<Wait>);
 
-    fn submit(queues: &mut Queues, values: &mut [u64; MOST], queue: usize, accesses: Vec<Access>) -> Submission {
-        queues.before(queue, &accesses);
+    fn submit(
+        queues: &mut QueueTracker,
+        values: &mut [u64; MAX_QUEUES],
+        queue: usize,
+        accesses: Vec<Access>,
+    ) -> Submission {
+        queues.record(queue, &accesses);
         let waits = queues.waits(queue);
         values[queue] += 1;
         queues.submitted(queue, &waits, values[queue]);
@@ -200,7 +207,7 @@ mod tests {
     fn access() -> impl Strategy<Value = Access> {
         (0usize..4, 0u32..2, 0u32..4, 1u32..3, any::<bool>()).prop_map(|(slot, image, from, count, write)| {
             let slot = [Slot::Frames, Slot::Volume, Slot::SharpVolume, Slot::Picture][slot];
-            Access::of_slot(slot, image, from..from + count, write, Worker::Compute)
+            Access::of_slot(slot, image, from..from + count, write, PipelineStage::Compute)
         })
     }
 
@@ -210,7 +217,7 @@ mod tests {
             count in 2usize..=3,
             work in prop::collection::vec((0usize..3, prop::collection::vec(access(), 1..4)), 1..30),
         ) {
-            let (mut queues, mut values) = (Queues::new(count), [0; MOST]);
+            let (mut queues, mut values) = (QueueTracker::new(count), [0; MAX_QUEUES]);
             let work = work.into_iter();
             let all: Vec<_> = work.map(|(q, a)| submit(&mut queues, &mut values, q % count, a)).collect();
             prop_assert_eq!(hold(&all), Ok(()));
@@ -231,8 +238,8 @@ mod tests {
             passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &args)).collect()
         };
         for (count, images) in (1..=3).flat_map(|count| [(count, 1), (count, 2), (count, 3)]) {
-            let (mut queues, mut values, mut all) = (Queues::new(count), [0; MOST], Vec::new());
-            let mut do_it = |work: Work, accesses| {
+            let (mut queues, mut values, mut all) = (QueueTracker::new(count), [0; MAX_QUEUES], Vec::new());
+            let mut do_it = |work: QueueRole, accesses| {
                 let submission = submit(&mut queues, &mut values, work.queue(count), accesses);
                 // More than one queue's work is never waited for but for a reason.
                 all.push(submission);
@@ -242,19 +249,19 @@ mod tests {
                     let args =
                         DispatchArgs { layer: (n * 6 + slice) % 4, slice, image, slices: 1, ..DispatchArgs::default() };
                     let layer = args.layer..args.layer + 1;
-                    let copied = Access::of_slot(Slot::Frames, 0, layer, true, Worker::Copy);
+                    let copied = Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy);
                     // Without a queue of its own the copy goes with the frame.
                     match count {
                         3 => {
-                            do_it(Work::Copy, vec![copied]);
-                            do_it(Work::Ingest, of(Frequency::Frame, args));
+                            do_it(QueueRole::Copy, vec![copied]);
+                            do_it(QueueRole::Ingest, of(Frequency::Frame, args));
                         }
-                        _ => do_it(Work::Ingest, [vec![copied], of(Frequency::Frame, args)].concat()),
+                        _ => do_it(QueueRole::Ingest, [vec![copied], of(Frequency::Frame, args)].concat()),
                     }
                     let rolls = images == 1 && slice % 2 == 1;
                     if rolls || slice == 5 {
                         let args = DispatchArgs { image, slices: scene.slices(), ..DispatchArgs::default() };
-                        do_it(Work::Render, [of(Frequency::Volume, args), of(Frequency::Picture, args)].concat());
+                        do_it(QueueRole::Render, [of(Frequency::Volume, args), of(Frequency::Picture, args)].concat());
                     }
                 }
             }
@@ -269,8 +276,8 @@ mod tests {
     /// Prevents that a volume that is filled waits for the picture of another.
     #[test]
     fn frames_of_one_volume_image_do_not_wait_for_a_picture_of_the_other() {
-        let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
-        let on = |image, write| vec![Access::of_slot(Slot::Volume, image, 0..1, write, Worker::Compute)];
+        let (mut queues, mut values) = (QueueTracker::new(2), [0; MAX_QUEUES]);
+        let on = |image, write| vec![Access::of_slot(Slot::Volume, image, 0..1, write, PipelineStage::Compute)];
         submit(&mut queues, &mut values, 1, on(0, true));
         let picture = submit(&mut queues, &mut values, 0, on(0, false));
         assert_eq!(picture.3, [Wait { queue: 1, value: 1 }]);
@@ -281,12 +288,12 @@ mod tests {
 
     #[test]
     fn what_was_not_submitted_is_not_waited_for() {
-        let (mut queues, mut values) = (Queues::new(2), [0; MOST]);
-        let access = |slot| vec![Access::of_slot(slot, 0, 0..1, true, Worker::Compute)];
+        let (mut queues, mut values) = (QueueTracker::new(2), [0; MAX_QUEUES]);
+        let access = |slot| vec![Access::of_slot(slot, 0, 0..1, true, PipelineStage::Compute)];
         queues.begin(1);
-        assert_eq!(queues.before(1, &access(Slot::Volume)), None);
+        assert_eq!(queues.record(1, &access(Slot::Volume)), None);
         queues.begin(1);
-        assert!(queues.before(1, &access(Slot::SharpVolume)).is_some(), "what was given up may have run in part");
+        assert!(queues.record(1, &access(Slot::SharpVolume)).is_some(), "what was given up may have run in part");
         submit(&mut queues, &mut values, 1, access(Slot::SharpVolume));
         assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::Volume)).3, []);
         assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::SharpVolume)).3, [Wait { queue: 1, value: 1 }]);
@@ -294,7 +301,7 @@ mod tests {
 
     #[test]
     fn there_are_one_to_three_queues() {
-        assert_eq!([0, 1, 2, 3, 9].map(|count| Queues::new(count).count()), [1, 1, 2, 3, 3]);
-        assert_eq!(Queues::default().count(), 1);
+        assert_eq!([0, 1, 2, 3, 9].map(|count| QueueTracker::new(count).count()), [1, 1, 2, 3, 3]);
+        assert_eq!(QueueTracker::default().count(), 1);
     }
 }
