@@ -407,8 +407,8 @@ fn create_instance(
     }
 }
 
-/// `shows`: the device will present pictures with panels drawn over them.
-fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -> Result<ash::Device, GpuError> {
+/// `presents`: the device will present pictures with panels drawn over them.
+fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool) -> Result<ash::Device, GpuError> {
     let priorities = [1.0; MAX_QUEUES];
     let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
     let queues: Vec<_> = families
@@ -421,7 +421,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -
     let mut extensions = Vec::new();
     extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
-    extensions.extend(shows.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    extensions.extend(presents.then_some(ash::khr::swapchain::NAME.as_ptr()));
     let core = vk::PhysicalDeviceFeatures::default()
         .pipeline_statistics_query(candidate.pipeline_statistics)
         .shader_storage_image_extended_formats(true)
@@ -433,7 +433,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
         .synchronization2(true)
         .maintenance4(true)
-        .dynamic_rendering(shows);
+        .dynamic_rendering(presents);
     let create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

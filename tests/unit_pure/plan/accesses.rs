@@ -49,7 +49,7 @@ fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
 }
 
 #[test]
-fn a_set_of_workers_lacks_what_was_taken_out_of_it() {
+fn a_set_of_stages_lacks_what_was_removed() {
     assert!(PipelineStages::DEVICE.has(PipelineStage::Compute) && PipelineStages::DEVICE.has(PipelineStage::Copy));
     assert!(!PipelineStages::DEVICE.has(PipelineStage::Host));
     let copies = PipelineStages::DEVICE.without(PipelineStage::Compute);
