@@ -64,7 +64,7 @@ impl Drop for Device {
 
 /// Scenes by name that together need every pass.
 pub fn scenes() -> Vec<(String, Scene)> {
-    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.make().expect("scene"))).collect()
+    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.build().expect("scene"))).collect()
 }
 
 pub fn frame_format(scene: &Scene) -> Format {

@@ -96,7 +96,7 @@ fn the_chosen_settings_hold_on_a_scene_that_the_sweep_did_not_contain() {
     let swept = report(&[], &["step", "format", "termination"], ReferenceChoice::F64);
     let limit = 0.01;
     let choice = choose::cheapest_under(&swept, Measure::Rmse, limit, 0.25).expect("a choice");
-    println!("{}", choice.say(Measure::Rmse));
+    println!("{}", choice.describe(Measure::Rmse));
     let elsewhere = ["camera.azimuth=25", "camera.elevation=-15", "volume.transfer=warm"];
     let chosen: Vec<&str> = elsewhere.into_iter().chain(choice.set.iter().map(String::as_str)).collect();
     // The first point of a dial is the unchanged scene; the reference of `step` there is f64 with tiny steps.

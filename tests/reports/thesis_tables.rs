@@ -48,7 +48,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
             let (sliding, taps) = match c.filter_3d {
                 Filter3d::None => (0, 0),
                 Filter3d::Sliding(n) => (n, 0),
-                Filter3d::Kept(n) => (0, n),
+                Filter3d::Stored(n) => (0, n),
             };
             let expected = [&["scan_convert"][..], if taps > 0 { &gaussian } else { &[] }].concat();
             assert_eq!(pass_names(&plan, true), expected, "{}", row.label);
@@ -73,7 +73,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
 #[test]
 fn rays_meet_the_surface_where_the_body_has_it() {
     let _alone = alone();
-    for filter_3d in [Filter3d::None, Filter3d::Sliding(3), Filter3d::Kept(3)] {
+    for filter_3d in [Filter3d::None, Filter3d::Sliding(3), Filter3d::Stored(3)] {
         let conditions = Conditions { filter_3d, ..Conditions::usual(true) };
         let scene = scene(&conditions).expect("scene");
         let (step, rays) = (scene.step, scene.rays);

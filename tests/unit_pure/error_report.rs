@@ -191,7 +191,7 @@ proptest! {
 fn dials_are_combined_by_squares_and_factors() {
     let cheap = cheapest_under(&small(), Measure::Rmse, 0.04, 0.0).expect("the default is good enough");
     assert_eq!(cheap.set, ["volume_format=r8"]);
-    assert_eq!(cheap.turned, [("format".to_string(), "r8".to_string())]);
+    assert_eq!(cheap.changed, [("format".to_string(), "r8".to_string())]);
     assert!((cheap.error - 0.03f64.hypot(0.02)).abs() < 1e-12 && (cheap.time - 8e6).abs() < 1e-3, "{cheap:?}");
     // A margin of 15 % excludes that.
     let safe = cheapest_under(&small(), Measure::Rmse, 0.04, 0.15).expect("the default is");
