@@ -28,7 +28,7 @@ pub(super) struct InFlight {
     pub arrived: Vec<Instant>,
 }
 
-/// A volume of the cine loop on its way to the device.
+/// A volume of the cine loop that is being sent to the device.
 #[derive(Debug)]
 pub(super) struct Replay {
     pub volume: CineVolume,

@@ -6,7 +6,7 @@ use hdrhistogram::Histogram;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// Largest latency that is told apart, us: a minute. Latencies have three significant digits.
+/// Largest latency that is distinguished, us: a minute. Latencies have three significant digits.
 const MAX_LATENCY: u64 = 60_000_000;
 
 /// Statistics of a stream since it began, or since they were last taken.

@@ -394,7 +394,7 @@ impl Stream {
     pub fn replace_source(&mut self, feed: Feed) {
         (self.feed, self.end) = (feed, None);
         self.cine.discard_partial();
-        // Two volumes with one number could not be told apart in the cine loop.
+        // Two volumes with one number could not be distinguished in the cine loop.
         if let Some(newest) = self.newest.take() {
             self.volume_base = newest.checked_add(1).unwrap_or_else(|| {
                 self.cine.clear();

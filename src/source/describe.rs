@@ -50,34 +50,34 @@ pub(super) fn grid(grid: &Grid) -> Vec<(String, String)> {
 }
 
 pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
-    let mut facts: Vec<(String, String)> = Vec::new();
-    let mut say = |title: &str, value: String| facts.push((title.into(), value));
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let mut add = |title: &str, value: String| rows.push((title.into(), value));
     match probe.array {
         Array::Curved { radius } => {
-            say("array", format!("curved, radius {} mm", number(radius)));
-            say("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
+            add("array", format!("curved, radius {} mm", number(radius)));
+            add("scan lines", axis(&probe.lines, "deg", 180.0 / std::f64::consts::PI));
         }
         Array::Linear => {
-            say("array", "linear".into());
-            say("scan lines", axis(&probe.lines, "mm", 1.0));
+            add("array", "linear".into());
+            add("scan lines", axis(&probe.lines, "mm", 1.0));
         }
     }
     let last = probe.start_depth + probe.sample_pitch * (probe.samples.max(1) - 1) as f64;
     let pitch = number(probe.sample_pitch);
-    say("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
+    add("depth", format!("{} .. {} mm, {pitch} mm a sample", number(probe.start_depth), number(last)));
     match probe.motion {
         Motion::Fan { wobble_radius } => {
-            say("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
-            say("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
+            add("motion", format!("fan about an axis {} mm behind the face", number(wobble_radius)));
+            add("slices", axis(&probe.slices, "deg", 180.0 / std::f64::consts::PI));
         }
         Motion::Translated => {
-            say("motion", "translated".into());
-            say("slices", axis(&probe.slices, "mm", 1.0));
+            add("motion", "translated".into());
+            add("slices", axis(&probe.slices, "mm", 1.0));
         }
-        Motion::Still { thickness } => say("motion", format!("still, drawn {} mm thick", number(thickness))),
+        Motion::Still { thickness } => add("motion", format!("still, drawn {} mm thick", number(thickness))),
     }
-    say("speed of sound", format!("{} m/s", number(probe.sound_speed)));
-    facts
+    add("speed of sound", format!("{} m/s", number(probe.sound_speed)));
+    rows
 }
 
 fn axis(axis: &Axis, unit: &str, scale: f64) -> String {

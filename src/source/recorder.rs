@@ -467,29 +467,29 @@ impl Reader {
     /// Errors of the operating system.
     pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let summary = self.summarize()?;
-        let mut facts: Vec<(String, String)> = Vec::new();
-        let mut say = |title: &str, value: String| facts.push((title.into(), value));
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut add = |title: &str, value: String| rows.push((title.into(), value));
         let header = self.header();
-        say("format", "frames as they arrived".into());
-        say("samples", SampleType::from(header.stored).to_string());
+        add("format", "frames as they arrived".into());
+        add("samples", SampleType::from(header.stored).to_string());
         let ([first, second], each) = (header.forward.frame_size(), header.forward.slices());
         match header.forward {
-            Geometry::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
-            Geometry::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
+            Geometry::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
+            Geometry::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
         }
-        say("frames", summary.frames.to_string());
+        add("frames", summary.frames.to_string());
         let backward =
             if summary.backward > 0 { format!(", {} swept backwards", summary.backward) } else { String::new() };
-        say("volumes", format!("{} of {each} frames, {} whole{backward}", summary.volumes, summary.whole));
+        add("volumes", format!("{} of {each} frames, {} whole{backward}", summary.volumes, summary.whole));
         match &header.forward {
-            Geometry::Sweep(probe) => facts.extend(describe::probe(probe)),
-            Geometry::Cartesian(grid) => facts.extend(describe::grid(grid)),
+            Geometry::Sweep(probe) => rows.extend(describe::probe(probe)),
+            Geometry::Cartesian(grid) => rows.extend(describe::grid(grid)),
         }
-        let mut say = |title: &str, value: String| facts.push((title.into(), value));
+        let mut add = |title: &str, value: String| rows.push((title.into(), value));
         let [low, high] = self.header().range.map(number);
-        say("value range", format!("{low} .. {high}"));
+        add("value range", format!("{low} .. {high}"));
         if let Some([first, last]) = summary.times {
-            say("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
+            add("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
         }
         if let Some([first, last]) = summary.arrivals {
             let rate = match last - first {
@@ -499,12 +499,12 @@ impl Reader {
                 }
                 _ => "all at once".into(),
             };
-            say("arrival", format!("{} .. {} s, {rate}", number(first), number(last)));
+            add("arrival", format!("{} .. {} s, {rate}", number(first), number(last)));
         }
-        say("damaged", format!("{} frames", self.damaged()));
-        say("lost", format!("{} bytes at the end", self.lost()));
-        say("index", if self.rebuilt() { "missing or wrong; made anew" } else { "as it was written" }.into());
-        Ok(facts)
+        add("damaged", format!("{} frames", self.damaged()));
+        add("lost", format!("{} bytes at the end", self.lost()));
+        add("index", if self.rebuilt() { "missing or wrong; made anew" } else { "as it was written" }.into());
+        Ok(rows)
     }
 
     fn summarize(&mut self) -> Result<Summary, InputError> {

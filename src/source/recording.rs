@@ -204,33 +204,33 @@ impl Recording {
 
     /// A description of the file for users: pairs of title and value. Never a patient's name or number.
     pub fn description(&self) -> Vec<(String, String)> {
-        let mut facts: Vec<(String, String)> = Vec::new();
-        let mut say = |title: &str, value: String| facts.push((title.into(), value));
-        say("format", self.format().into());
-        say("compression", if self.layout.pixels.compressed { "zlib" } else { "none" }.into());
-        say("samples", self.sample_type().to_string());
+        let mut rows: Vec<(String, String)> = Vec::new();
+        let mut add = |title: &str, value: String| rows.push((title.into(), value));
+        add("format", self.format().into());
+        add("compression", if self.layout.pixels.compressed { "zlib" } else { "none" }.into());
+        add("samples", self.sample_type().to_string());
         let [first, second] = self.layout.frame_size;
         match self.placement {
-            Placement::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
-            Placement::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
+            Placement::Sweep(_) => add("frame", format!("{second} lines of {first} samples")),
+            Placement::Cartesian(_) => add("frame", format!("{first} x {second} pixels")),
         }
-        say("frames", self.layout.frames.to_string());
-        say("volumes", describe::volumes(&self.volumes));
-        say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
+        add("frames", self.layout.frames.to_string());
+        add("volumes", describe::volumes(&self.volumes));
+        add("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
         match &self.placement {
-            Placement::Sweep(probe) => facts.extend(describe::probe(probe)),
-            Placement::Cartesian(grid) => facts.extend(describe::grid(grid)),
+            Placement::Sweep(probe) => rows.extend(describe::probe(probe)),
+            Placement::Cartesian(grid) => rows.extend(describe::grid(grid)),
         }
         let [low, high] = self.range.map(|v| describe::number(v - self.sample_type().shift()));
         let how = if self.measured { " (measured)" } else { "" };
-        facts.push(("value range".into(), format!("{low} .. {high}{how}")));
+        rows.push(("value range".into(), format!("{low} .. {high}{how}")));
         if self.sample_type() == SampleType::F32 {
             let Replaced { not_finite, denormal } = self.replaced;
-            facts.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
+            rows.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
         }
-        facts.extend(describe::times(&self.layout.times));
-        facts.extend(self.layout.remarks.iter().cloned());
-        facts
+        rows.extend(describe::times(&self.layout.times));
+        rows.extend(self.layout.remarks.iter().cloned());
+        rows
     }
 
     fn frames_to_read(&self) -> usize {
@@ -263,7 +263,7 @@ impl Recording {
         });
         outcome.map_err(|e| self.broken(&e, bytes.len()))?;
         self.proven = true;
-        // The checksum at the end of a compressed stream tells whether all of it is intact.
+        // The checksum at the end of a compressed stream shows whether all of it is intact.
         if index + 1 == self.layout.frames {
             let more = stream.finish().map_err(|e| self.broken(&e, bytes.len()))?;
             if more > 0 {

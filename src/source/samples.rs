@@ -157,7 +157,7 @@ pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
     }
 }
 
-/// A range that is not empty. Constant data get a range of 1 above their value, or of as much as f32 can tell apart.
+/// A range that is not empty. Constant data get a range of 1 above their value, or of as much as f32 can distinguish.
 pub(super) fn not_empty([low, high]: [f64; 2]) -> [f64; 2] {
     match low < high {
         true => [low, high],

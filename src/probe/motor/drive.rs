@@ -199,10 +199,10 @@ impl Drive {
         for side in [Side::Left, Side::Right] {
             self.check_limit(side)?;
         }
-        self.set(axis::LARGEST_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
-        self.set(axis::LARGEST_SPEED, self.table.velocity(self.table.search_speed()))?;
+        self.set(axis::MAX_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
+        self.set(axis::MAX_SPEED, self.table.velocity(self.table.search_speed()))?;
         self.travel(-sweep.angle / 2.0, self.table.search_speed(), &mut |_, _| {})?;
-        self.set(axis::LARGEST_SPEED, self.table.velocity(speed))?;
+        self.set(axis::MAX_SPEED, self.table.velocity(speed))?;
         let mut last = f64::NEG_INFINITY;
         let volumes = sweep.volumes.unwrap_or(usize::MAX);
         for pass in 0..volumes {
@@ -303,7 +303,7 @@ enum RotationEnd {
 
 impl Drive {
     fn find_home(&mut self) -> Result<(), Fault> {
-        self.set(axis::LARGEST_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
+        self.set(axis::MAX_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
         match self.table.home {
             Home::ReferenceSearch => self.search_by_module(),
             Home::Switch => self.search_by_switch(),

@@ -328,9 +328,9 @@ impl Module {
     fn new(table: &MotorTable) -> Module {
         let shaft = START_ANGLE * table.steps_per_degree();
         let mut axes = BTreeMap::from([(axis::SEARCH_MODE, 1), (axis::SWITCH_SPEED, 1)]);
-        axes.insert(axis::LARGEST_SPEED, table.velocity(table.search_speed()));
+        axes.insert(axis::MAX_SPEED, table.velocity(table.search_speed()));
         axes.insert(axis::SEARCH_SPEED, table.velocity(table.search_speed()));
-        axes.insert(axis::LARGEST_ACCELERATION, table.acceleration(table.acceleration_deg_per_s2));
+        axes.insert(axis::MAX_ACCELERATION, table.acceleration(table.acceleration_deg_per_s2));
         Module {
             number: table.module.unwrap_or(1140),
             watchdog: true,
@@ -395,7 +395,7 @@ impl Module {
     }
 
     fn step(&mut self, time: f64) {
-        let acceleration = self.register(axis::LARGEST_ACCELERATION) / self.table.acceleration_scale();
+        let acceleration = self.register(axis::MAX_ACCELERATION) / self.table.acceleration_scale();
         let towards = |from: f64, to: f64, most: f64| {
             // The speed from which it can still brake, slightly less because of the finite steps.
             let fast = (1.9 * acceleration * (to - from).abs()).sqrt();
@@ -404,7 +404,7 @@ impl Module {
         let (target_speed, end) = match self.activity {
             Activity::Velocity(velocity) => (velocity, None),
             Activity::Position(target) => {
-                let most = self.register(axis::LARGEST_SPEED) / self.table.speed_scale();
+                let most = self.register(axis::MAX_SPEED) / self.table.speed_scale();
                 let end = target - self.offset;
                 (towards(self.shaft, end, most), Some(end))
             }
@@ -500,7 +500,7 @@ impl Module {
         match parameter {
             axis::TARGET => self.activity = Activity::Position(f64::from(value)),
             axis::POSITION => self.offset = f64::from(value) - self.shaft,
-            axis::LARGEST_SPEED | axis::LARGEST_ACCELERATION | axis::SEARCH_SPEED | axis::SWITCH_SPEED if value < 0 => {
+            axis::MAX_SPEED | axis::MAX_ACCELERATION | axis::SEARCH_SPEED | axis::SWITCH_SPEED if value < 0 => {
                 return Err(BAD_VALUE);
             }
             known if self.axes.contains_key(&known) => {

@@ -28,8 +28,8 @@ pub mod axis {
     pub const POSITION: u8 = 1;
     pub const TARGET_SPEED: u8 = 2;
     pub const SPEED: u8 = 3;
-    pub const LARGEST_SPEED: u8 = 4;
-    pub const LARGEST_ACCELERATION: u8 = 5;
+    pub const MAX_SPEED: u8 = 4;
+    pub const MAX_ACCELERATION: u8 = 5;
     pub const REACHED: u8 = 8;
     pub const HOME_SWITCH: u8 = 9;
     pub const RIGHT_LIMIT: u8 = 10;

@@ -12,7 +12,7 @@ fn requests_are_the_bytes_of_the_manuals() {
         (Request::move_to(1, 0, 800), [1, 4, 0, 0, 0, 0, 0x03, 0x20, 0x28], "MVP 0, 0, 800"),
         // The others by the same rule: -1000 is ff ff fc 18.
         (Request::move_by(1, 0, -1000), [1, 4, 1, 0, 0xff, 0xff, 0xfc, 0x18, 0x18], "MVP 1, 0, -1000"),
-        (Request::set_axis(1, 0, axis::LARGEST_SPEED, 1000), [1, 5, 4, 0, 0, 0, 0x03, 0xe8, 0xf5], "SAP 4, 0, 1000"),
+        (Request::set_axis(1, 0, axis::MAX_SPEED, 1000), [1, 5, 4, 0, 0, 0, 0x03, 0xe8, 0xf5], "SAP 4, 0, 1000"),
         (Request::get_axis(1, 0, axis::POSITION), [1, 6, 1, 0, 0, 0, 0, 0, 8], "GAP 1, 0"),
         (Request::get_global(1, 66), [1, 0x0a, 0x42, 0, 0, 0, 0, 0, 0x4d], "GGP 66, 0"),
         (Request::search_start(1, 0), [1, 0x0d, 0, 0, 0, 0, 0, 0, 0x0e], "RFS 0, 0"),
