@@ -1,6 +1,5 @@
 //! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
 
-use crate::passes::slots::Initializer;
 use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -61,7 +60,7 @@ impl Plan {
                 stage = Some(pass.stage);
                 let _ = writeln!(text, "stage {}: {}", pass.stage as u32 + 1, pass.stage.name());
             }
-            match (pass.needed)(scene) {
+            match pass.needed(scene) {
                 Ok(why) => {
                     let [x, y, z] =
                         pass.invocations(scene, &DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() });
@@ -83,10 +82,10 @@ impl Plan {
                     for args in
                         (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
                     {
-                        let shader = (pass.shader)(scene, &args);
+                        let shader = pass.shader(scene, &args);
                         if !told.contains(&shader) {
                             told.push(shader);
-                            let (reads, writes) = ((pass.reads)(scene, &args), (pass.writes)(scene, &args));
+                            let (reads, writes) = (pass.reads(scene, &args), pass.writes(scene, &args));
                             let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
                         }
                     }
@@ -138,19 +137,19 @@ impl Plan {
             return Rerun::Frames;
         }
         let old = &Scene { seen: new.seen, ..old.clone() };
-        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| made_differently(*s, old, new)).collect();
+        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| s.differs(old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             let same = before.steps.iter().any(|s| s.is(step) && s.same_work(step, old, new));
-            let reads = (step.pass.reads)(new, &step.args());
+            let reads = step.pass.reads(new, &step.args());
             if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
                 continue;
             }
             if step.pass.frequency == Frequency::Frame {
                 return Rerun::Frames;
             }
-            changed.extend((step.pass.writes)(new, &step.args()).iter().map(|b| b.slot));
+            changed.extend(step.pass.writes(new, &step.args()).iter().map(|b| b.slot));
             steps.push(i);
         }
         Rerun::Steps { steps, slots }
@@ -170,7 +169,7 @@ impl Plan {
                 if !stale[i] {
                     continue;
                 }
-                for bind in (step.pass.reads)(scene, &step.args()) {
+                for bind in step.pass.reads(scene, &step.args()) {
                     let writer = self.steps[..i].iter().rposition(|s| s.writes(scene).contains(&bind.slot));
                     let Some(j) = writer.filter(|j| self.steps[*j].pass.frequency != Frequency::Frame) else {
                         continue;
@@ -203,7 +202,7 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 impl Step {
     /// How many slices on either side a pass over the volume looks at.
     pub fn reach(&self, scene: &Scene) -> u32 {
-        let reads = (self.pass.reads)(scene, &self.args());
+        let reads = self.pass.reads(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
@@ -213,12 +212,12 @@ impl Step {
 
     /// Slots that it reads.
     pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.reads)(scene, &self.args()).iter().map(|b| b.slot).collect()
+        self.pass.reads(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
     /// Slots that it writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.writes)(scene, &self.args()).iter().map(|b| b.slot).collect()
+        self.pass.writes(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
     pub fn args(&self) -> DispatchArgs {
@@ -226,8 +225,8 @@ impl Step {
     }
 
     fn slots(&self, scene: &Scene) -> Vec<Slot> {
-        let reads = (self.pass.reads)(scene, &self.args());
-        let writes = (self.pass.writes)(scene, &self.args());
+        let reads = self.pass.reads(scene, &self.args());
+        let writes = self.pass.writes(scene, &self.args());
         reads.iter().chain(&writes).map(|b| b.slot).collect()
     }
 
@@ -238,36 +237,13 @@ impl Step {
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {
         let (a, b) = (self.pass, other.pass);
         let args = self.args();
-        (a.shader)(old, &args) == (b.shader)(new, &args)
+        a.shader(old, &args) == b.shader(new, &args)
             && (a.constants)(old, &args) == (b.constants)(new, &args)
             && a.numbers(old, &args) == b.numbers(new, &args)
             && a.invocations(old, &args) == b.invocations(new, &args)
-            && (a.reads)(old, &args) == (b.reads)(new, &args)
-            && (a.writes)(old, &args) == (b.writes)(new, &args)
+            && a.reads(old, &args) == b.reads(new, &args)
+            && a.writes(old, &args) == b.writes(new, &args)
     }
-}
-
-/// Whether a slot that the CPU makes from the scene has other content now.
-fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
-    let Initializer::ByScene(make) = slot.filled() else { return false };
-    match slot {
-        Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
-        // Follows from the other, which is shorter.
-        Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
-        Slot::BrickTable => {
-            return !old.geometry.equals_except_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
-        }
-        Slot::SliceTable => return old.geometry != new.geometry,
-        _ => {}
-    }
-    // The rest follow from the geometry, and their content is too long to compare. The way that the motor goes during a frame stretches
-    // the sweep's span and nothing else.
-    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
-    let stays = match slot {
-        Slot::SweepLut => old.geometry.equals_except_direction(&new.geometry),
-        _ => old.geometry.equals_except_advance(&new.geometry),
-    };
-    !stays || lattice(old) != lattice(new)
 }
 
 #[cfg(test)]

@@ -136,7 +136,7 @@ impl Stated {
         let find = |name: &&str| {
             let pass = PASSES.iter().find(|p| p.name == *name);
             let pass = pass.ok_or_else(|| format!("scene '{}': there is no pass '{name}'", self.name))?;
-            match (pass.needed)(scene) {
+            match pass.needed(scene) {
                 Ok(_) => Ok(pass),
                 Err(why) => Err(format!("scene '{}' does not need '{name}': {why}", self.name)),
             }

@@ -54,7 +54,7 @@ impl Slots {
     /// Writes a slot made from the scene, if it is a table; images of that kind go through staging.
     pub fn fill(&mut self, slot: Slot, scene: &Scene) {
         if let (Initializer::ByScene(make), Some(Resource::Buffer(buffer))) =
-            (slot.filled(), self.there.get_mut(&(slot, 0)))
+            (slot.initializer(), self.there.get_mut(&(slot, 0)))
         {
             let values = self.context.faults.table(slot, scene, make(scene));
             let bytes: &[u8] = bytemuck::cast_slice(&values);

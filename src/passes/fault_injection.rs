@@ -1,8 +1,8 @@
 //! Faults that are planted on purpose, to see whether the checks notice: what the device is told or given is changed, what the f64
 //! reference is told stays. Pure: [`crate::gpu`] asks at the few places where it tells the device something.
 
+use super::pass::{DispatchArgs, Params, Pass, Slot};
 use super::slots::Initializer;
-use super::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use crate::spirv::SpirvError;
 
@@ -102,7 +102,7 @@ impl Change {
     pub fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
         let args = |iteration| DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: 1, iteration, image: 0 };
         let turns: Vec<DispatchArgs> = (0..(pass.repeat)(scene)).map(args).collect();
-        let reads = |slot: Slot| turns.iter().any(|t| (pass.reads)(scene, t).iter().any(|b| b.slot == slot));
+        let reads = |slot: Slot| turns.iter().any(|t| pass.reads(scene, t).iter().any(|b| b.slot == slot));
         pass.is_needed(scene)
             && match self {
                 Change::Numbers { .. } => turns.iter().any(|t| self.numbers(pass, scene, &mut pass.numbers(scene, t))),
@@ -114,10 +114,10 @@ impl Change {
                 Change::LeftOut { .. } => turns.iter().any(|t| self.leaves_out(pass.name, scene, t)),
                 Change::Table { slot, .. } => {
                     let made = |make: fn(&Scene) -> Vec<f32>| self.table(*slot, scene, &mut make(scene));
-                    reads(*slot) && matches!(slot.filled(), Initializer::ByScene(make) if made(make))
+                    reads(*slot) && matches!(slot.initializer(), Initializer::ByScene(make) if made(make))
                 }
                 Change::Frame(_) => reads(Slot::Frames),
-                Change::Nearest => (pass.reads)(scene, &turns[0]).iter().any(|b| b.filtered),
+                Change::Nearest => pass.reads(scene, &turns[0]).iter().any(|b| b.filtered),
             }
     }
 }

@@ -1,7 +1,7 @@
 //! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
 
+use super::pass::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use super::slots::{Format, Shape};
-use super::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use crate::scene::Scene;
 use crate::spirv::hoist_uniforms::hoisted;
 use crate::spirv::strip_bindings::without;
@@ -17,7 +17,7 @@ const OPTIONAL: [&str; 2] = ["bricks", "quads"];
 /// # Errors
 /// A module that breaks the format.
 pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
-    let bound = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+    let bound = [pass.reads(scene, args), pass.writes(scene, args)].concat();
     let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
     without(words, &absent).map_err(|e| e.to_string())
 }
@@ -39,13 +39,14 @@ pub fn for_cpu(
         let binding = module.bindings.iter().find(|b| b.name == bind.name);
         binding.is_some_and(|b| matches!(b.kind, Kind::Sampled | Kind::Filtered))
     };
-    let textures: Vec<_> = (pass.reads)(scene, args)
+    let textures: Vec<_> = pass
+        .reads(scene, args)
         .into_iter()
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
         .collect();
     let words = hoisted(words).and_then(|words| as_storage(&words, &textures)).map_err(|e| e.to_string())?;
-    let reads = (pass.reads)(scene, args);
+    let reads = pass.reads(scene, args);
     as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
 }
 
@@ -69,7 +70,7 @@ fn image_format(format: Format) -> Option<ImageFormat> {
 
 /// The first disagreement, naming both sides.
 pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
-    let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
+    let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
     for bind in &reads {
         check_bind(scene, module, bind, Access::Read)?;
     }

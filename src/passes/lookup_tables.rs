@@ -1,7 +1,8 @@
 //! Tables that the CPU makes from the scene, in f64: what shaders look up instead of computing it for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use crate::scene::{Scene, transfer};
+use crate::scene::{Bricks, Reach, Scene, Side, transfer};
+use rayon::prelude::*;
 
 fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
@@ -162,4 +163,31 @@ pub fn tile_table(scene: &Scene) -> Vec<f32> {
 /// Outward normal and limit of each half-space of the block.
 pub fn block_table(scene: &Scene) -> Vec<f32> {
     floats(scene.block().iter().flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, f.limit]))
+}
+
+/// The part of the texture that the samples of each brick may touch, x fastest.
+pub(super) fn brick_reaches(scene: &Scene, bricks: &Bricks) -> Vec<Reach> {
+    let [width, height, _] = bricks.count.map(u64::from);
+    let cell = |n: u64| [n % width, n / width % height, n / (width * height)].map(|n| n as u32);
+    (0..bricks.total()).into_par_iter().map(|n| scene.reach(bricks, cell(n))).collect()
+}
+
+fn side_code(side: Side) -> u32 {
+    match side {
+        Side::Outside => 0,
+        Side::Across => 1,
+        Side::Inside => 2,
+    }
+}
+
+/// Each brick's tile columns, tile rows and slices (first * 4096 + last, exact in f32), and the side.
+pub fn brick_table(scene: &Scene) -> Vec<f32> {
+    let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
+    let entry = |reach: &Reach| {
+        let [columns, rows] = reach.tiles;
+        // Bricks outside depend on no slice, and are written whichever slice is new.
+        let slices = if reach.side == Side::Outside { [0, 4095] } else { reach.slices };
+        [packed(columns), packed(rows), packed(slices), side_code(reach.side) as f32]
+    };
+    brick_reaches(scene, &scene.bricks()).iter().flat_map(entry).collect()
 }

@@ -46,7 +46,7 @@ impl Slack {
     /// Of a pass whose samples the device's own filter takes: its weights have so many bits and may be cut off, along three axes, of
     /// neighbours that differ by 1. A threshold is met a step earlier or later then, and here and there by another voxel.
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> Slack {
-        match (pass.reads)(scene, args).iter().any(|bind| bind.filtered) {
+        match pass.reads(scene, args).iter().any(|bind| bind.filtered) {
             true => Slack { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers: 0.02 },
             false => Slack::default(),
         }

@@ -19,7 +19,7 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
         size[2] = 1;
     }
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
-    if let Initializer::ByScene(make) = bind.slot.filled() {
+    if let Initializer::ByScene(make) = bind.slot.initializer() {
         texels.values = make(scene).into_iter().map(f64::from).collect();
         return texels;
     }
@@ -75,16 +75,16 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
         let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
-        for bind in (step.pass.reads)(scene, &args) {
+        for bind in step.pass.reads(scene, &args) {
             let there = slots.get(&bind.slot).cloned();
             inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
         }
-        for bind in (step.pass.writes)(scene, &args) {
+        for bind in step.pass.writes(scene, &args) {
             let channels = bind.slot.format(scene).channels();
             outputs.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
         }
-        (step.pass.reference)(scene, &args, &inputs, &mut outputs);
-        for bind in (step.pass.writes)(scene, &args) {
+        step.pass.reference(scene, &args, &inputs, &mut outputs);
+        for bind in step.pass.writes(scene, &args) {
             slots.insert(bind.slot, outputs.get(bind.name).clone());
         }
         if slots.contains_key(&slot) {
@@ -104,7 +104,7 @@ pub fn turn_of(scene: &Scene, iteration: u32) -> DispatchArgs {
 pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
-    let reads = (pass.reads)(scene, args);
+    let reads = pass.reads(scene, args);
     for (n, bind) in reads.iter().enumerate() {
         // One image bound under two names has one content.
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
@@ -120,7 +120,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         let channels = Slot::Quads.format(scene).channels();
         quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
+        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut quads);
         inputs.insert("quads", quads.get("quads").clone());
     }
     inputs

@@ -46,7 +46,7 @@ pub fn beside(
 ) -> Result<Beside, GpuError> {
     let turn = turn_of(scene, iteration);
     let inputs = inputs_of(scene, pass, &turn, kind, seed);
-    let writes = (pass.writes)(scene, &turn);
+    let writes = pass.writes(scene, &turn);
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
@@ -73,8 +73,8 @@ type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 /// What makes a pipeline: its shader, its constants, and the formats of what it reads and writes.
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let turn = turn_of(scene, 0);
-    let bound = (pass.reads)(scene, &turn).into_iter().chain((pass.writes)(scene, &turn));
-    ((pass.shader)(scene, &turn), (pass.constants)(scene, &turn), bound.map(|b| b.slot.format(scene)).collect())
+    let bound = pass.reads(scene, &turn).into_iter().chain(pass.writes(scene, &turn));
+    (pass.shader(scene, &turn), (pass.constants)(scene, &turn), bound.map(|b| b.slot.format(scene)).collect())
 }
 
 fn check(bench: &mut Bench, n: usize, pass: &'static Pass) -> Result<Found, GpuError> {

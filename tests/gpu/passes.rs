@@ -47,9 +47,9 @@ fn texels_loaded_are_the_texels_fetched() {
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             let reads: Vec<_> =
-                (pass.reads)(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
+                pass.reads(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
             // Once with each shader and the formats of what it reads: that is what is rewritten.
-            if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
+            if !seen.insert((pass.shader(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
             let args = turn_of(&scene, 0);
@@ -141,7 +141,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
             let channels = bind.slot.format(told).channels();
             expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
         }
-        (pass.reference)(wrong, &args, &right.inputs, &mut expected);
+        pass.reference(wrong, &args, &right.inputs, &mut expected);
         let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
@@ -155,7 +155,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     inputs.insert("source", source);
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(size_of(right.writes[0].slot.shape(&base)), 1));
-    (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
+    pass.reference(&base, &DispatchArgs::default(), &inputs, &mut expected);
     let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
 }

@@ -3,8 +3,7 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
-use echolume::passes::chain::rectangle;
-use echolume::passes::{DispatchArgs, Slot, Texels};
+use echolume::passes::{DispatchArgs, Slot, Texels, by_name};
 use echolume::plan::Rerun;
 use echolume::probe::{Advance, Geometry, Probe};
 use echolume::scene::{Mode, RING, Scene, VisibleBounds};
@@ -278,7 +277,8 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
         .expect("recorded");
     assert_eq!(renderer.skipped(), 9 - frames.len() as u64);
     for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
-        let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
+        let made =
+            by_name(name).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
         // Some passes make four texels an invocation.
         let run = |axis: usize| {
@@ -293,7 +293,8 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
     for (slot, pass, slices) in
         [(Slot::SharpVolume, "gaussian_lateral", frames), (Slot::Volume, "gaussian_elevation", scene.seen.slices())]
     {
-        let made = rectangle(&scene, pass, &DispatchArgs::default()).expect("a pass over slices");
+        let made =
+            by_name(pass).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let volume = renderer.read(slot).expect("read").expect("there");
         let [width, height, depth] = volume.size;
         let mut written = 0;

@@ -103,8 +103,8 @@ impl Pipelines {
     }
 
     fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
-        let formats = (pass.reads)(scene, args).iter().map(|b| b.slot.format(scene)).collect();
-        ((pass.shader)(scene, args), (pass.constants)(scene, args), formats)
+        let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
+        (pass.shader(scene, args), (pass.constants)(scene, args), formats)
     }
 
     fn there(&self, key: &Key) -> Option<Arc<Pipeline>> {

@@ -18,7 +18,7 @@ enum Listed {
 impl Recorder {
     pub(super) fn bind(&mut self, work: &Work, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Work { slots, pipeline, scene, pass, args } = *work;
-        let binds = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+        let binds = [pass.reads(scene, args), pass.writes(scene, args)].concat();
         let mut images = Vec::with_capacity(binds.len());
         let mut buffers = Vec::with_capacity(binds.len());
         let mut texels = Vec::with_capacity(binds.len());

@@ -1,13 +1,15 @@
 //! The smallest and the largest value that samples within each brick may have, from the tiles that they may look at. Only
 //! bricks that look at a slice made anew are made anew.
 
-use crate::passes::*;
+use crate::passes::lookup_tables::brick_reaches;
+use crate::passes::pass::*;
 use crate::scene::Side;
 
 pub const PASS: Pass = Pass {
     name: "brick_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
+    link: Link::None,
     shader: |_, _| "skip/brick_ranges.plain",
     needed: super::asked,
     reads: |s, _| {
@@ -29,7 +31,7 @@ pub const PASS: Pass = Pass {
         let tiles = reads.get("tile_ranges");
         let target = writes.get_mut("brick_ranges");
         let bricks = scene.bricks();
-        for (n, reach) in super::reaches(scene, &bricks).into_iter().enumerate() {
+        for (n, reach) in brick_reaches(scene, &bricks).into_iter().enumerate() {
             let [first, last] = reach.slices;
             let outside = reach.side == Side::Outside;
             if !outside && (last < args.slice || first >= args.slice + args.slices) {

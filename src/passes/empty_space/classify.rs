@@ -1,8 +1,9 @@
 //! What each brick is to a mode: a change of transfer function, threshold or window classifies bricks anew, and touches no
 //! voxel.
 
-use super::{FARTHEST, KNOWN, NOTHING, WANTED, reaches};
-use crate::passes::*;
+use super::{FARTHEST, KNOWN, NOTHING, WANTED};
+use crate::passes::lookup_tables::brick_reaches;
+use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Side, View, transfer};
 
 /// For the surface detector.
@@ -10,13 +11,14 @@ pub const SURFACE: Pass = Pass {
     name: "classify_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |_, _| "skip/classify.plain",
     needed: |s| match (s.detects_surface(), super::asked(s)) {
         (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
         (true, not) => not,
         (false, _) => Err("no surface in this mode"),
     },
-    reads: |_, _| vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)],
+    reads: |_, _| ranges(),
     writes: |_, _| vec![whole("kinds", Slot::BrickKinds)],
     extent: |s, _| s.bricks().count,
     repeat: once,
@@ -49,7 +51,7 @@ pub const VOLUME: Pass = Pass {
         _ => Err("nothing is composited or averaged in this mode"),
     },
     reads: |s, _| {
-        let mut reads = (SURFACE.reads)(s, &DispatchArgs::default());
+        let mut reads = ranges();
         reads.extend(s.composites().then_some(whole("opaque_before", Slot::OpaqueBefore)));
         reads
     },
@@ -86,6 +88,11 @@ pub const VOLUME: Pass = Pass {
     ..SURFACE
 };
 
+/// What every kind follows from.
+fn ranges() -> Vec<Bind> {
+    vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
+}
+
 /// What no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that below the lower threshold
 /// the detector says nothing.
 pub fn quiet(scene: &Scene) -> f64 {
@@ -115,7 +122,7 @@ fn reference(scene: &Scene, view: View, reads: &Arrays, writes: &mut Arrays, kin
     let target = writes.get_mut("kinds");
     let [low, high] = view.window;
     let windowed = |v: f64| ((v - low) / (high - low)).clamp(0.0, 1.0);
-    for (n, reach) in reaches(scene, &scene.bricks()).into_iter().enumerate() {
+    for (n, reach) in brick_reaches(scene, &scene.bricks()).into_iter().enumerate() {
         let range = [ranges.values[2 * n] / beyond(scene), ranges.values[2 * n + 1] * beyond(scene)];
         let kind = kind(reach.side, range.map(windowed));
         target.values[n] = f64::from(kind * 64 + FARTHEST) / 255.0;

@@ -2,7 +2,7 @@
 //! dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
 
 use super::{NOTHING, WANTED};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::probe::Geometry;
 use crate::scene::Scene;
 
@@ -10,8 +10,9 @@ pub const SURFACE: Pass = Pass {
     name: "leap_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |_, _| "skip/leap.plain",
-    needed: |s| (super::classify::SURFACE.needed)(s),
+    needed: super::classify::SURFACE.needed,
     reads: |_, t| vec![whole("source", link(Slot::SurfaceLeaps, t).0)],
     writes: |_, t| vec![whole("target", link(Slot::SurfaceLeaps, t).1)],
     extent: |s, _| s.bricks().count,
@@ -24,7 +25,7 @@ pub const SURFACE: Pass = Pass {
 
 pub const VOLUME: Pass = Pass {
     name: "leap_volume",
-    needed: |s| (super::classify::VOLUME.needed)(s),
+    needed: super::classify::VOLUME.needed,
     reads: |_, t| vec![whole("source", link(Slot::VolumeLeaps, t).0)],
     writes: |_, t| vec![whole("target", link(Slot::VolumeLeaps, t).1)],
     constants: |_, t| constants(NOTHING, t),

@@ -6,9 +6,8 @@ pub mod classify;
 pub mod distance;
 pub mod tile_ranges;
 
-use crate::passes::{Need, Slot};
-use crate::scene::{Bricks, Mode, Reach, Scene, Side};
-use rayon::prelude::*;
+use crate::passes::pass::{Need, Slot};
+use crate::scene::{Mode, Scene};
 
 /// Kinds of bricks, as classify.comp has them.
 const WANTED: u32 = 0;
@@ -66,31 +65,4 @@ fn asked(scene: &Scene) -> Need {
         true => Ok("rays leap over bricks that cannot change the picture"),
         false => Err("no ray leaps: none is cast, or every sample is asked for"),
     }
-}
-
-/// What each brick looks at, x fastest.
-fn reaches(scene: &Scene, bricks: &Bricks) -> Vec<Reach> {
-    let [width, height, _] = bricks.count.map(u64::from);
-    let cell = |n: u64| [n % width, n / width % height, n / (width * height)].map(|n| n as u32);
-    (0..bricks.total()).into_par_iter().map(|n| scene.reach(bricks, cell(n))).collect()
-}
-
-fn side_code(side: Side) -> u32 {
-    match side {
-        Side::Outside => 0,
-        Side::Across => 1,
-        Side::Inside => 2,
-    }
-}
-
-/// The table of bricks: tile columns, tile rows and slices (first * 4096 + last, exact in f32), and the side.
-pub fn table(scene: &Scene) -> Vec<f32> {
-    let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
-    let entry = |reach: &Reach| {
-        let [columns, rows] = reach.tiles;
-        // Bricks outside look at nothing, and are written whatever slice is new.
-        let slices = if reach.side == Side::Outside { [0, 4095] } else { reach.slices };
-        [packed(columns), packed(rows), packed(slices), side_code(reach.side) as f32]
-    };
-    reaches(scene, &scene.bricks()).iter().flat_map(entry).collect()
 }

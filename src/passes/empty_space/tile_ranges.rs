@@ -1,13 +1,14 @@
 //! The smallest and the largest value of every tile of a slice: made anew for the slices that a new frame is near, never for
 //! the whole volume while frames arrive one by one.
 
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::TILE;
 
 pub const PASS: Pass = Pass {
     name: "tile_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
+    link: Link::None,
     shader: |_, _| "skip/tile_ranges.plain",
     needed: super::asked,
     // A slice changes with the frames that are smoothed into it.

@@ -3,8 +3,7 @@
 
 use super::estimator::{self, LEAST, LEAST_DISTANCE};
 use super::sigma::{few, range};
-use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::{EnhancedSigma, Noise, Scene};
 
 const WHY: &str = "a mean of at most 63^2 values in f32; a pixel at exactly 2 sigma may count or not, and with it a whole ring; \
@@ -14,13 +13,14 @@ pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| match writes_volume(s, "enhanced_sigma_slice", t) {
+    link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.settings.slices.enhanced_sigma); 2]))),
+    shader: |_, t| match t.writes_volume() {
         true => "filter/enhanced_sigma.slice",
         false => "filter/enhanced_sigma.plane",
     },
     needed: |s| asked(s.settings.slices.enhanced_sigma),
-    reads: |s, t| vec![whole("source", slice_link(s, "enhanced_sigma_slice", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "enhanced_sigma_slice", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
@@ -36,13 +36,14 @@ pub const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
         true => asked(s.distance.enhanced_sigma),
         false => Err("no distance map in this mode"),
     },
-    reads: |s, t| vec![whole("source", distance_link(s, "enhanced_sigma_distance", t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, "enhanced_sigma_distance", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: ray_extent,
     repeat: once,
     params: |s, t| params(s.distance.enhanced_sigma, LEAST_DISTANCE, t),
@@ -59,10 +60,11 @@ pub const PICTURE: Pass = Pass {
     name: "enhanced_sigma_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/enhanced_sigma.picture",
     needed: |s| asked(s.settings.post.enhanced_sigma),
-    reads: |s, t| vec![whole("source", picture_link(s, "enhanced_sigma_picture", t).0)],
-    writes: |s, t| vec![whole("target", picture_link(s, "enhanced_sigma_picture", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: picture_extent,
     repeat: once,
     params: |s, t| params(s.settings.post.enhanced_sigma, LEAST, t),
@@ -81,6 +83,11 @@ pub(super) fn asked(enhanced: Option<EnhancedSigma>) -> Need {
         Some(_) => Err("a sigma of 0 changes nothing"),
         None => Err("not asked for"),
     }
+}
+
+/// How far the largest window, or the estimate of its centre, looks, texels.
+fn reach(scene: &Scene, enhanced: Option<EnhancedSigma>) -> u32 {
+    enhanced.map_or(0, |e| (e.largest / 2).max(estimator::reach(scene.centre(e))))
 }
 
 pub(super) fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> Params {

@@ -1,20 +1,18 @@
 //! Local estimators of a pixel from those around it, which thesis 5.4 compares: as a filter of slices of their own, and as the
 //! centre of the enhanced sigma filter. Beyond the border the nearest pixel stands in; of distances, misses count nowhere.
 
-use crate::passes::chain::{slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Estimator;
 
-const NAME: &str = "estimator_slice";
-
 pub const SLICE: Pass = Pass {
-    name: NAME,
+    name: "estimator_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| if writes_volume(s, NAME, t) { "filter/estimator.slice" } else { "filter/estimator.plane" },
+    link: Link::Filter(Filter::of_slices(|s| Some([s.settings.slices.estimator.map_or(0, reach); 2]))),
+    shader: |_, t| if t.writes_volume() { "filter/estimator.slice" } else { "filter/estimator.plane" },
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
-    reads: |s, t| vec![whole("source", slice_link(s, NAME, t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(Params::default(), s.settings.slices.estimator_edge, LEAST).i32("slice", t.slice),
@@ -53,6 +51,11 @@ pub(super) fn constant(estimator: Estimator) -> i32 {
         Estimator::GradientInverse => 2,
         Estimator::NagaoMatsuyama => 3,
     }
+}
+
+/// How far it looks, texels.
+pub(super) fn reach(estimator: Estimator) -> u32 {
+    if estimator == Estimator::NagaoMatsuyama { 2 } else { 1 }
 }
 
 pub(super) fn params(params: Params, edge: f64, least: f64) -> Params {

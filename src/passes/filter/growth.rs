@@ -2,8 +2,7 @@
 
 use super::enhanced_sigma::{Enhanced, constants, params};
 use super::estimator::LEAST;
-use crate::passes::chain::slice_link;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Scene;
 
 /// What the enhanced sigma filter of slices reads is read again.
@@ -11,13 +10,14 @@ pub const SLICE: Pass = Pass {
     name: "growth_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
+    link: Link::Observer(Chain::Slices),
     shader: |_, _| "filter/enhanced_sigma.growth",
     needed: |s| match s.settings.slices.enhanced_sigma {
         Some(e) if e.growth && e.sigma > 0.0 => Ok("the windows' growth is asked for"),
         Some(e) if e.growth => Err("a sigma of 0 grows no window"),
         _ => Err("not asked for"),
     },
-    reads: |s, t| vec![whole("source", slice_link(s, "enhanced_sigma_slice", t).0)],
+    reads: reads_source,
     writes: |_, _| vec![whole("target", Slot::Growth)],
     extent: slice_extent,
     repeat: once,

@@ -1,18 +1,19 @@
 //! From what was rendered to the picture: the mean of several rays a pixel, or what lies between the
 //! rays where one makes four pixels, and its place beside the planes of a 4-up picture.
 
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Layout;
 
 pub const PASS: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| match s.settings.layout {
         Layout::Single => "postprocess/assemble.alone",
         Layout::Four => "postprocess/assemble.four",
     },
-    needed: |s| match (chain::rendered(s), s.settings.layout) {
+    needed: |s| match (rendered(s), s.settings.layout) {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
         (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),

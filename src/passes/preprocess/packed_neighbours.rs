@@ -1,13 +1,14 @@
 //! Every texel of a slice beside its neighbours one column and one row on. A sample between eight texels is then two loads, one of
 //! each slice. Needs four times the volume's memory, and one more pass over every slice that is new.
 
-use crate::passes::*;
-use crate::scene::VolumeFormat;
+use crate::passes::pass::*;
+use crate::scene::{Scene, VolumeFormat};
 
 pub const PASS: Pass = Pass {
     name: "quads",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
+    link: Link::AfterSlices,
     shader: |_, _| "preprocess/quads.plain",
     needed: |s| match s.packs() {
         true => Ok("rays load the four neighbours of a slice at once"),

@@ -1,7 +1,7 @@
 //! The volume as a solid block: the sample where each ray enters it, the sector's own border being a face too.
 
 use super::ray;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::probe::{Array, Motion, Probe};
 use crate::scene::cube::HalfSpace;
 use crate::scene::{Mode, Scene};
@@ -16,6 +16,7 @@ pub const PASS: Pass = Pass {
     name: "raycast_cube",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/cube"),
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),
@@ -26,7 +27,7 @@ pub const PASS: Pass = Pass {
         reads.push(whole("block", Slot::Block));
         reads
     },
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| {

@@ -2,8 +2,8 @@
 
 use crate::passes::empty_space::Leaps;
 use crate::passes::lookup_tables::{is_uneven, line_parameter, sweep_span};
+use crate::passes::pass::*;
 use crate::passes::preprocess::packed_neighbours;
-use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
 use glam::DVec3;

@@ -2,13 +2,15 @@
 
 use super::detector::{detect, polarity};
 use super::ray;
-use crate::passes::*;
+use crate::passes::empty_space;
+use crate::passes::pass::*;
 use crate::scene::{Detector, Place, RING, Scene};
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/surface"),
     needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
     reads: |s, _| ray::marching_reads(s, empty_space::surface_leaps(s)),

@@ -2,7 +2,8 @@
 
 use super::composite::{March, Medium, Place};
 use super::ray;
-use crate::passes::*;
+use crate::passes::empty_space;
+use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
 use glam::DVec3;
 
@@ -10,6 +11,7 @@ pub const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| match kind(s) {
         Kind::Alone => ray::variant!(s, "raycast/volume", ""),
         Kind::Veil => ray::variant!(s, "raycast/volume", "veil_"),
@@ -26,7 +28,7 @@ pub const PASS: Pass = Pass {
         reads
     },
     writes: |s, _| match kind(s) {
-        Kind::Alone => vec![whole("picture", chain::rendered(s))],
+        Kind::Alone => vec![whole("picture", rendered(s))],
         Kind::Veil => vec![whole("picture", Slot::Veil)],
         Kind::Hit => vec![whole("picture", Slot::Veil), whole("distance_map", Slot::Distance)],
     },

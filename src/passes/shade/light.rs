@@ -1,8 +1,7 @@
 //! Blinn-Phong (thesis 4-4..4-7) under a far or near light, with shadow, occlusion and the look of skin where asked for.
 
-use super::{camera_params, light_at, normal, to_light};
-use crate::passes::chain::distance_end;
-use crate::passes::*;
+use super::{camera_params, light_at, normal, occlusion, shadow, to_light};
+use crate::passes::pass::*;
 use crate::scene::{Mode, Scene, Skin};
 use glam::DVec3;
 
@@ -10,8 +9,9 @@ pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
     shader: |s, _| {
-        let arrives = (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s));
+        let arrives = (shadow::is_cast(s), occlusion::is_asked(s));
         match (lit_thing(s), arrives) {
             (Lit::Surface, (false, false)) => "shade/light.plain",
             (Lit::Surface, (true, false)) => "shade/light.shadowed",
@@ -32,15 +32,15 @@ pub const PASS: Pass = Pass {
         (true, true) => Ok("the volume is lit where rays hit it first"),
         (false, _) => Err("no surface in this mode"),
     },
-    reads: |s, _| {
-        let mut reads = vec![whole("distance_map", distance_end(s))];
+    reads: |s, t| {
+        let mut reads = vec![whole("distance_map", t.source())];
         reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
         reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("veil", Slot::Veil)));
-        reads.extend(super::shadow::PASS.is_needed(s).then_some(whole("shadow", Slot::Shadow)));
-        reads.extend(super::occlusion::PASS.is_needed(s).then_some(whole("occlusion", Slot::Occlusion)));
+        reads.extend(shadow::is_cast(s).then_some(whole("shadow", Slot::Shadow)));
+        reads.extend(occlusion::is_asked(s).then_some(whole("occlusion", Slot::Occlusion)));
         reads
     },
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
@@ -151,11 +151,11 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
         }
     };
 
-    let arrives = light.shadow.map_or(1.0, |s| match super::shadow::PASS.is_needed(scene) {
+    let arrives = light.shadow.map_or(1.0, |s| match shadow::is_cast(scene) {
         true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
         false => 1.0,
     });
-    let open = if super::occlusion::PASS.is_needed(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
+    let open = if occlusion::is_asked(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
     let (diffused, glow) = match scene.skin() {
         None => (DVec3::splat(facing * arrives), DVec3::ZERO),
         Some(_) => {

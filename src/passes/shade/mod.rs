@@ -4,7 +4,7 @@ pub mod light;
 pub mod occlusion;
 pub mod shadow;
 
-use crate::passes::{Params, Texels, is_hit, ray_params};
+use crate::passes::pass::{Params, Texels, is_hit, ray_params};
 use crate::scene::Scene;
 use glam::DVec3;
 

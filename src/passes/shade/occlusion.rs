@@ -2,8 +2,7 @@
 //! and Sainz 2008.)
 
 use super::{camera_params, normal, place};
-use crate::passes::chain::distance_end;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Scene;
 
 /// Places looked at around a pixel.
@@ -17,6 +16,7 @@ pub const PASS: Pass = Pass {
     name: "occlusion",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/occlusion",
     needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
         (false, _) => Err("no surface in this mode"),
@@ -24,7 +24,7 @@ pub const PASS: Pass = Pass {
         (true, Some(occlusion)) if occlusion.strength == 0.0 => Err("a strength of 0 takes nothing"),
         _ => Ok("asked for"),
     },
-    reads: |s, _| vec![whole("distance_map", distance_end(s))],
+    reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
     extent: ray_extent,
     repeat: once,
@@ -50,6 +50,11 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// True if ambient occlusion darkens this scene.
+pub(super) fn is_asked(scene: &Scene) -> bool {
+    (PASS.needed)(scene).is_ok()
+}
 
 fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
     let settings = scene.settings.light.occlusion.unwrap_or_default();

@@ -21,10 +21,10 @@ pub(super) fn of_a_hill(bench: &mut Bench) -> Result<Found, GpuError> {
     let distances =
         Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| f64::from((60.0 - 12.0 * (-hill(x, y)).exp()) as f32));
     let (args, mut inputs, mut expected) = (DispatchArgs::default(), Arrays::default(), Arrays::default());
-    for bind in (shadow::PASS.reads)(&scene, &args) {
+    for bind in shadow::PASS.reads(&scene, &args) {
         inputs.insert(bind.name, distances.clone());
     }
-    let writes = (shadow::PASS.writes)(&scene, &args);
+    let writes = shadow::PASS.writes(&scene, &args);
     for bind in &writes {
         expected.insert(bind.name, Texels::untouched(size_of(Slot::Shadow.shape(&scene)), 1));
     }
