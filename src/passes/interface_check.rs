@@ -9,8 +9,9 @@ use crate::spirv::tables::as_texels;
 use crate::spirv::texture_to_storage::{ImageFormat, as_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// Textures that a shader has and a pass need not: what rays leap by, and quads. Specialization constants say whether they are read.
-const OPTIONAL: [&str; 2] = ["bricks", "quads"];
+/// Textures that a shader declares and a pass may not bind: bricks and packed neighbours. Specialization constants say whether
+/// they are read.
+const OPTIONAL: [&str; 2] = ["bricks", "packed_neighbours"];
 
 /// A pass's shader without the textures that this scene has not.
 ///

@@ -123,7 +123,7 @@ pub fn slice_table(scene: &Scene) -> Vec<f32> {
 }
 
 /// Whether slices lie unevenly or were taken in mixed directions, so that a slice is found by bracketing.
-pub fn is_uneven(geometry: &Geometry) -> bool {
+pub fn is_non_uniform(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),
         Geometry::Cartesian(_) => false,

@@ -133,8 +133,8 @@ slots! {
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// The 3D texture that rays are cast through.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
-    /// Each texel of it with its neighbours one column and one row on, as their bits.
-    Quads = D::image("quads", volume, four_texels).multibuffered();
+    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
     /// Smallest and largest value of every tile of every slice.
     TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered();
     /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
@@ -146,14 +146,14 @@ slots! {
     );
     /// Smallest and largest value that samples within each brick may have.
     BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered();
-    /// What each brick is to a mode.
+    /// The kind of each brick to a mode: active, empty or homogeneous.
     BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8);
     /// The same with the distance to the nearest brick of another kind along x, and within x and y.
-    LeapsX = D::image("leaps_x", per_brick, |_| Format::R8);
-    LeapsXy = D::image("leaps_xy", per_brick, |_| Format::R8);
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8);
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8);
     /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
-    SurfaceLeaps = D::image("surface_leaps", per_brick, |_| Format::R8);
-    VolumeLeaps = D::image("volume_leaps", per_brick, |_| Format::R8);
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8);
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8);
     /// Entries of the transfer function that are not transparent, before each.
     OpaqueBefore = D::table(
         "opaque_before",
@@ -215,8 +215,8 @@ slots! {
     Shadow = D::image("shadow", per_ray, |_| Format::R16f);
     /// Ambient light that arrives, 0..1.
     Occlusion = D::image("occlusion", per_ray, |_| Format::R16f);
-    /// The composited volume, where stage 3 lights it or lays it over a surface.
-    Veil = D::image("veil", per_ray, |_| Format::Rgba16f);
+    /// The composited volume, where stage 3 lights it or shows it in front of a surface.
+    VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
     /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
     /// The planes of a 4-up picture; black where the rendering goes.

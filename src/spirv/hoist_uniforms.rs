@@ -139,13 +139,13 @@ mod tests {
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }
-        let (early, late) = loads(&words(embedded("raycast/projection.even").unwrap()));
+        let (early, late) = loads(&words(embedded("raycast/projection.uniform").unwrap()));
         assert!(early + late > 40, "rays have that many numbers");
     }
 
     #[test]
     fn a_broken_module_is_an_error() {
-        let whole = words(embedded("raycast/volume.uneven").unwrap());
+        let whole = words(embedded("raycast/volume.non_uniform").unwrap());
         for cut in 1..whole.len() {
             let _ = hoisted(&whole[..cut]);
         }

@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_broken_module_is_an_error_wherever_it_breaks() {
-        let whole = words(embedded("raycast/surface.moved").unwrap());
+        let whole = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         assert!(reflect(&[]).is_err());
         for cut in 1..whole.len() {
             let _ = reflect(&whole[..cut]);

@@ -78,10 +78,11 @@ mod tests {
 
     #[test]
     fn the_binding_goes_and_nothing_else_changes() {
-        let before = words(embedded("raycast/surface.moved").unwrap());
-        let after = without(&before, &["bricks", "quads", "nothing"]).unwrap();
+        let before = words(embedded("raycast/surface.intra_frame_motion").unwrap());
+        let after = without(&before, &["bricks", "packed_neighbours", "nothing"]).unwrap();
         let (old, new) = (reflect(&before).unwrap(), reflect(&after).unwrap());
-        let kept: Vec<_> = old.bindings.iter().filter(|b| !["bricks", "quads"].contains(&b.name.as_str())).collect();
+        let kept: Vec<_> =
+            old.bindings.iter().filter(|b| !["bricks", "packed_neighbours"].contains(&b.name.as_str())).collect();
         assert_eq!(old.bindings.len(), kept.len() + 2);
         assert_eq!(new.bindings.iter().collect::<Vec<_>>(), kept);
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
@@ -90,15 +91,15 @@ mod tests {
 
     #[test]
     fn what_is_sampled_cannot_go_and_a_broken_module_is_an_error() {
-        let whole = words(embedded("raycast/surface.moved").unwrap());
+        let whole = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         assert!(without(&whole, &["volume"]).is_err(), "its filtered samples are taken");
         for cut in 1..whole.len() {
-            let _ = without(&whole[..cut], &["bricks", "quads"]);
+            let _ = without(&whole[..cut], &["bricks", "packed_neighbours"]);
         }
         for at in 3..whole.len() {
             let mut bent = whole.clone();
             bent[at] ^= 0x0003_0001;
-            let _ = without(&bent, &["bricks", "quads"]);
+            let _ = without(&bent, &["bricks", "packed_neighbours"]);
         }
     }
 }

@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn tables_become_texels_and_nothing_else_changes() {
-        let before = words(embedded("raycast/volume.uneven_moved").unwrap());
+        let before = words(embedded("raycast/volume.non_uniform_intra_frame_motion").unwrap());
         let mut names = tables(&before).unwrap();
         names.sort();
         assert_eq!(names, ["line_lut", "slice_table", "sweep_lut", "transfer"]);
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_broken_module_is_an_error() {
-        let whole = words(embedded("raycast/volume.uneven").unwrap());
+        let whole = words(embedded("raycast/volume.non_uniform").unwrap());
         for cut in 1..whole.len() {
             let _ = as_texels(&whole[..cut], |_| true);
         }

@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_sampled_volume_becomes_a_storage_image() {
-        let before = words(embedded("raycast/surface.moved").unwrap());
+        let before = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         let after = as_storage(&before, &[("volume", ImageFormat::R8)]).unwrap();
         let volume = reflect(&after).unwrap().bindings.into_iter().find(|b| b.name == "volume").unwrap();
         assert_eq!((volume.kind, volume.access, volume.dimension), (Kind::Storage, Access::Read, Dimension::Three));
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn what_is_no_texture_is_refused_and_a_broken_module_is_an_error() {
-        let whole = words(embedded("raycast/surface.moved").unwrap());
+        let whole = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         for name in ["distance_map", "sweep_lut", "Params", "nothing"] {
             assert!(as_storage(&whole, &[(name, ImageFormat::R8)]).is_err(), "{name}");
         }

@@ -69,9 +69,11 @@ fn blurred(noise: &Texels) -> Texels {
 }
 
 /// What the passes between a volume and its rays make of it, by their references.
-fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
+fn brick_distances_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
-    let made = |name: &str| ["tile_ranges", "brick_ranges", "classify", "leap"].iter().any(|p| name.starts_with(p));
+    let made = |name: &str| {
+        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance"].iter().any(|p| name.starts_with(p))
+    };
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
         let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
@@ -91,7 +93,7 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
             break;
         }
     }
-    // A plan whose pass reads leaps has what makes them.
+    // A plan whose pass reads brick distances has the passes that make them.
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
@@ -111,17 +113,17 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
     }
     if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
-        // What rays leap by says what the volume says.
-        let leaps = leaps_of(scene, bricks.slot, inputs.get("volume"));
-        inputs.insert("bricks", leaps);
+        // What rays skip follows from the volume.
+        let distances = brick_distances_of(scene, bricks.slot, inputs.get("volume"));
+        inputs.insert("bricks", distances);
     }
-    if reads.iter().any(|b| b.slot == Slot::Quads) {
-        let mut quads = Arrays::default();
-        let channels = Slot::Quads.format(scene).channels();
-        quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
+    if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
+        let mut packed = Arrays::default();
+        let channels = Slot::PackedNeighbours.format(scene).channels();
+        packed.insert("packed_neighbours", Texels::untouched(size_of(Slot::PackedNeighbours.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut quads);
-        inputs.insert("quads", quads.get("quads").clone());
+        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut packed);
+        inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());
     }
     inputs
 }

@@ -10,7 +10,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::None,
-    shader: |_, _| "skip/brick_ranges.plain",
+    shader: |_, _| "empty_space/brick_ranges.plain",
     needed: super::asked,
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);

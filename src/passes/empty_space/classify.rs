@@ -1,18 +1,18 @@
 //! What each brick is to a mode: a change of transfer function, threshold or window classifies bricks anew, and touches no
 //! voxel.
 
-use super::{FARTHEST, KNOWN, NOTHING, WANTED};
+use super::{ACTIVE, EMPTY, HOMOGENEOUS, MAX_DISTANCE};
 use crate::passes::lookup_tables::brick_reaches;
 use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Side, View, transfer};
 
 /// For the surface detector.
 pub const SURFACE: Pass = Pass {
-    name: "classify_surface",
+    name: "classify_bricks_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
     link: Link::None,
-    shader: |_, _| "skip/classify.plain",
+    shader: |_, _| "empty_space/classify.plain",
     needed: |s| match (s.detects_surface(), super::asked(s)) {
         (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
         (true, not) => not,
@@ -22,8 +22,8 @@ pub const SURFACE: Pass = Pass {
     writes: |_, _| vec![whole("kinds", Slot::BrickKinds)],
     extent: |s, _| s.bricks().count,
     repeat: once,
-    params: |s, _| window(s, s.surface_view()).f32("quiet", quiet(s)),
-    constants: |_, _| vec![("FARTHEST", FARTHEST as i32)],
+    params: |s, _| window(s, s.surface_view()).f32("quiet_level", quiet_level(s)),
+    constants: |_, _| vec![("MAX_DISTANCE", MAX_DISTANCE as i32)],
     tolerance: Tolerance {
         absolute: 0.0,
         relative: 0.0,
@@ -31,19 +31,19 @@ pub const SURFACE: Pass = Pass {
         why: "kinds are whole numbers; a range that ends within rounding of the threshold may fall on either side",
     },
     reference: |s, _, reads, writes| {
-        let bar = quiet(s);
+        let bar = quiet_level(s);
         reference(s, s.surface_view(), reads, writes, |side, range| match side {
-            Side::Outside => NOTHING,
-            Side::Inside if range[1] + 1e-6 <= bar => KNOWN,
-            _ => WANTED,
+            Side::Outside => EMPTY,
+            Side::Inside if range[1] + 1e-6 <= bar => HOMOGENEOUS,
+            _ => ACTIVE,
         });
     },
 };
 
 /// For the mode that composites, or takes the mean.
 pub const VOLUME: Pass = Pass {
-    name: "classify_volume",
-    shader: |s, _| if s.composites() { "skip/classify.transparent" } else { "skip/classify.plain" },
+    name: "classify_bricks_volume",
+    shader: |s, _| if s.composites() { "empty_space/classify.transparent" } else { "empty_space/classify.plain" },
     needed: |s| match (s.composites(), s.settings.mode, super::asked(s)) {
         (true, _, Ok(_)) => Ok("what is transparent or outside is left out"),
         (_, Mode::Mean, Ok(_)) => Ok("what is zero or outside is counted without looking"),
@@ -57,10 +57,10 @@ pub const VOLUME: Pass = Pass {
     },
     params: |s, _| match s.composites() {
         true => window(s, s.volume_view()),
-        false => window(s, s.projection_view()).f32("quiet", 0.0),
+        false => window(s, s.projection_view()).f32("quiet_level", 0.0),
     },
     constants: |s, _| {
-        let mut constants = vec![("FARTHEST", FARTHEST as i32)];
+        let mut constants = vec![("MAX_DISTANCE", MAX_DISTANCE as i32)];
         if s.composites() {
             constants.push(("FROM_ZERO", between_samples(s) as i32));
             constants.push(("ENTRIES", transfer::ENTRIES as i32));
@@ -70,9 +70,9 @@ pub const VOLUME: Pass = Pass {
     reference: |s, _, reads, writes| {
         if !s.composites() {
             return reference(s, s.projection_view(), reads, writes, |side, range| match side {
-                Side::Outside => NOTHING,
-                Side::Inside if range[1] == 0.0 => KNOWN,
-                _ => WANTED,
+                Side::Outside => EMPTY,
+                Side::Inside if range[1] == 0.0 => HOMOGENEOUS,
+                _ => ACTIVE,
             });
         }
         let opaque = reads.get("opaque_before").values.clone();
@@ -82,7 +82,7 @@ pub const VOLUME: Pass = Pass {
             let first = if between_samples(s) { 0 } else { entry(low - 1e-6) };
             let last = (entry(high + 1e-6) + 1).min(transfer::ENTRIES - 1);
             let transparent = opaque[last + 1] == opaque[first];
-            if side == Side::Outside || transparent { NOTHING } else { WANTED }
+            if side == Side::Outside || transparent { EMPTY } else { ACTIVE }
         });
     },
     ..SURFACE
@@ -95,7 +95,7 @@ fn ranges() -> Vec<Bind> {
 
 /// What no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that below the lower threshold
 /// the detector says nothing.
-pub fn quiet(scene: &Scene) -> f64 {
+pub fn quiet_level(scene: &Scene) -> f64 {
     let surface = &scene.settings.surface;
     let threshold = surface.threshold.min(surface.rough_threshold.unwrap_or(surface.threshold));
     // Larger than 0, which stands for exact zeros.
@@ -125,6 +125,6 @@ fn reference(scene: &Scene, view: View, reads: &Arrays, writes: &mut Arrays, kin
     for (n, reach) in brick_reaches(scene, &scene.bricks()).into_iter().enumerate() {
         let range = [ranges.values[2 * n] / beyond(scene), ranges.values[2 * n + 1] * beyond(scene)];
         let kind = kind(reach.side, range.map(windowed));
-        target.values[n] = f64::from(kind * 64 + FARTHEST) / 255.0;
+        target.values[n] = f64::from(kind * 64 + MAX_DISTANCE) / 255.0;
     }
 }

@@ -10,15 +10,15 @@ use crate::passes::pass::{Need, Slot};
 use crate::scene::{Mode, Scene};
 
 /// Kinds of bricks, as classify.comp has them.
-const WANTED: u32 = 0;
-const NOTHING: u32 = 1;
-const KNOWN: u32 = 2;
+const ACTIVE: u32 = 0;
+const EMPTY: u32 = 1;
+const HOMOGENEOUS: u32 = 2;
 /// Bricks that a distance goes up to; a kind has the two bits above.
-const FARTHEST: u32 = 16;
+const MAX_DISTANCE: u32 = 16;
 
-/// What a ray caster leaps by.
+/// How a ray caster skips empty space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leaps {
+pub enum Skipping {
     /// It takes every sample.
     None,
     /// Kinds of bricks, and how far around they are the same.
@@ -27,42 +27,42 @@ pub enum Leaps {
     Ranges,
 }
 
-impl Leaps {
+impl Skipping {
     /// The 3D texture that shaders name "bricks".
     pub fn slot(self) -> Option<Slot> {
         match self {
-            Leaps::None => None,
-            Leaps::Kinds(slot) => Some(slot),
-            Leaps::Ranges => Some(Slot::BrickRanges),
+            Skipping::None => None,
+            Skipping::Kinds(slot) => Some(slot),
+            Skipping::Ranges => Some(Slot::BrickRanges),
         }
     }
 
     /// SKIP of skip.glsl.
     pub fn constant(self) -> (&'static str, i32) {
         let value = match self {
-            Leaps::None => 0,
-            Leaps::Kinds(_) => 1,
-            Leaps::Ranges => 2,
+            Skipping::None => 0,
+            Skipping::Kinds(_) => 1,
+            Skipping::Ranges => 2,
         };
         ("SKIP", value)
     }
 }
 
-pub fn surface_leaps(scene: &Scene) -> Leaps {
-    if scene.skips() { Leaps::Kinds(Slot::SurfaceLeaps) } else { Leaps::None }
+pub fn surface_skipping(scene: &Scene) -> Skipping {
+    if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
 }
 
-pub fn volume_leaps(scene: &Scene) -> Leaps {
+pub fn volume_skipping(scene: &Scene) -> Skipping {
     match scene.settings.mode {
-        _ if !scene.skips() => Leaps::None,
-        Mode::Mip | Mode::MinIp => Leaps::Ranges,
-        _ => Leaps::Kinds(Slot::VolumeLeaps),
+        _ if !scene.skips() => Skipping::None,
+        Mode::Mip | Mode::MinIp => Skipping::Ranges,
+        _ => Skipping::Kinds(Slot::VolumeBrickDistances),
     }
 }
 
 fn asked(scene: &Scene) -> Need {
     match scene.skips() {
-        true => Ok("rays leap over bricks that cannot change the picture"),
-        false => Err("no ray leaps: none is cast, or every sample is asked for"),
+        true => Ok("rays skip bricks that cannot change the picture"),
+        false => Err("no ray skips bricks: none is cast, or every sample is asked for"),
     }
 }

@@ -9,7 +9,7 @@ pub const PASS: Pass = Pass {
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
     link: Link::None,
-    shader: |_, _| "skip/tile_ranges.plain",
+    shader: |_, _| "empty_space/tile_ranges.plain",
     needed: super::asked,
     // A slice changes with the frames that are smoothed into it.
     reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],

@@ -100,7 +100,7 @@ pub(super) fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(
     let e = enhanced.unwrap_or_default();
     vec![
         ("RADIUS", (e.window / 2) as i32),
-        ("LARGEST", (e.largest / 2) as i32),
+        ("MAX_RADIUS", (e.largest / 2) as i32),
         ("ESTIMATOR", estimator::constant(scene.centre(e))),
         ("MULTIPLICATIVE", i32::from(e.noise == Noise::Multiplicative)),
     ]

@@ -16,13 +16,13 @@ pub const PASS: Pass = Pass {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
         _ => Err("the mode is no projection"),
     },
-    reads: |s, _| ray::marching_reads(s, empty_space::volume_leaps(s)),
+    reads: |s, _| ray::marching_reads(s, empty_space::volume_skipping(s)),
     writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| ray::params(s, s.projection_view()),
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         constants.push(("KEPT", kept(s)));
         constants
     },

@@ -1,7 +1,7 @@
 //! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
-use crate::passes::empty_space::Leaps;
-use crate::passes::lookup_tables::{is_uneven, line_parameter, sweep_span};
+use crate::passes::empty_space::Skipping;
+use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_span};
 use crate::passes::pass::*;
 use crate::passes::preprocess::packed_neighbours;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
@@ -16,10 +16,10 @@ macro_rules! variant {
     ($scene:expr, $shader:literal, $kind:literal) => {
         match crate::passes::raycast::ray::tables($scene) {
             (false, _, _) => concat!($shader, ".", $kind, "plain"),
-            (true, false, false) => concat!($shader, ".", $kind, "even"),
-            (true, false, true) => concat!($shader, ".", $kind, "moved"),
-            (true, true, false) => concat!($shader, ".", $kind, "uneven"),
-            (true, true, true) => concat!($shader, ".", $kind, "uneven_moved"),
+            (true, false, false) => concat!($shader, ".", $kind, "uniform"),
+            (true, false, true) => concat!($shader, ".", $kind, "intra_frame_motion"),
+            (true, true, false) => concat!($shader, ".", $kind, "non_uniform"),
+            (true, true, true) => concat!($shader, ".", $kind, "non_uniform_intra_frame_motion"),
         }
     };
 }
@@ -30,31 +30,31 @@ pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
     match &scene.geometry {
         Geometry::Sweep(probe) => {
             let swept = !matches!(probe.motion, Motion::Still { .. });
-            let moved = match &probe.advance {
+            let moving = match &probe.advance {
                 Advance::None => false,
                 Advance::Same(a) => *a != 0.0,
                 Advance::Each(table) => table.iter().any(|a| *a != 0.0),
             };
-            (swept, swept && is_uneven(&scene.geometry), swept && moved)
+            (swept, swept && is_non_uniform(&scene.geometry), swept && moving)
         }
         Geometry::Cartesian(_) => (false, false, false),
     }
 }
 
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
-    let (swept, uneven, moved) = tables(scene);
+    let (swept, non_uniform, moving) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
-    reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
-    reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
+    reads.extend(moving.then_some(whole("line_lut", Slot::LineLut)));
+    reads.extend(non_uniform.then_some(whole("slice_table", Slot::SliceTable)));
     reads
 }
 
 /// Of the passes that take samples along rays: what they leap by, too.
-pub(super) fn marching_reads(scene: &Scene, leaps: Leaps) -> Vec<Bind> {
+pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
     let mut reads = reads(scene);
-    reads.extend(scene.packs().then_some(whole("quads", Slot::Quads)));
-    reads.extend(leaps.slot().map(|slot| whole("bricks", slot)));
+    reads.extend(scene.packs().then_some(whole("packed_neighbours", Slot::PackedNeighbours)));
+    reads.extend(skipping.slot().map(|slot| whole("bricks", slot)));
     reads
 }
 
@@ -83,13 +83,13 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// Constants of the passes that take samples along rays.
-pub(super) fn marching_constants(scene: &Scene, leaps: Leaps) -> Vec<(&'static str, i32)> {
+pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
     if scene.packs() {
         constants.retain(|(name, _)| *name != "SAMPLING");
         constants.push(("SAMPLING", packed_neighbours::sampling(scene)));
     }
-    constants.push(leaps.constant());
+    constants.push(skipping.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));
     constants
 }

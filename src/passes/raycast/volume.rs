@@ -14,23 +14,23 @@ pub const PASS: Pass = Pass {
     link: Link::None,
     shader: |s, _| match kind(s) {
         Kind::Alone => ray::variant!(s, "raycast/volume", ""),
-        Kind::Veil => ray::variant!(s, "raycast/volume", "veil_"),
+        Kind::Layer => ray::variant!(s, "raycast/volume", "layer_"),
         Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
     },
     needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
-        let mut reads = ray::marching_reads(s, empty_space::volume_leaps(s));
+        let mut reads = ray::marching_reads(s, empty_space::volume_skipping(s));
         reads.push(match s.settings.volume.compositing {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
             _ => whole("transfer", Slot::Transfer),
         });
-        reads.extend((kind(s) == Kind::Veil).then_some(whole("distance_map", Slot::Distance)));
+        reads.extend((kind(s) == Kind::Layer).then_some(whole("distance_map", Slot::Distance)));
         reads
     },
     writes: |s, _| match kind(s) {
         Kind::Alone => vec![whole("picture", rendered(s))],
-        Kind::Veil => vec![whole("picture", Slot::Veil)],
-        Kind::Hit => vec![whole("picture", Slot::Veil), whole("distance_map", Slot::Distance)],
+        Kind::Layer => vec![whole("picture", Slot::VolumeLayer)],
+        Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("distance_map", Slot::Distance)],
     },
     extent: ray_extent,
     repeat: once,
@@ -47,7 +47,7 @@ pub const PASS: Pass = Pass {
             .f32("depth_near", near)
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         let compositing = match s.settings.volume.compositing {
             Compositing::Riemann => 0,
             Compositing::Corrected => 1,
@@ -73,7 +73,7 @@ pub const PASS: Pass = Pass {
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), x, y);
-                if kind(scene) == Kind::Veil {
+                if kind(scene) == Kind::Layer {
                     ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
                 }
                 let (colour, hit) = composite(scene, &ray, table);
@@ -91,14 +91,14 @@ enum Kind {
     /// The picture.
     Alone,
     /// What lies before a surface.
-    Veil,
+    Layer,
     /// What stage 3 lights, and where.
     Hit,
 }
 
 fn kind(scene: &Scene) -> Kind {
     match (scene.settings.mode, scene.lights_volume()) {
-        (Mode::Mixed, _) => Kind::Veil,
+        (Mode::Mixed, _) => Kind::Layer,
         (_, true) => Kind::Hit,
         (_, false) => Kind::Alone,
     }

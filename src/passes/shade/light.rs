@@ -17,10 +17,10 @@ pub const PASS: Pass = Pass {
             (Lit::Surface, (true, false)) => "shade/light.shadowed",
             (Lit::Surface, (false, true)) => "shade/light.occluded",
             (Lit::Surface, (true, true)) => "shade/light.shadowed_occluded",
-            (Lit::Veiled, (false, false)) => "shade/light.veiled_plain",
-            (Lit::Veiled, (true, false)) => "shade/light.veiled_shadowed",
-            (Lit::Veiled, (false, true)) => "shade/light.veiled_occluded",
-            (Lit::Veiled, (true, true)) => "shade/light.veiled_shadowed_occluded",
+            (Lit::BehindLayer, (false, false)) => "shade/light.behind_layer_plain",
+            (Lit::BehindLayer, (true, false)) => "shade/light.behind_layer_shadowed",
+            (Lit::BehindLayer, (false, true)) => "shade/light.behind_layer_occluded",
+            (Lit::BehindLayer, (true, true)) => "shade/light.behind_layer_shadowed_occluded",
             (Lit::Composited, (false, false)) => "shade/light.composited_plain",
             (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
             (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
@@ -35,7 +35,7 @@ pub const PASS: Pass = Pass {
     reads: |s, t| {
         let mut reads = vec![whole("distance_map", t.source())];
         reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
-        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("veil", Slot::Veil)));
+        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("volume_layer", Slot::VolumeLayer)));
         reads.extend(shadow::is_cast(s).then_some(whole("shadow", Slot::Shadow)));
         reads.extend(occlusion::is_asked(s).then_some(whole("occlusion", Slot::Occlusion)));
         reads
@@ -57,7 +57,7 @@ pub const PASS: Pass = Pass {
             .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
             .vec3("wrap", wrap(s.skin()))
             .vec3("through", through(s.skin()))
-            .f32("veil_share", s.settings.volume.veil)
+            .f32("layer_share", s.settings.volume.veil)
     },
     constants: |s, _| {
         let light = &s.settings.light;
@@ -75,7 +75,7 @@ pub const PASS: Pass = Pass {
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
                 let light = lit(scene, reads, x, y);
-                picture.set([x, y, 0], &seen(scene, reads, light, x, y));
+                picture.set([x, y, 0], &shown(scene, reads, light, x, y));
             }
         }
     },
@@ -85,7 +85,7 @@ pub const PASS: Pass = Pass {
 enum Lit {
     Surface,
     /// A surface behind a composited volume.
-    Veiled,
+    BehindLayer,
     /// The volume itself, where rays hit it first.
     Composited,
 }
@@ -93,25 +93,25 @@ enum Lit {
 fn lit_thing(scene: &Scene) -> Lit {
     match (scene.lights_volume(), scene.settings.mode) {
         (true, _) => Lit::Composited,
-        (false, Mode::Mixed) => Lit::Veiled,
+        (false, Mode::Mixed) => Lit::BehindLayer,
         (false, _) => Lit::Surface,
     }
 }
 
 /// What a pixel shows: its light (body and highlight), with the composited volume before it or in it.
-fn seen(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
-    let veil = |share: f64| {
-        let veil = reads.get("veil").get([x, y, 0]);
-        (DVec3::new(veil[0], veil[1], veil[2]) * share, veil[3] * share)
+fn shown(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
+    let layer = |share: f64| {
+        let layer = reads.get("volume_layer").get([x, y, 0]);
+        (DVec3::new(layer[0], layer[1], layer[2]) * share, layer[3] * share)
     };
     let (colour, opacity) = match (lit_thing(scene), light) {
         (Lit::Surface, light) => light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0)),
-        (Lit::Veiled, light) => {
-            let (before, opacity) = veil(scene.settings.volume.veil);
+        (Lit::BehindLayer, light) => {
+            let (before, opacity) = layer(scene.settings.volume.veil);
             light.map_or((before, opacity), |(body, highlight)| (before + (1.0 - opacity) * (body + highlight), 1.0))
         }
         (Lit::Composited, light) => {
-            let (colour, opacity) = veil(1.0);
+            let (colour, opacity) = layer(1.0);
             match light {
                 Some((body, highlight)) => (colour * (1.0 - opacity + opacity * body) + opacity * highlight, opacity),
                 None => (colour, opacity),

@@ -1,4 +1,4 @@
-//! Faults of rays, of what they leap over, and of light.
+//! Faults of rays, of the empty space that they skip, and of light.
 
 use super::list::{number, set, swap, times};
 use crate::passes::fault_injection::{Change, InjectedFault};
@@ -134,15 +134,18 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         },
     },
     InjectedFault {
-        name: "leap one brick too far",
+        name: "skip one brick too far",
         what: "the distance to the next brick of another kind is counted from the one behind",
-        change: Change::Shader { pass: "leap_", by: |words| added(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]) },
+        change: Change::Shader {
+            pass: "brick_distance_",
+            by: |words| added(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]),
+        },
     },
     InjectedFault {
         name: "brick taken for empty",
-        what: "bricks a hundredth above the threshold are leapt over",
+        what: "bricks a hundredth above the threshold are skipped",
         change: Change::Numbers {
-            pass: "classify_surface",
+            pass: "classify_bricks_surface",
             by: |_, params| {
                 number(params, "quiet", |value| {
                     if let Value::F32(v) = value {

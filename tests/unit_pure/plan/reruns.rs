@@ -58,7 +58,7 @@ fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
     assert_eq!(passes(&with(""), &with("camera = { azimuth = 10 }")), format!("raycast_surface {filtered}"));
     assert_eq!(
         passes(&with(""), &with("surface = { threshold = 0.3 }")),
-        format!("classify_surface leap_surface raycast_surface {filtered}")
+        format!("classify_bricks_surface brick_distance_surface raycast_surface {filtered}")
     );
     // Another window of the median is a constant of its pipeline, and shadow a pass more whose slot the light reads.
     let wider = scene(fan(Advance::None), &SURFACE.replace("median = 3", "median = 5"));
@@ -123,15 +123,21 @@ fn tables_are_made_anew_where_what_they_follow_from_changes() {
     let still = |more: &str| volume(Advance::None, more);
     let marched = "raycast_volume tone";
     let (run, made) = again(&still(""), &still("volume = { transfer = 'bone' }"));
-    assert_eq!((run, made), (format!("classify_volume leap_volume {marched}"), "opaque_before transfer".into()));
+    assert_eq!(
+        (run, made),
+        (format!("classify_bricks_volume brick_distance_volume {marched}"), "opaque_before transfer".into())
+    );
     let pre = "compositing = 'pre-integrated'";
     let (run, made) =
         again(&still(&format!("volume = {{ {pre} }}")), &still(&format!("volume = {{ {pre}, transfer = 'bone' }}")));
-    assert_eq!((run, made), (format!("classify_volume leap_volume {marched}"), "opaque_before pre_integrated".into()));
+    assert_eq!(
+        (run, made),
+        (format!("classify_bricks_volume brick_distance_volume {marched}"), "opaque_before pre_integrated".into())
+    );
     let entries = |n: u32| still(&format!("ray = {{ entries = {n} }}"));
     assert_eq!(rerun(&entries(1025), &entries(513)), Rerun::Frames, "of all tables alike");
     let (run, made) = again(&still("ray = { brick = 8 }"), &still("ray = { brick = 16 }"));
-    assert!(run.starts_with("brick_ranges classify_volume") && made == "brick_table", "{run}: {made}");
+    assert!(run.starts_with("brick_ranges classify_bricks_volume") && made == "brick_table", "{run}: {made}");
     // The motor goes another way, or further, during a frame: the tables of the sweep follow, the lines of a frame lie as before.
     let [forth, back, fast] = [0.02, -0.02, 0.03].map(|way| volume(Advance::Same(way), ""));
     assert_eq!(again(&forth, &back).1, "");
