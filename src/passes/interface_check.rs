@@ -1,4 +1,4 @@
-//! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
+//! Checks a pass's declaration against its shader: names, types, access and dimensions. Needs no GPU.
 
 use super::pass::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use super::slots::{Format, Shape};
@@ -13,7 +13,7 @@ use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 /// they are read.
 const OPTIONAL: [&str; 2] = ["bricks", "packed_neighbours"];
 
-/// A pass's shader without the textures that this scene has not.
+/// A pass's shader without the textures that this scene does not have.
 ///
 /// # Errors
 /// A module that breaks the format.

@@ -1,4 +1,4 @@
-//! Tables that the CPU makes from the scene, in f64: what shaders look up instead of computing it for every sample.
+//! Tables that the CPU computes from the scene in f64, so that shaders need not compute them for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use crate::scene::{Bricks, Reach, Scene, Side, transfer};
@@ -8,8 +8,8 @@ fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
 }
 
-/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the PLUS toolkit's rule
-/// holds: both neighbours must exist in both directions, so the last sample and line themselves are out.
+/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the rule of the PLUS toolkit
+/// applies: both neighbours must exist in both directions, so that the last sample and line are left out.
 pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let [width, height] = scene.grid.size;
@@ -24,7 +24,7 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     lut
 }
 
-/// Gain of every sample of a line: a factor of linear envelopes, an addend of samples that are compressed already.
+/// Gain of every sample of a line: a factor for linear envelopes, an addend for log-compressed samples.
 pub fn tgc(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let c = &scene.settings.conditioning;
@@ -35,7 +35,7 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
 }
 
 /// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none. Samples are counted on the lattice that is
-/// scan-converted: decimated by M, sample j lies at sample j M of the frame, and what lies beyond the last takes the last.
+/// scan-converted: decimated by M, sample j is at sample j M of the frame, and pixels beyond the last sample take the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -52,7 +52,7 @@ pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, 
     (away <= scene.apron).then_some((near_sample.min(kept) / factor, near_line))
 }
 
-/// The parameter that the sweep look-up table is entered by: the tangent of half the angle about the wobble axis, or mm.
+/// The parameter of the sweep look-up table: the tangent of half the angle about the wobble axis, or mm.
 pub fn sweep_parameter(motion: Motion, position: f64) -> f64 {
     match motion {
         Motion::Fan { .. } => (position / 2.0).tan(),
@@ -67,7 +67,7 @@ fn sweep_position(motion: Motion, parameter: f64) -> f64 {
     }
 }
 
-/// The parameter that the line look-up table is entered by: the tangent of half the in-plane angle, or mm.
+/// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm.
 pub fn line_parameter(array: Array, position: f64) -> f64 {
     match array {
         Array::Curved { .. } => (position / 2.0).tan(),
@@ -81,7 +81,7 @@ pub fn sweep_span(probe: &Probe) -> (f64, f64) {
     (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
 }
 
-/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index itself for an even sweep.
+/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index for a uniform sweep.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -122,7 +122,7 @@ pub fn slice_table(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Whether slices lie unevenly or were taken in mixed directions, so that a slice is found by bracketing.
+/// True if slices have non-uniform positions or mixed directions, so that a slice is found by bracketing.
 pub fn is_non_uniform(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),

@@ -1,5 +1,5 @@
-//! What bounds every pass on a device: how fast it samples, fetches and copies when nothing else is to be done. In no plan;
-//! `profile` runs them by themselves and puts the passes beside them.
+//! The device's limits for every pass: how fast it samples, fetches and copies without computing. These passes are in no plan;
+//! `profile` runs each alone and compares the other passes with them.
 
 use super::pass::*;
 use crate::probe::{Geometry, Grid};

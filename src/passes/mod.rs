@@ -22,7 +22,6 @@ pub mod filter {
     pub mod enhanced_sigma;
     pub mod estimator;
     pub mod gaussian;
-    pub mod growth;
     pub mod median;
     pub mod perona_malik;
     pub mod sigma;
@@ -31,7 +30,6 @@ pub mod raycast {
     pub mod composite;
     pub mod cube;
     mod detector;
-    mod noise;
     pub mod planes;
     pub mod projection;
     pub mod ray;
@@ -55,7 +53,7 @@ pub const PASSES: &[Pass] = &[
     filter::median::SLICE,
     filter::estimator::SLICE,
     filter::sigma::SLICE,
-    filter::growth::SLICE,
+    filter::enhanced_sigma::GROWTH,
     filter::enhanced_sigma::SLICE,
     filter::perona_malik::SLICE,
     filter::aos::SLICE,
@@ -63,8 +61,8 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
     preprocess::packed_neighbours::PASS,
-    empty_space::tile_ranges::PASS,
-    empty_space::brick_ranges::PASS,
+    empty_space::ranges::TILES,
+    empty_space::ranges::BRICKS,
     empty_space::classify::SURFACE,
     empty_space::distance::SURFACE,
     raycast::surface::PASS,

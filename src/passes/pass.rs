@@ -192,7 +192,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// A filter of that chain that looks at one texel in one dispatch a step.
+    /// A filter of that chain that reads one texel and takes one dispatch per step.
     pub const fn of(chain: Chain) -> Filter {
         Filter { chain, dispatches: 1, reach: |_| Some([0; 2]), copies: |_| false }
     }

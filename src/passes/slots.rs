@@ -6,7 +6,7 @@ use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Layout, Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
 
-/// Frames that may be on their way into slices at once: layers of the frame array, and slots of the staging ring.
+/// Frames that may be uploaded at once: layers of the frame array, and slots of the staging ring.
 pub const FRAMES_IN_FLIGHT: u32 = 4;
 
 /// What a slot is.
@@ -412,7 +412,7 @@ impl Shape {
         }
     }
 
-    /// Slices of a 3D image, layers of an array, 1 otherwise: what a barrier tells apart.
+    /// Slices of a 3D image, layers of an array, 1 otherwise: the parts that barriers distinguish.
     pub fn parts(self) -> u32 {
         match self {
             Shape::Layers(n) | Shape::Three(n) => n[2],

@@ -1,4 +1,4 @@
-//! What each brick is to a mode: a change of transfer function, threshold or window classifies bricks anew, and touches no
+//! The kind of each brick to a mode. A change of transfer function, threshold or window classifies bricks again and reads no
 //! voxel.
 
 use super::{ACTIVE, EMPTY, HOMOGENEOUS, MAX_DISTANCE};
@@ -88,26 +88,26 @@ pub const VOLUME: Pass = Pass {
     ..SURFACE
 };
 
-/// What every kind follows from.
+/// The slots that every kind follows from.
 fn ranges() -> Vec<Bind> {
     vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
 }
 
-/// What no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that below the lower threshold
-/// the detector says nothing.
+/// The level that no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that the detector
+/// cannot fire where q is below the lower threshold.
 pub fn quiet_level(scene: &Scene) -> f64 {
     let surface = &scene.settings.surface;
     let threshold = surface.threshold.min(surface.rough_threshold.unwrap_or(surface.threshold));
-    // Larger than 0, which stands for exact zeros.
+    // Larger than 0, which means exact zeros.
     (threshold * (1.0 - 1e-4) - 1e-5).max(1e-30)
 }
 
-/// Whether a step sees every value between two samples, which may lie in two bricks.
+/// True if a step uses every value between two samples, which may be in two bricks.
 fn between_samples(scene: &Scene) -> bool {
     scene.settings.volume.compositing == Compositing::PreIntegrated
 }
 
-/// How many times its largest texel a sample may be, by rounding: of a weighted mean, some ulps.
+/// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.
 fn beyond(scene: &Scene) -> f64 {
     if scene.settings.ray.sliding > 0 { 1.0 + 1e-5 } else { 1.0 }
 }

@@ -1,4 +1,4 @@
-//! How many bricks away the nearest brick of another kind is, in Chebyshev's distance (Deakin and Knackstedt 2020): one axis a
+//! The Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020): one axis per
 //! dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
 
 use super::{ACTIVE, EMPTY};
@@ -33,7 +33,7 @@ pub const VOLUME: Pass = Pass {
     ..SURFACE
 };
 
-/// What an axis' dispatch reads and writes.
+/// The slots that the dispatch of an axis reads and writes.
 fn link(last: Slot, args: &DispatchArgs) -> (Slot, Slot) {
     match args.iteration {
         0 => (Slot::BrickKinds, Slot::BrickDistancesX),
@@ -42,7 +42,7 @@ fn link(last: Slot, args: &DispatchArgs) -> (Slot, Slot) {
     }
 }
 
-/// The detector looks beyond the bricks, where a Cartesian volume repeats its last texels.
+/// The kind of the space beyond the bricks. The detector takes samples there, where a Cartesian volume repeats its last texels.
 fn beyond_surface(scene: &Scene) -> u32 {
     if matches!(scene.geometry, Geometry::Cartesian(_)) { ACTIVE } else { EMPTY }
 }

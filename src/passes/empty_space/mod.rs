@@ -1,29 +1,30 @@
-//! What lets rays leap: ranges of tiles and bricks, kept up to date slice by slice; what each brick is to a mode; and how far
-//! the nearest brick of another kind is. Each mode's rule is exact: the picture is the same bit for bit.
+//! Empty-space skipping: value ranges of tiles and bricks, updated slice by slice; the kind of each brick to a mode; and the
+//! distance to the nearest brick of another kind. Each mode's rule is exact: the picture is the same bit for bit.
 
-pub mod brick_ranges;
 pub mod classify;
 pub mod distance;
-pub mod tile_ranges;
+pub mod ranges;
 
 use crate::passes::pass::{Need, Slot};
 use crate::scene::{Mode, Scene};
 
-/// Kinds of bricks, as classify.comp has them.
+/// Kinds of bricks, as in classify.comp. The samples of an active brick are needed.
 const ACTIVE: u32 = 0;
+/// Outside the insonified region, or transparent.
 const EMPTY: u32 = 1;
+/// Inside, and the result of its samples is known.
 const HOMOGENEOUS: u32 = 2;
-/// Bricks that a distance goes up to; a kind has the two bits above.
+/// Largest distance that is stored, bricks; the kind is in the two bits above.
 const MAX_DISTANCE: u32 = 16;
 
 /// How a ray caster skips empty space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Skipping {
-    /// It takes every sample.
+    /// Not at all: it takes every sample.
     None,
-    /// Kinds of bricks, and how far around they are the same.
+    /// By the kinds of bricks and the distance to the nearest brick of another kind, in this slot.
     Kinds(Slot),
-    /// What the largest sample so far is compared with.
+    /// By the value ranges of bricks, which are compared with the largest or smallest sample so far.
     Ranges,
 }
 
@@ -37,7 +38,7 @@ impl Skipping {
         }
     }
 
-    /// SKIP of skip.glsl.
+    /// SKIP of empty_space.glsl.
     pub fn constant(self) -> (&'static str, i32) {
         let value = match self {
             Skipping::None => 0,
@@ -48,10 +49,12 @@ impl Skipping {
     }
 }
 
+/// How the surface detector skips empty space.
 pub fn surface_skipping(scene: &Scene) -> Skipping {
     if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
 }
 
+/// How compositing and projections skip empty space.
 pub fn volume_skipping(scene: &Scene) -> Skipping {
     match scene.settings.mode {
         _ if !scene.skips() => Skipping::None,

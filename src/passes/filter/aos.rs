@@ -8,7 +8,7 @@ use super::perona_malik::{asked, conductance, constant};
 use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scheme};
 
-/// Of one step: rows forward and backward, columns forward and backward.
+/// Dispatches of one step: rows forward and backward, columns forward and backward.
 pub const DISPATCHES: u32 = 4;
 
 const TOLERANCE: Tolerance = Tolerance {
@@ -62,7 +62,7 @@ pub const PICTURE: Pass = Pass {
     reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes),
 };
 
-/// What lies between the sweeps.
+/// The slots between the sweeps.
 struct Between {
     shares: Slot,
     forward: Slot,
@@ -162,7 +162,7 @@ fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays,
     }
 }
 
-/// What elimination has to leave at pixel i, u[i] = forward + share u[i+1], told without eliminating: the last unknown of the
+/// The result of elimination at pixel i, u[i] = forward + share u[i+1], computed without elimination: the last unknown of the
 /// first i + 1 equations, whose solution is linear in u[i+1]. `forward` is that solution with u[i+1] = 0, and `share` what a
 /// u[i+1] of 1 adds to it.
 fn eliminated(weights: &[f64], values: &[&[f64]], i: usize) -> (f64, Vec<f64>) {

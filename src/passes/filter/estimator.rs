@@ -1,5 +1,5 @@
-//! Local estimators of a pixel from those around it, which thesis 5.4 compares: as a filter of slices of their own, and as the
-//! centre of the enhanced sigma filter. Beyond the border the nearest pixel stands in; of distances, misses count nowhere.
+//! Local estimators of a pixel from its neighbours, which thesis 5.4 compares: as a filter of slices, and as the centre of the
+//! enhanced sigma filter. Beyond the border the nearest pixel repeats; of distances, misses are ignored.
 
 use crate::passes::pass::*;
 use crate::scene::Estimator;
@@ -38,12 +38,12 @@ pub const SLICE: Pass = Pass {
     },
 };
 
-/// Difference below which a gradient is taken for none: half a level of 255, as Wang, Vagnucci and Li do on whole levels.
+/// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
 pub(super) const LEAST: f64 = 0.5 / 255.0;
-/// The same on distances, mm: less than a detector can tell.
+/// The same on distances, mm: below the detector's resolution.
 pub(super) const LEAST_DISTANCE: f64 = 0.01;
 
-/// The shader's word for it.
+/// The value of the shader's constant ESTIMATOR.
 pub(super) fn constant(estimator: Estimator) -> i32 {
     match estimator {
         Estimator::Median => 0,
@@ -121,7 +121,7 @@ pub(super) fn quotient(difference: f64, edge: f64) -> f64 {
     if edge > 0.0 { 1.0 / (1.0 + (difference / edge).powi(2)) } else { 0.0 }
 }
 
-/// Nagao and Matsuyama's nine: the square of 3x3, and a mask towards an edge and one towards a corner, each turned four times.
+/// Nagao and Matsuyama's nine: the square of 3x3, and a mask towards an edge and one towards a corner, each in four rotations.
 fn masks() -> Vec<Vec<(i64, i64)>> {
     let square = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).collect();
     let mut edge = vec![(0, 0), (-1, -1), (0, -1), (1, -1), (-1, -2), (0, -2), (1, -2)];

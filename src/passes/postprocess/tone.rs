@@ -5,7 +5,7 @@ use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Scene, transfer};
 use glam::DVec3;
 
-/// How much of what lies under a cross-line it covers: anatomy stays visible.
+/// Opacity of a cross-line: the anatomy below it stays visible.
 pub const LINE_STRENGTH: f64 = 0.7;
 
 pub const PASS: Pass = Pass {
@@ -53,7 +53,7 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// Its numbers, behind those that are there.
+/// Adds the numbers of toning to those of a pass.
 pub fn params(scene: &Scene, params: Params) -> Params {
     let post = &scene.settings.post;
     let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
@@ -68,7 +68,7 @@ pub fn params(scene: &Scene, params: Params) -> Params {
         .vec3("map_4", e)
 }
 
-/// Its structure; with `lines`, over planes.
+/// The constants of toning; with `lines`, over planes.
 pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
     let mut constants = vec![("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32)];
@@ -79,7 +79,7 @@ pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
     constants
 }
 
-/// What the screen shows of a colour, or where there is none, of nothing: under the lines of the sheet, if it has any.
+/// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
 pub fn shown(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
     let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
     if let Some((sheet, tile)) = sheet.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {

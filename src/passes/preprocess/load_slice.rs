@@ -1,4 +1,4 @@
-//! A slice of a Cartesian volume: scaled to 0..1 and put into its place.
+//! A slice of a Cartesian volume, scaled to 0..1.
 
 use super::scan_convert::{load_params, normalisation};
 use crate::passes::pass::*;

@@ -1,5 +1,5 @@
-//! Every texel of a slice beside its neighbours one column and one row on. A sample between eight texels is then two loads, one of
-//! each slice. Needs four times the volume's memory, and one more pass over every slice that is new.
+//! Every texel of a slice together with its neighbours one column and one row on. An interpolated sample then takes two loads, one per
+//! slice. This needs four times the volume's memory, and one more pass over every new slice.
 
 use crate::passes::pass::*;
 use crate::scene::{Scene, VolumeFormat};

@@ -1,5 +1,5 @@
-//! MPR: planes and slabs through the volume, and no ray: each pixel's place lies in the plane of its tile. Where stage 4 only tones
-//! them, that is done at once: a third of the time of a picture of planes went into storing it in floats and loading it again.
+//! MPR: planes and slabs through the volume. No ray is cast: each pixel shows a point of its tile's plane. Where stage 4 only tones
+//! them, this pass tones: storing the picture in floats and loading it again took a third of the time.
 
 use super::ray;
 use crate::passes::pass::*;
@@ -97,7 +97,7 @@ fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     constants
 }
 
-/// What a pixel shows; none outside all tiles and where nothing is seen.
+/// The value of a pixel; none outside all tiles and outside the insonified region.
 fn value_at(scene: &Scene, volume: &Texels, sheet: &Sheet, x: usize, y: usize) -> Option<f64> {
     let tile = sheet.tile_at(x, y)?;
     slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal)
@@ -118,7 +118,7 @@ fn unmoved(scene: &Scene) -> Scene {
     Scene { rays, step: 1.0, ..scene.clone() }
 }
 
-/// What a slab about a place shows; none where all of it is cut away or not insonified.
+/// The value of a slab around a point; none where all of it is cut away or not insonified.
 fn slab(scene: &Scene, volume: &Texels, place: DVec3, normal: DVec3) -> Option<f64> {
     let settings = &scene.settings.planes;
     let count = scene.slab_samples() as usize;

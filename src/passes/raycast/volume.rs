@@ -90,9 +90,9 @@ pub const PASS: Pass = Pass {
 enum Kind {
     /// The picture.
     Alone,
-    /// What lies before a surface.
+    /// The volume in front of a surface.
     Layer,
-    /// What stage 3 lights, and where.
+    /// Colours that stage 3 lights, and the distance of the first hit.
     Hit,
 }
 
@@ -119,7 +119,7 @@ fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 
-/// What a ray sees of the volume through the transfer function, and through the tints of its depth.
+/// The volume along a ray, through the transfer function and the tints by depth.
 struct Seen<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
@@ -174,7 +174,7 @@ fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
     std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
 }
 
-/// Entry before a value in 0..1, and the share of the way to the next.
+/// Index of the entry before a value in 0..1, and the fraction to the next entry.
 fn placed(value: f64) -> (usize, f64) {
     let at = value * (transfer::ENTRIES - 1) as f64;
     let n = (at.floor() as usize).min(transfer::ENTRIES - 2);

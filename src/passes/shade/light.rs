@@ -1,4 +1,4 @@
-//! Blinn-Phong (thesis 4-4..4-7) under a far or near light, with shadow, occlusion and the look of skin where asked for.
+//! Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
 
 use super::{camera_params, light_at, normal, occlusion, shadow, to_light};
 use crate::passes::pass::*;
@@ -98,7 +98,7 @@ fn lit_thing(scene: &Scene) -> Lit {
     }
 }
 
-/// What a pixel shows: its light (body and highlight), with the composited volume before it or in it.
+/// The colour of a pixel: its light (body and highlight), with the composited volume in front of it or lit by it.
 fn shown(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
     let layer = |share: f64| {
         let layer = reads.get("volume_layer").get([x, y, 0]);
@@ -130,7 +130,7 @@ fn through(skin: Option<Skin>) -> DVec3 {
     skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
 }
 
-/// Light that comes from a pixel's surface: from its body, and its highlight.
+/// Light from a pixel's surface: from its body, and its highlight.
 fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec3)> {
     let distances = reads.get("distance_map");
     let (place, _) = super::place(scene, distances, x as i64, y as i64)?;

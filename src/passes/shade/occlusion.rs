@@ -1,15 +1,15 @@
-//! Ambient occlusion in image space: what stands out of a pixel's tangent plane nearby takes sky away. (Mittring 2007; Bavoil
-//! and Sainz 2008.)
+//! Ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007;
+//! Bavoil and Sainz 2008.)
 
 use super::{camera_params, normal, place};
 use crate::passes::pass::*;
 use crate::scene::Scene;
 
-/// Places looked at around a pixel.
+/// Samples around a pixel.
 const SAMPLES: u32 = 32;
 /// pi (3 - sqrt 5), rad: turning by it never comes back to a direction.
 const GOLDEN_ANGLE: f64 = 2.399_963_23;
-/// Cosine over the tangent plane that is no corner yet: the map's own roughness.
+/// Cosine above the tangent plane that is ignored: the map's own roughness.
 const ROUGHNESS: f64 = 0.1;
 
 pub const PASS: Pass = Pass {

@@ -6,7 +6,7 @@ use crate::passes::pass::*;
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// Places looked at on the way to the light.
+/// Samples on the segment to the light.
 const STEPS: u32 = 96;
 
 pub const PASS: Pass = Pass {
