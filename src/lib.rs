@@ -38,6 +38,8 @@ pub mod kiosk;
 #[forbid(unsafe_code)]
 pub mod live;
 #[forbid(unsafe_code)]
+pub mod machine;
+#[forbid(unsafe_code)]
 pub mod passes;
 #[forbid(unsafe_code)]
 pub mod picture;
@@ -62,11 +64,13 @@ pub mod shader_source;
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
-#[cfg(feature = "view")]
 #[forbid(unsafe_code)]
 mod terminal;
 #[forbid(unsafe_code)]
+pub mod text;
+#[forbid(unsafe_code)]
 pub mod thesis_tables;
+#[cfg(feature = "view")]
 #[forbid(unsafe_code)]
 pub mod ui;
 #[forbid(unsafe_code)]
