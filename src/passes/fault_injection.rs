@@ -71,7 +71,7 @@ impl Change {
         }
     }
 
-    pub fn leaves_out(&self, pass: &str, scene: &Scene, args: &DispatchArgs) -> bool {
+    pub(crate) fn leaves_out(&self, pass: &str, scene: &Scene, args: &DispatchArgs) -> bool {
         matches!(self, Change::LeftOut { pass: name, which } if pass.starts_with(name) && which(scene, args))
     }
 
@@ -99,7 +99,7 @@ impl Change {
     }
 
     /// True if the fault can change the output of a pass for a scene.
-    pub fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
+    pub(crate) fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
         let args = |iteration| DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: 1, iteration, image: 0 };
         let turns: Vec<DispatchArgs> = (0..(pass.repeat)(scene)).map(args).collect();
         let reads = |slot: Slot| turns.iter().any(|t| pass.reads(scene, t).iter().any(|b| b.slot == slot));

@@ -53,7 +53,7 @@ pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, 
 }
 
 /// The parameter of the sweep look-up table: the tangent of half the angle about the wobble axis, or mm.
-pub fn sweep_parameter(motion: Motion, position: f64) -> f64 {
+fn sweep_parameter(motion: Motion, position: f64) -> f64 {
     match motion {
         Motion::Fan { .. } => (position / 2.0).tan(),
         _ => position,
@@ -68,7 +68,7 @@ fn sweep_position(motion: Motion, parameter: f64) -> f64 {
 }
 
 /// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm.
-pub fn line_parameter(array: Array, position: f64) -> f64 {
+pub(super) fn line_parameter(array: Array, position: f64) -> f64 {
     match array {
         Array::Curved { .. } => (position / 2.0).tan(),
         Array::Linear => position,
@@ -76,7 +76,7 @@ pub fn line_parameter(array: Array, position: f64) -> f64 {
 }
 
 /// Lowest and highest parameter of the sweep table.
-pub fn sweep_span(probe: &Probe) -> (f64, f64) {
+pub(super) fn sweep_span(probe: &Probe) -> (f64, f64) {
     let (first, last) = probe.slice_bounds();
     (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
 }
@@ -123,7 +123,7 @@ pub fn slice_table(scene: &Scene) -> Vec<f32> {
 }
 
 /// True if slices have non-uniform positions or mixed directions, so that a slice is found by bracketing.
-pub fn is_non_uniform(geometry: &Geometry) -> bool {
+pub(super) fn is_non_uniform(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),
         Geometry::Cartesian(_) => false,
@@ -156,12 +156,12 @@ fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
 }
 
 /// The tiles of a picture of planes, as `Sheet::table` lays them out.
-pub fn tile_table(scene: &Scene) -> Vec<f32> {
+pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     floats(scene.sheet().table(scene.settings.planes.thickness))
 }
 
 /// Outward normal and limit of each half-space of the block.
-pub fn block_table(scene: &Scene) -> Vec<f32> {
+pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
     floats(scene.block().iter().flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, f.limit]))
 }
 

@@ -88,7 +88,7 @@ impl<'a> Dispatch<'a> {
     }
 
     /// True if this link writes into the 3D texture: it is the last of its chain.
-    pub fn writes_volume(&self) -> bool {
+    pub(super) fn writes_volume(&self) -> bool {
         matches!(self.target(), Slot::Volume | Slot::SharpVolume)
     }
 
@@ -145,12 +145,12 @@ pub fn layer(name: &'static str, slot: Slot) -> Bind {
 }
 
 /// What a filter reads: its chain's slot, which shaders name `source`.
-pub fn reads_source(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
+pub(super) fn reads_source(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![whole("source", dispatch.source())]
 }
 
 /// What a filter writes: its chain's slot, which shaders name `target`; of the 3D texture one slice.
-pub fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
+pub(super) fn writes_target(_: &Scene, dispatch: &Dispatch) -> Vec<Bind> {
     vec![slice("target", dispatch.target())]
 }
 
@@ -198,7 +198,7 @@ impl Filter {
     }
 
     /// A filter of slices that looks that many columns and rows away.
-    pub const fn of_slices(reach: fn(&Scene) -> Option<[u32; 2]>) -> Filter {
+    pub(super) const fn of_slices(reach: fn(&Scene) -> Option<[u32; 2]>) -> Filter {
         Filter { reach, ..Filter::of(Chain::Slices) }
     }
 }
@@ -248,22 +248,22 @@ pub fn once(_: &Scene) -> u32 {
     1
 }
 
-pub fn no_constants(_: &Scene, _: &DispatchArgs) -> Vec<(&'static str, i32)> {
+pub(super) fn no_constants(_: &Scene, _: &DispatchArgs) -> Vec<(&'static str, i32)> {
     Vec::new()
 }
 
 /// One invocation per texel of a slice.
-pub fn slice_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+pub(super) fn slice_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.grid.size[0], scene.grid.size[1], 1]
 }
 
 /// One invocation per pixel.
-pub fn picture_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+pub(super) fn picture_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.picture_size()[0], scene.picture_size()[1], 1]
 }
 
 /// One invocation per ray: stages 2 and 3.
-pub fn ray_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
+pub(super) fn ray_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.ray_size()[0], scene.ray_size()[1], 1]
 }
 
@@ -310,7 +310,7 @@ impl Params {
         self
     }
 
-    pub fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
+    pub(super) fn vec4(mut self, name: &'static str, value: [f64; 4]) -> Params {
         self.0.push((name, Value::Vec4(value.map(finite))));
         self
     }
@@ -322,7 +322,7 @@ impl Params {
 }
 
 /// The rays of a scene, as every shader that casts or retraces them names them.
-pub fn ray_params(scene: &Scene) -> Params {
+pub(super) fn ray_params(scene: &Scene) -> Params {
     let rays = &scene.rays;
     Params::default()
         .vec3("origin", rays.origin)

@@ -316,17 +316,17 @@ impl Slot {
     }
 
     /// True if each of the volume images has its own copy.
-    pub fn is_multibuffered(self) -> bool {
+    pub(crate) fn is_multibuffered(self) -> bool {
         self.descriptor().is_multibuffered
     }
 
     /// True if texels that no pass writes are read as 0.
-    pub fn starts_clear(self) -> bool {
+    pub(crate) fn starts_clear(self) -> bool {
         self.descriptor().starts_clear
     }
 
     /// True if different queues use it where the device has several.
-    pub fn crosses_queues(self) -> bool {
+    pub(crate) fn crosses_queues(self) -> bool {
         self.descriptor().crosses_queues
     }
 
@@ -390,7 +390,7 @@ impl Format {
         }
     }
 
-    pub fn channel_bytes(self) -> usize {
+    pub(super) fn channel_bytes(self) -> usize {
         match self {
             Format::R8 | Format::Rgba8 => 1,
             Format::R16 | Format::Rg16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
@@ -398,7 +398,7 @@ impl Format {
         }
     }
 
-    pub fn texel_bytes(self) -> usize {
+    pub(crate) fn texel_bytes(self) -> usize {
         self.channels() * self.channel_bytes()
     }
 }

@@ -95,7 +95,7 @@ fn ranges() -> Vec<Bind> {
 
 /// The level that no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that the detector
 /// cannot fire where q is below the lower threshold.
-pub fn quiet_level(scene: &Scene) -> f64 {
+pub(in crate::passes) fn quiet_level(scene: &Scene) -> f64 {
     let surface = &scene.settings.surface;
     let threshold = surface.threshold.min(surface.rough_threshold.unwrap_or(surface.threshold));
     // Larger than 0, which means exact zeros.

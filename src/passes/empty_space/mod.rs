@@ -19,7 +19,7 @@ const MAX_DISTANCE: u32 = 16;
 
 /// How a ray caster skips empty space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Skipping {
+pub(in crate::passes) enum Skipping {
     /// Not at all: it takes every sample.
     None,
     /// By the kinds of bricks and the distance to the nearest brick of another kind, in this slot.
@@ -50,12 +50,12 @@ impl Skipping {
 }
 
 /// How the surface detector skips empty space.
-pub fn surface_skipping(scene: &Scene) -> Skipping {
+pub(in crate::passes) fn surface_skipping(scene: &Scene) -> Skipping {
     if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
 }
 
 /// How compositing and projections skip empty space.
-pub fn volume_skipping(scene: &Scene) -> Skipping {
+pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Skipping {
     match scene.settings.mode {
         _ if !scene.skips() => Skipping::None,
         Mode::Mip | Mode::MinIp => Skipping::Ranges,

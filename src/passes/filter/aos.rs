@@ -9,7 +9,7 @@ use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scheme};
 
 /// Dispatches of one step: rows forward and backward, columns forward and backward.
-pub const DISPATCHES: u32 = 4;
+const DISPATCHES: u32 = 4;
 
 const TOLERANCE: Tolerance = Tolerance {
     absolute: 3e-5,

@@ -6,7 +6,7 @@ use crate::scene::{ColourMap, Scene, transfer};
 use glam::DVec3;
 
 /// Opacity of a cross-line: the anatomy below it stays visible.
-pub const LINE_STRENGTH: f64 = 0.7;
+pub(in crate::passes) const LINE_STRENGTH: f64 = 0.7;
 
 pub const PASS: Pass = Pass {
     name: "tone",
