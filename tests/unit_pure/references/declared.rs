@@ -185,7 +185,7 @@ fn shaders_get_the_numbers_that_the_references_go_by() {
     let expected = [("range", 0.5), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "enhanced_sigma_slice"), expected);
     assert_eq!(numbers(&scene, "growth_slice"), expected);
-    let expected = [("RADIUS", 3), ("LARGEST", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0)];
+    let expected = [("RADIUS", 3), ("MAX_RADIUS", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0)];
     assert_eq!(constants(&scene, "enhanced_sigma_slice", 0), expected);
     assert_eq!(numbers(&scene, "perona_malik_slice"), [("edge", 0.5), ("lambda", 0.125), ("slice", 1.0)]);
     assert_eq!(constants(&scene, "perona_malik_slice", 0), [("CONDUCTANCE", 1)]);
