@@ -147,7 +147,7 @@ impl Session {
     fn apply_pending(&mut self) -> Result<(), GpuError> {
         let Some(next) = self.pending.take() else { return Ok(()) };
         let scene = next.of(&self.backward);
-        if !self.renderer.is_other(&scene) {
+        if !self.renderer.differs_from(&scene) {
             drop(scene);
             self.views = next;
             self.display.invalidate();
@@ -232,7 +232,7 @@ impl Session {
             return Ok(refused.or_else(|| self.to_restore.take().map(Begun::Restore)).unwrap_or(Begun::Nothing));
         };
         let scene = self.views.of(&self.backward);
-        if self.renderer.is_other(&scene) {
+        if self.renderer.differs_from(&scene) {
             self.renderer.change(scene.into_owned())?;
         }
         self.renderer.begin_picture()?;

@@ -131,7 +131,7 @@ impl Stream {
         let result = self.advance(patience);
         // A renderer that cannot draw any more is made anew with the next geometry.
         if result.is_err()
-            && let Some(Session { pool, .. }) = self.session.take_if(|session| session.renderer.is_broken())
+            && let Some(Session { pool, .. }) = self.session.take_if(|session| session.renderer.needs_rebuild())
         {
             self.previous_pool = Some(pool);
         }
@@ -313,12 +313,12 @@ impl Stream {
         }
         self.cine.discard_partial();
         let mut pool = VolumePool::new(self.options.update, self.options.images, slices);
-        let options = gpu::Options {
+        let options = gpu::RendererOptions {
             volume_images: pool.images(),
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
-            ..gpu::Options::default()
+            ..gpu::RendererOptions::default()
         };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
         if let Some(previous) = self.previous_pool.take() {

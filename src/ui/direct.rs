@@ -5,7 +5,7 @@ use super::devices::{DeviceMessage, Devices};
 use super::input::Input;
 use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
 use super::window::MakeConsole;
-use crate::gpu::window::{PresentMode, Screen, Target, display};
+use crate::gpu::window::{MonitorChoice, PresentMode, Screen, Target, monitor_size};
 use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ const CURSOR_TIME: Duration = Duration::from_secs(3);
 /// How to show the console on a monitor.
 pub struct DirectOptions {
     /// The monitor and its mode.
-    pub monitor: display::Wanted,
+    pub monitor: MonitorChoice,
     pub present_mode: PresentMode,
     /// Grabs the input devices, so that no other program gets their events, such as the text console behind.
     pub grab: bool,
@@ -34,8 +34,8 @@ pub fn run(
     mut make: Box<MakeConsole>,
 ) -> Result<(Console, Arc<Context>), GpuError> {
     let output = Output { device, target: Target::Monitor(shape.monitor.clone()), present_mode: shape.present_mode };
-    let context = Context::showing(device, &output.target)?;
-    let size = display::size(&context, &shape.monitor)?;
+    let context = Context::for_presentation(device, &output.target)?;
+    let size = monitor_size(&context, &shape.monitor)?;
     let screen = Screen::new(&context, output.target.clone(), size, shape.present_mode)?;
     let devices =
         Devices::open(size, shape.grab).map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
@@ -55,7 +55,7 @@ pub fn run(
 
 struct DirectLoop<'a> {
     output: Output<'a>,
-    monitor: display::Wanted,
+    monitor: MonitorChoice,
     devices: Devices,
     // The console is dropped before its context: it holds the screen.
     console: Console,
@@ -131,7 +131,7 @@ impl DirectLoop<'_> {
     /// Restores what is lost. By then the monitor may be another one, or in another mode.
     fn restore(&mut self, lost: Lost) -> Result<(), (Lost, GpuError)> {
         let monitor = &self.monitor;
-        let size = |context: &Context| display::size(context, monitor);
+        let size = |context: &Context| monitor_size(context, monitor);
         let size = self.output.restore(&mut self.console, &mut self.context, &size, lost)?;
         self.resize(size);
         Ok(())

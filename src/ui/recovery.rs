@@ -100,7 +100,7 @@ impl Output<'_> {
         // Drop the old one first: a window has one surface at a time.
         console.set_screen(None);
         if lost == Lost::Device {
-            *context = Context::showing(self.device, &self.target).map_err(still)?;
+            *context = Context::for_presentation(self.device, &self.target).map_err(still)?;
         }
         let size = size(context).map_err(still)?;
         let screen = Screen::new(context, self.target.clone(), size, self.present_mode).map_err(still)?;

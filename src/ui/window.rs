@@ -104,7 +104,7 @@ impl WindowLoop<'_> {
             return Ok(());
         }
         let window = self.new_window(events)?;
-        let context = Context::showing(self.device, &Target::Window(window.clone()))?;
+        let context = Context::for_presentation(self.device, &Target::Window(window.clone()))?;
         let size = size_of(&window);
         let screen = Screen::new(&context, Target::Window(window.clone()), size, self.options.present_mode)?;
         let mut console = (self.make)(&context, size, window.scale_factor() as f32, self.wake.clone());

@@ -216,13 +216,13 @@ impl Console {
             None => screen.show(panels),
         };
         match presented {
-            Ok(PresentOutcome::Shown) => {
+            Ok(PresentOutcome::Presented) => {
                 (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
                 self.present_retry_at = None;
                 self.measure_input_latency();
             }
             // Try again when the window asks for it, or after a moment.
-            Ok(PresentOutcome::Nowhere) => self.present_retry_at = Some(now + PRESENT_RETRY),
+            Ok(PresentOutcome::NotPresentable) => self.present_retry_at = Some(now + PRESENT_RETRY),
             Err(lost) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
             Err(fault) => return Err(ConsoleError::Screen(fault)),
         }

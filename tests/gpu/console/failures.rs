@@ -2,7 +2,7 @@
 
 use super::*;
 use ash::vk;
-use echolume::gpu::faults::Seam;
+use echolume::gpu::faults::InjectionPoint;
 
 /// Prevents a console that ends with its probe, or needs to be told that it is back.
 #[test]
@@ -66,7 +66,9 @@ fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
 /// Prevents a console that goes down with its device, or shows something else on the next one.
 #[test]
 fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
-    for (seam, is_frozen) in [(Seam::Submit, true), (Seam::Submit, false), (Seam::Wait, true)] {
+    for (seam, is_frozen) in
+        [(InjectionPoint::Submit, true), (InjectionPoint::Submit, false), (InjectionPoint::Wait, true)]
+    {
         let (device, other) = (Device::new(), Device::new());
         let mut desk = Desk::new(&device, options());
         desk.begin();
@@ -102,7 +104,7 @@ fn memory_that_runs_out_anywhere_is_got_over() {
         let sources = Arc::new(Mutex::new(Vec::new()));
         let mut desk =
             Desk::of(&device, ConsoleOptions { retry: Some(Duration::from_millis(5)), ..options() }, sources.clone());
-        device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         // What is opened again says all of it again, and none of them ends by itself.
         let mut speak = Vec::new();
         for _ in 0..4 {
@@ -119,7 +121,7 @@ fn memory_that_runs_out_anywhere_is_got_over() {
         }
         desk.rest();
         reached += usize::from(sources.lock().expect("lock").len() < 3);
-        device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "allocation {n}");
     }
     assert!(reached > 2, "{reached}");

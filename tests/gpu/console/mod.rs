@@ -193,7 +193,7 @@ impl Desk {
 pub fn headless(device: &Arc<Context>, settings: &Settings, frames: &[Frame]) -> Picture {
     let views = Views::new(&header(0.3), settings, Update::Whole).expect("views");
     let scene = views.of(&vec![frames[0].backward; frames.len()]).into_owned();
-    let mut renderer = Renderer::new(device, scene, &gpu::Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(device, scene, &gpu::RendererOptions::default()).expect("renderer");
     frames.iter().for_each(|f| renderer.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
     renderer.show(0).expect("show");
     renderer.picture().expect("picture")

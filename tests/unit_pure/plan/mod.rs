@@ -92,15 +92,15 @@ fn a_plan_explains_itself() {
     assert_eq!(line("+ aos_slice"), "+ aos_slice 8 x 1 x 1, each frame, 8 times: asked for");
     assert_eq!(line("+ tone"), "+ tone 5 x 4 x 1, each picture: every picture ends in 8 bits");
     assert_eq!(line("- sigma_slice"), "- sigma_slice not asked for");
-    // Eight dispatches of three shaders, each told once.
+    // Eight dispatches of three shaders, each listed once.
     assert_eq!(line("filter/aos_forward.plane"), "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward");
     assert_eq!(line("filter/aos_backward.rows"), "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows");
     assert!(line("samples of the volume").contains("fastest"));
     assert_eq!(
-        line("seen"),
-        "seen: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
+        line("visible"),
+        "visible: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
     );
-    assert_eq!(line("in all"), "in all 2352 bytes");
+    assert_eq!(line("total"), "total 2352 bytes");
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod random_source;
 use super::*;
 use crate::common::own_process;
 use ash::vk;
-use echolume::gpu::faults::Seam;
+use echolume::gpu::faults::InjectionPoint;
 use echolume::ui::input::Phase;
 use echolume::ui::keys::KEY_BINDINGS;
 use echolume::ui::sliders::SLIDERS;
@@ -163,10 +163,10 @@ impl Monkey {
             }
             4 => {
                 let n = self.below(30) as u32;
-                self.device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+                self.device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
             }
             5 if self.below(4) == 0 => {
-                let (n, seam) = (self.below(6) as u32, [Seam::Submit, Seam::Wait][self.below(2)]);
+                let (n, seam) = (self.below(6) as u32, [InjectionPoint::Submit, InjectionPoint::Wait][self.below(2)]);
                 self.device.faults.inject(seam, n, vk::Result::ERROR_DEVICE_LOST);
             }
             6 => self.desk.console.redraw(),
@@ -201,7 +201,7 @@ impl Monkey {
 
     /// No failure is planned any more, the volume of a source of ours is shown as at the start, and drawn as by itself.
     fn rest(&mut self) {
-        self.device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        self.device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         self.calm.store(true, Ordering::Relaxed);
         self.desk.console.input(&Input::FocusLost);
         self.desk.console.input(&Input::Modifiers(Modifiers::default()));

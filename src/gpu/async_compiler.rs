@@ -1,7 +1,7 @@
-//! Pipelines made on a thread of their own, so that a view goes on with what it has meanwhile.
+//! Compiles pipelines on a background thread, so that drawing goes on meanwhile.
 
-use super::{Key, Pipelines};
-use crate::gpu::GpuError;
+use super::error::GpuError;
+use super::pipelines::{Key, Pipelines};
 use crate::passes::{DispatchArgs, Pass};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -11,7 +11,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// Tells whoever sleeps that there is something to look at.
+/// Wakes the event loop of a view.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 struct Job {
@@ -21,7 +21,7 @@ struct Job {
     args: DispatchArgs,
 }
 
-/// The thread, and what it was asked for.
+/// A thread that compiles pipelines, and its requests.
 pub struct AsyncPipelineCompiler {
     jobs: Option<Sender<Job>>,
     thread: Option<JoinHandle<()>>,
@@ -31,10 +31,10 @@ pub struct AsyncPipelineCompiler {
 }
 
 impl AsyncPipelineCompiler {
-    /// `wake` is called when something was made.
+    /// `wake` is called after each pipeline.
     ///
     /// # Errors
-    /// A thread that cannot be started.
+    /// The thread cannot be started.
     pub fn new(pipelines: &Arc<Pipelines>, wake: Option<Wake>) -> Result<AsyncPipelineCompiler, GpuError> {
         let (jobs, asked_for) = channel::<Job>();
         let faults = Arc::new(Mutex::new(HashMap::new()));
@@ -45,9 +45,9 @@ impl AsyncPipelineCompiler {
                 if over.load(Ordering::Relaxed) {
                     break;
                 }
-                let is_new = pipelines.there(&key).is_none();
+                let is_new = pipelines.cached(&key).is_none();
                 match pipelines.get(pass, &scene, &args) {
-                    Ok(_) => drop(pipelines.context.counts.beside.fetch_add(is_new.into(), Ordering::Relaxed)),
+                    Ok(_) => drop(pipelines.context.counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed)),
                     Err(fault) => drop(theirs.lock().unwrap_or_else(|e| e.into_inner()).insert(key, fault.to_string())),
                 }
                 if let Some(wake) = &wake {
@@ -56,21 +56,22 @@ impl AsyncPipelineCompiler {
             }
         };
         let thread = std::thread::Builder::new().name("pipelines".into()).spawn(work);
-        let thread = thread.map_err(|e| GpuError::Memory { doing: "start a thread".into(), fault: e.to_string() })?;
+        let thread =
+            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
         Ok(AsyncPipelineCompiler { jobs: Some(jobs), thread: Some(thread), asked: HashSet::new(), stop, faults })
     }
 
-    /// Whether everything that a scene's plan needs is made; what is not is made from now on.
+    /// True if every pipeline of a plan is compiled; requests those that are not.
     ///
     /// # Errors
-    /// Something of it cannot be made.
+    /// A pipeline that could not be compiled.
     pub fn prepare(&mut self, pipelines: &Pipelines, plan: &Plan, scene: &Scene) -> Result<bool, GpuError> {
         let mut shared = None;
         let mut is_ready = true;
         for step in &plan.steps {
             let args = step.args();
             let key = Pipelines::key(step.pass, scene, &args);
-            if pipelines.there(&key).is_some() {
+            if pipelines.cached(&key).is_some() {
                 continue;
             }
             if let Some(fault) = self.faults.lock().unwrap_or_else(|e| e.into_inner()).get(&key) {
@@ -79,7 +80,7 @@ impl AsyncPipelineCompiler {
             is_ready = false;
             if self.asked.insert(key.clone()) {
                 let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
-                // A thread that broke down makes nothing more: what it lacks is then made at its use.
+                // If the thread has died, pipelines are compiled at their first use.
                 let sent =
                     self.jobs.as_ref().is_some_and(|j| j.send(Job { key, pass: step.pass, scene, args }).is_ok());
                 is_ready |= !sent;

@@ -1,26 +1,27 @@
-//! Which device to use: what each one is, what it lacks, and why it was or was not picked.
+//! Device selection: the properties of each device, what it lacks, and which one is used.
 
-use super::GpuError;
+use super::error::GpuError;
 use ash::vk;
 use std::borrow::Cow;
 use std::ffi::CStr;
 
-/// A device as the user names it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Choice {
-    /// The best that lacks nothing.
+/// The device that a user asks for.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub enum DeviceChoice {
+    /// The best device that lacks no required feature.
+    #[default]
     Best,
     /// By its number in `echolume devices`.
     Number(usize),
-    /// By a part of its name, in any case.
+    /// By a part of its name, ignoring case.
     Name(String),
 }
 
-impl std::str::FromStr for Choice {
+impl std::str::FromStr for DeviceChoice {
     type Err = std::convert::Infallible;
 
-    fn from_str(text: &str) -> Result<Choice, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Choice::Name(text.to_string()), Choice::Number))
+    fn from_str(text: &str) -> Result<DeviceChoice, Self::Err> {
+        Ok(text.parse().map_or_else(|_| DeviceChoice::Name(text.to_string()), DeviceChoice::Number))
     }
 }
 
@@ -32,36 +33,36 @@ pub struct Candidate {
     pub kind: vk::PhysicalDeviceType,
     pub driver: String,
     pub version: u32,
-    /// What is required and not there.
-    pub lacks: Vec<Cow<'static, str>>,
-    /// What is optional and not there.
-    pub without: Vec<&'static str>,
-    /// The queues that are used: the first renders, the second takes frames in, the third copies them, as far as there are such.
-    pub queues: Vec<QueueOf>,
-    /// Time stamps can be put on the host's clock.
-    pub calibrated: bool,
-    /// Descriptors can be pushed.
-    pub pushes: bool,
-    /// Shader invocations can be counted.
-    pub statistics: bool,
-    /// Pictures can be shown on a window, with panels drawn over them.
-    pub presents: bool,
+    /// Required features that the device lacks.
+    pub missing: Vec<Cow<'static, str>>,
+    /// Optional features that the device lacks, with the consequence.
+    pub missing_optional: Vec<&'static str>,
+    /// The queues to use: the first renders, the second (if any) ingests frames, the third (if any) copies them.
+    pub queues: Vec<QueueInfo>,
+    /// Time stamps can be converted to the host's clock.
+    pub calibrated_timestamps: bool,
+    /// Supports push descriptors.
+    pub push_descriptors: bool,
+    /// Can count shader invocations.
+    pub pipeline_statistics: bool,
+    /// Can present pictures, with panels drawn over them.
+    pub can_present: bool,
     pub limits: vk::PhysicalDeviceLimits,
-    /// Largest allocation and largest buffer, whichever is less.
+    /// The smaller of the largest allocation and the largest buffer, bytes.
     pub max_bytes: u64,
 }
 
 /// A queue of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct QueueOf {
+pub struct QueueInfo {
     pub family: u32,
     /// Within its family.
     pub index: u32,
-    /// Of its time stamps; 0 for none.
+    /// Valid bits of its time stamps; 0 without time stamps.
     pub valid_bits: u32,
     pub computes: bool,
     pub draws: bool,
-    /// Whether it copies single slices of a 3D image, and not only all of it.
+    /// True if it can copy single slices of a 3D image; otherwise only complete images.
     pub copies_slices: bool,
 }
 
@@ -70,12 +71,12 @@ impl Candidate {
         self.kind == vk::PhysicalDeviceType::CPU
     }
 
-    /// Its memory is the machine's.
-    pub fn shares_memory(&self) -> bool {
+    /// True if it shares the machine's memory.
+    pub fn has_unified_memory(&self) -> bool {
         self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
     }
 
-    /// Of the time stamps of the queue that renders; 0 for none.
+    /// Valid bits of the time stamps of the rendering queue; 0 without time stamps.
     pub fn valid_bits(&self) -> u32 {
         self.queues.first().map_or(0, |q| q.valid_bits)
     }
@@ -110,7 +111,7 @@ impl Candidate {
 pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     // SAFETY: the instance is alive; the call only reads.
     let handles = unsafe { instance.enumerate_physical_devices() }
-        .map_err(|result| GpuError::Vulkan { doing: "list devices".into(), result })?;
+        .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;
     Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
 }
 
@@ -131,9 +132,9 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }.unwrap_or_default();
     let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
 
-    let mut presents = has(ash::khr::swapchain::NAME);
-    let mut lacks = Vec::new();
-    let mut need = |there: bool, name: &'static str| (!there).then(|| lacks.push(name.into()));
+    let mut can_present = has(ash::khr::swapchain::NAME);
+    let mut missing = Vec::new();
+    let mut need = |there: bool, name: &'static str| (!there).then(|| missing.push(name.into()));
     need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
     if properties.api_version >= vk::API_VERSION_1_3 {
         let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
@@ -149,38 +150,41 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
         need(v13.synchronization2 == vk::TRUE, "synchronization2");
         need(v13.maintenance4 == vk::TRUE, "maintenance4");
-        presents &= v13.dynamic_rendering == vk::TRUE;
+        can_present &= v13.dynamic_rendering == vk::TRUE;
     }
     let queues = queues(&families);
     need(!queues.is_empty(), "a compute queue");
     let valid_bits = queues.first().map_or(0, |q| q.valid_bits);
-    let mut without = Vec::new();
+    let mut missing_optional = Vec::new();
     match queues.len() {
-        0 | 1 => without.push("an asynchronous compute queue: frames are taken in between pictures, not beside them"),
-        2 => without.push("a transfer queue: frames are copied where they are converted"),
+        0 | 1 => missing_optional
+            .push("an asynchronous compute queue: frames are converted between pictures, not in parallel with them"),
+        2 => missing_optional.push("a transfer queue: frames are copied on the queue that converts them"),
         _ => {}
     }
     if valid_bits == 0 {
-        without.push("time stamps: no times are printed");
+        missing_optional.push("time stamps: no times are printed");
     }
-    let calibrated = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
-    if !calibrated {
-        without.push("VK_EXT_calibrated_timestamps: a trace puts the device's times beside the host's by guess");
+    let calibrated_timestamps = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
+    if !calibrated_timestamps {
+        missing_optional
+            .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
     }
-    let pushes = has(ash::khr::push_descriptor::NAME);
-    if !pushes {
-        without.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
+    let push_descriptors = has(ash::khr::push_descriptor::NAME);
+    if !push_descriptors {
+        missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
     }
     // SAFETY: as above.
-    let statistics = unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
-    if !statistics {
-        without.push("pipelineStatisticsQuery: invocations are not counted");
+    let pipeline_statistics =
+        unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
+    if !pipeline_statistics {
+        missing_optional.push("pipelineStatisticsQuery: invocations are not counted");
     }
-    if !presents {
-        without.push("VK_KHR_swapchain and dynamicRendering: nothing is shown on a window");
+    if !can_present {
+        missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
     }
     if !has(ash::ext::memory_budget::NAME) {
-        without.push("VK_EXT_memory_budget");
+        missing_optional.push("VK_EXT_memory_budget");
     }
     Candidate {
         handle,
@@ -188,24 +192,24 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         kind: properties.device_type,
         driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
         version: properties.api_version,
-        lacks,
-        without,
+        missing,
+        missing_optional,
         queues,
-        calibrated,
-        pushes,
-        statistics,
-        presents,
+        calibrated_timestamps,
+        push_descriptors,
+        pipeline_statistics,
+        can_present,
         limits: properties.limits,
-        // A driver older than 1.3 leaves this 0; it is refused anyway.
+        // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
 }
 
-/// The queues to use: one that computes, best with graphics too, since that one may show pictures; another that computes, best one
-/// that does nothing else; and one that only copies.
-fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
+/// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
+/// without graphics; and one for transfers only.
+fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
     let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
-    let of = |family: usize, index: u32| QueueOf {
+    let of = |family: usize, index: u32| QueueInfo {
         family: family as u32,
         index,
         valid_bits: families[family].timestamp_valid_bits,
@@ -223,7 +227,7 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
     let only_computes =
         |f: &vk::QueueFamilyProperties| f.queue_flags.contains(compute) && !f.queue_flags.contains(graphics);
     match find(&only_computes).filter(|f| *f != first) {
-        Some(beside) => queues.push(of(beside, 0)),
+        Some(family) => queues.push(of(family, 0)),
         None if families[first].queue_count > 1 => queues.push(of(first, 1)),
         None => return queues,
     }
@@ -234,34 +238,37 @@ fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueOf> {
     queues
 }
 
-/// The number of the chosen device.
-pub fn choose(candidates: &[Candidate], choice: &Choice) -> Result<usize, GpuError> {
+/// The index of the chosen device.
+///
+/// # Errors
+/// No such device, or one that lacks a required feature.
+pub fn choose(candidates: &[Candidate], choice: &DeviceChoice) -> Result<usize, GpuError> {
     let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
     if candidates.is_empty() {
         return Err(GpuError::NoDevice);
     }
     let missing = |wanted: String| GpuError::NoSuchDevice { wanted, there: names() };
     let index = match choice {
-        Choice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
-        Choice::Name(name) => {
+        DeviceChoice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
+        DeviceChoice::Name(name) => {
             let part = name.to_lowercase();
             let found = candidates.iter().position(|c| !part.is_empty() && c.name.to_lowercase().contains(&part));
             found.ok_or_else(|| missing(name.clone()))?
         }
-        Choice::Best => {
-            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.lacks.is_empty());
+        DeviceChoice::Best => {
+            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.missing.is_empty());
             let best = fitting.min_by_key(|(_, c)| c.rank()).map(|(i, _)| i);
             best.ok_or_else(|| GpuError::NoneFits(all_lacks(candidates)))?
         }
     };
-    match candidates[index].lacks.is_empty() {
+    match candidates[index].missing.is_empty() {
         true => Ok(index),
         false => Err(GpuError::NoneFits(all_lacks(&candidates[index..=index]))),
     }
 }
 
 fn all_lacks(candidates: &[Candidate]) -> String {
-    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.lacks.join(", "))).collect::<Vec<_>>().join("; ")
+    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.missing.join(", "))).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]
@@ -275,28 +282,28 @@ mod tests {
             kind,
             driver: String::new(),
             version: vk::API_VERSION_1_3,
-            lacks: lacks.into_iter().map(Cow::from).collect(),
-            without: vec![],
+            missing: lacks.into_iter().map(Cow::from).collect(),
+            missing_optional: vec![],
             queues: vec![],
-            calibrated: true,
-            pushes: true,
-            statistics: true,
-            presents: true,
+            calibrated_timestamps: true,
+            push_descriptors: true,
+            pipeline_statistics: true,
+            can_present: true,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }
     }
 
     #[test]
-    fn the_best_device_is_a_gpu_that_lacks_nothing_and_software_comes_last() {
+    fn the_best_device_is_a_complete_gpu_and_software_comes_last() {
         let devices = [
             device("llvmpipe", vk::PhysicalDeviceType::CPU, vec![]),
             device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"]),
             device("Small", vk::PhysicalDeviceType::INTEGRATED_GPU, vec![]),
         ];
-        assert_eq!(choose(&devices, &Choice::Best).ok(), Some(2));
-        assert_eq!(choose(&devices[..2], &Choice::Best).ok(), Some(0));
-        assert_eq!(choose(&devices, &Choice::Name("PIPE".into())).ok(), Some(0));
+        assert_eq!(choose(&devices, &DeviceChoice::Best).ok(), Some(2));
+        assert_eq!(choose(&devices[..2], &DeviceChoice::Best).ok(), Some(0));
+        assert_eq!(choose(&devices, &DeviceChoice::Name("PIPE".into())).ok(), Some(0));
     }
 
     fn family(flags: vk::QueueFlags, queue_count: u32, depth: u32) -> vk::QueueFamilyProperties {
@@ -309,10 +316,10 @@ mod tests {
         }
     }
 
-    /// One queue in all (lavapipe); all in one family but several queues (Intel); families of their own (NVIDIA, AMD), of which one
-    /// that copies may only copy whole images.
+    /// A single queue (lavapipe); several queues in one family (Intel); separate families (NVIDIA, AMD), where the transfer family
+    /// may only copy complete images.
     #[test]
-    fn as_many_queues_are_used_as_there_are_for_different_work() {
+    fn one_queue_is_used_for_each_role_that_the_device_has_a_queue_for() {
         use vk::QueueFlags as Q;
         let all = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
         let families = |list: &[vk::QueueFamilyProperties]| -> Vec<(u32, u32)> {
@@ -328,11 +335,11 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_what_is_missing_or_what_is_there() {
+    fn an_error_names_the_missing_feature_or_the_devices() {
         let devices = [device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"])];
-        assert!(choose(&devices, &Choice::Best).unwrap_err().to_string().contains("maintenance4"));
-        assert!(choose(&devices, &Choice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
-        assert!(choose(&devices, &Choice::Number(7)).unwrap_err().to_string().contains("0 Old"));
-        assert!(matches!(choose(&[], &Choice::Best), Err(GpuError::NoDevice)));
+        assert!(choose(&devices, &DeviceChoice::Best).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(7)).unwrap_err().to_string().contains("0 Old"));
+        assert!(matches!(choose(&[], &DeviceChoice::Best), Err(GpuError::NoDevice)));
     }
 }

@@ -1,23 +1,19 @@
-//! What a shader becomes: a layout bound by reflected names, and a pipeline for each set of constants.
-
-mod async_compiler;
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants.
 
 use super::context::Context;
-use super::error::Doing;
+use super::error::{ErrorContext, GpuError};
+use super::formats::{self, TexelAccess};
 use super::resources::has_texels;
-use super::{Candidate, GpuError, formats};
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
-use crate::scene::{Sampling, Scene};
+use crate::scene::Scene;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-pub use async_compiler::{AsyncPipelineCompiler, Wake};
-
-/// A compute pipeline and what it is bound by.
+/// A compute pipeline and its layout.
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
@@ -26,51 +22,22 @@ pub struct Pipeline {
     pub handle: vk::Pipeline,
 }
 
-/// Shader, constants, and the formats of what is read: those of storage images are part of the module.
-type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
+pub(super) type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
-/// How single texels are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fetch {
-    /// `texelFetch` from textures, as the shaders say.
-    Textures,
-    /// `imageLoad` from storage images and texel buffers: the modules are rewritten.
-    Storage,
-}
-
-impl Fetch {
-    /// What is fast on a device. One that is a CPU sends every fetch through its sampler in software; a GPU's textures have
-    /// caches of their own.
-    pub fn of(candidate: &Candidate) -> Fetch {
-        if candidate.is_software() { Fetch::Storage } else { Fetch::Textures }
-    }
-
-    /// What `auto` sampling is then.
-    pub fn sampling(self) -> Sampling {
-        if self == Fetch::Storage { Sampling::Quads } else { Sampling::Hardware }
-    }
-
-    pub fn words(self) -> &'static str {
-        match self {
-            Fetch::Textures => "texels by texelFetch",
-            Fetch::Storage => "texels by imageLoad",
-        }
-    }
-}
-
-/// Where the words of a shader come from; embedded unless hot reload compiles them.
+/// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
-/// Every pipeline made so far, by shader and constants: going back to an earlier setting compiles nothing.
+/// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
 pub struct Pipelines {
-    context: Arc<Context>,
+    pub(super) context: Arc<Context>,
     made: Mutex<HashMap<Key, Arc<Pipeline>>>,
     shaders: Arc<Shaders>,
-    fetch: Fetch,
+    texel_access: TexelAccess,
     sampler: vk::Sampler,
 }
 
-/// The shaders that are part of the program.
+/// The embedded shaders.
 pub fn embedded() -> Arc<Shaders> {
     Arc::new(|name| {
         spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
@@ -89,7 +56,11 @@ pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
 }
 
 impl Pipelines {
-    pub fn new(context: &Arc<Context>, shaders: Arc<Shaders>, fetch: Fetch) -> Result<Pipelines, GpuError> {
+    pub fn new(
+        context: &Arc<Context>,
+        shaders: Arc<Shaders>,
+        texel_access: TexelAccess,
+    ) -> Result<Pipelines, GpuError> {
         let create = vk::SamplerCreateInfo::default()
             .mag_filter(context.faults.filter())
             .min_filter(context.faults.filter())
@@ -97,33 +68,33 @@ impl Pipelines {
             .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
         // SAFETY: the create structure is complete.
-        let sampler = unsafe { context.device.create_sampler(&create, None) }.doing(|| "create sampler".into())?;
+        let sampler = unsafe { context.device.create_sampler(&create, None) }.context(|| "create sampler".into())?;
         context.name(sampler, "trilinear");
-        Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, fetch, sampler })
+        Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, texel_access, sampler })
     }
 
-    fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
+    pub(super) fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
         (pass.shader(scene, args), (pass.constants)(scene, args), formats)
     }
 
-    fn there(&self, key: &Key) -> Option<Arc<Pipeline>> {
+    pub(super) fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
     }
 
-    /// The pipeline of a pass in a scene; made at its first use.
+    /// The pipeline of a pass in a scene, compiled at its first use.
     ///
     /// # Errors
-    /// A shader that is not there, or that disagrees with the pass's declaration.
+    /// A shader that does not exist, or that disagrees with the declaration of the pass.
     pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let key = Pipelines::key(pass, scene, args);
-        if let Some(pipeline) = self.there(&key) {
+        if let Some(pipeline) = self.cached(&key) {
             return Ok(pipeline);
         }
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
-        if self.fetch == Fetch::Storage {
+        if self.texel_access == TexelAccess::Storage {
             let stores = |slot: Slot| match slot.shape(scene) {
                 Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
                 _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
@@ -133,9 +104,9 @@ impl Pipelines {
         self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
-        let told = self.context.faults.constants(pass.name, &key.1);
-        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &told, &words, module)?);
-        // Another thread may have made it meanwhile: both serve.
+        let constants = self.context.faults.constants(pass.name, &key.1);
+        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module)?);
+        // Another thread may have made the same pipeline meanwhile; either can be used.
         self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
         Ok(pipeline)
     }
@@ -159,7 +130,7 @@ impl Pipeline {
         module: Module,
     ) -> Result<Pipeline, GpuError> {
         let device = &context.device;
-        let doing = || format!("create pipeline '{name}'");
+        let operation = || format!("create pipeline '{name}'");
         let samplers = [sampler];
         let bindings: Vec<_> = module
             .bindings
@@ -179,7 +150,7 @@ impl Pipeline {
         };
         let create = vk::DescriptorSetLayoutCreateInfo::default().flags(flags).bindings(&bindings);
         // SAFETY: the structures are complete and outlive the calls; a failure below drops `pipeline`, which frees what is made.
-        let set_layout = unsafe { device.create_descriptor_set_layout(&create, None) }.doing(doing)?;
+        let set_layout = unsafe { device.create_descriptor_set_layout(&create, None) }.context(operation)?;
         let mut pipeline = Pipeline {
             context: context.clone(),
             module,
@@ -190,12 +161,12 @@ impl Pipeline {
         let layouts = [set_layout];
         let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: as above.
-        pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.doing(doing)?;
+        pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.context(operation)?;
         context.name(set_layout, name);
         context.name(pipeline.layout, name);
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
         let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
-            .doing(doing)?;
+            .context(operation)?;
         context.name(shader, name);
         let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
             .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
@@ -216,9 +187,9 @@ impl Pipeline {
         // SAFETY: as above; the shader module is alive until after the call.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
         context.counts.pipelines.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: a module may go once its pipelines are made.
+        // SAFETY: a shader module may be destroyed once its pipelines are made.
         unsafe { device.destroy_shader_module(shader, None) };
-        pipeline.handle = made.map_err(|(_, result)| result).doing(doing)?[0];
+        pipeline.handle = made.map_err(|(_, result)| result).context(operation)?[0];
         context.name(pipeline.handle, name);
         tracing::debug!("pipeline '{name}' {constants:?}");
         Ok(pipeline)

@@ -1,80 +1,78 @@
-//! From what each operation touches to the barriers between them. One rule: where an operation conflicts with one that came
-//! before and no barrier lies between, a global memory barrier goes in front of it; nowhere else. The order is a ring: a
-//! tracker lives as long as its slots, so the end of one picture feeds the start of the next.
-
-pub mod oracle;
+//! Derives pipeline barriers from the memory accesses of each operation. There is one rule: if an operation conflicts with an earlier
+//! one and no barrier separates them, a global memory barrier is placed before it. A tracker lives as long as its slots, so the
+//! accesses of one picture also count for the next.
 
 use crate::passes::{DispatchArgs, Part, Pass, Slot};
 use crate::scene::Scene;
 use std::ops::Range;
 
-/// What a barrier orders accesses of. Volume images that take turns are told apart by their index.
+/// A resource whose accesses are ordered. Each image of a multibuffered slot is a resource of its own, by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Resource {
     Slot(Slot, u32),
-    /// The buffer that results come back in.
+    /// The buffer for results that the host reads.
     Readback,
 }
 
-/// Who touches it.
+/// The pipeline stage of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Worker {
+pub enum PipelineStage {
     Compute,
     Copy,
     Host,
 }
 
-/// A set of workers.
+/// A set of pipeline stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Workers(u8);
+pub struct PipelineStages(u8);
 
-impl Workers {
-    /// What runs on the device. The host is left out: making memory visible to it can cost a cache flush, so only a host
-    /// access asks for it.
-    pub const DEVICE: Workers = Workers(0b011);
+impl PipelineStages {
+    /// All stages on the device. The host is not included: making memory visible to it can cost a cache flush, so only a host access
+    /// requests it.
+    pub const DEVICE: PipelineStages = PipelineStages(0b011);
 
-    pub fn has(self, worker: Worker) -> bool {
-        self.0 & Workers::from(worker).0 != 0
+    pub fn has(self, worker: PipelineStage) -> bool {
+        self.0 & PipelineStages::from(worker).0 != 0
     }
 
-    pub fn without(self, worker: Worker) -> Workers {
-        Workers(self.0 & !Workers::from(worker).0)
+    pub fn without(self, worker: PipelineStage) -> PipelineStages {
+        PipelineStages(self.0 & !PipelineStages::from(worker).0)
     }
 
-    fn with(self, other: Workers) -> Workers {
-        Workers(self.0 | other.0)
-    }
-}
-
-impl From<Worker> for Workers {
-    fn from(worker: Worker) -> Workers {
-        Workers(1 << worker as u8)
+    pub fn with(self, other: PipelineStages) -> PipelineStages {
+        PipelineStages(self.0 | other.0)
     }
 }
 
-/// One access of an operation: the parts are slices of a 3D image, layers of an array, or the one part of anything else.
+impl From<PipelineStage> for PipelineStages {
+    fn from(worker: PipelineStage) -> PipelineStages {
+        PipelineStages(1 << worker as u8)
+    }
+}
+
+/// One memory access of an operation. The parts are slices of a 3D image or layers of an array; anything else has a single part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
     pub resource: Resource,
     pub parts: Range<u32>,
     pub write: bool,
-    pub by: Worker,
+    pub stage: PipelineStage,
 }
 
-/// A global memory barrier: everything `from` did so far is done and visible to whatever `to` does next.
+/// A global memory barrier: all earlier accesses of the stages `from` are complete and visible to all later ones of the stages `to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Barrier {
-    pub from: Workers,
-    pub to: Workers,
+    pub from: PipelineStages,
+    pub to: PipelineStages,
 }
 
 impl Access {
-    pub fn of_slot(slot: Slot, image: u32, parts: Range<u32>, write: bool, by: Worker) -> Access {
-        Access { resource: Resource::Slot(slot, image), parts, write, by }
+    pub fn of_slot(slot: Slot, image: u32, parts: Range<u32>, write: bool, stage: PipelineStage) -> Access {
+        Access { resource: Resource::Slot(slot, image), parts, write, stage }
     }
 
-    /// Two accesses whose order matters. Slices of a 3D image are no sub-resources to Vulkan: two writers of different slices
-    /// may overlap, but a reader (who may filter across slices, and whose caches know no slices) and a writer may not.
+    /// True if the order of two accesses matters. Slices of a 3D image are not subresources in Vulkan: two writers of different slices
+    /// may overlap, but a reader, which may filter across slices, and a writer may not.
     pub fn conflicts(&self, later: &Access) -> bool {
         if self.resource != later.resource || !(self.write || later.write) {
             return false;
@@ -85,7 +83,7 @@ impl Access {
     }
 }
 
-/// What a dispatch of a pass touches.
+/// The memory accesses of a dispatch.
 pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> {
     let access = |bind: crate::passes::Bind, write| {
         let parts = match bind.part {
@@ -98,59 +96,59 @@ pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> 
             }
         };
         let image = if bind.slot.is_multibuffered() { args.image } else { 0 };
-        Access::of_slot(bind.slot, image, parts, write, Worker::Compute)
+        Access::of_slot(bind.slot, image, parts, write, PipelineStage::Compute)
     };
     let reads = pass.reads(scene, args).into_iter().map(|b| access(b, false));
     let writes = pass.writes(scene, args).into_iter().map(|b| access(b, true));
     reads.chain(writes).collect()
 }
 
-/// Accesses that no barrier has covered yet.
+/// Tracks the accesses that no barrier has covered yet.
 #[derive(Clone, Debug, Default)]
-pub struct Tracker {
-    pending: Vec<(Access, Workers)>,
-    /// Something that was recorded may never have run.
-    unsure: bool,
+pub struct BarrierTracker {
+    pending: Vec<(Access, PipelineStages)>,
+    /// Some recorded operations may never have run.
+    is_invalid: bool,
 }
 
-impl Tracker {
-    /// The barrier that must come before an operation with these accesses, if any; the operation is then taken as recorded.
-    pub fn before(&mut self, accesses: &[Access]) -> Option<Barrier> {
+impl BarrierTracker {
+    /// Records an operation with these accesses. Returns the barrier that it needs before it, if any.
+    pub fn record(&mut self, accesses: &[Access]) -> Option<Barrier> {
         let hazard = accesses.iter().any(|later| {
-            self.pending.iter().any(|(earlier, covered)| !covered.has(later.by) && earlier.conflicts(later))
+            self.pending.iter().any(|(earlier, covered)| !covered.has(later.stage) && earlier.conflicts(later))
         });
-        let barrier = (hazard || self.unsure).then(|| self.barrier(accesses));
+        let barrier = (hazard || self.is_invalid).then(|| self.barrier(accesses));
         for access in accesses {
-            self.record(access);
+            self.add(access);
         }
         barrier
     }
 
-    /// What was recorded last was not submitted, so its barriers do not count: the next operation waits for everything.
-    pub fn doubt(&mut self) {
-        self.unsure = true;
+    /// The last recording was not submitted, so its barriers do not count: the next operation waits for everything.
+    pub fn invalidate(&mut self) {
+        self.is_invalid = true;
     }
 
     fn barrier(&mut self, accesses: &[Access]) -> Barrier {
-        let to = accesses.iter().fold(Workers::DEVICE, |to, a| to.with(a.by.into()));
-        let before = if self.unsure { Workers::DEVICE } else { Workers::default() };
-        let from = self.pending.iter().fold(before, |from, (a, _)| from.with(a.by.into()));
-        self.unsure = false;
+        let to = accesses.iter().fold(PipelineStages::DEVICE, |to, a| to.with(a.stage.into()));
+        let before = if self.is_invalid { PipelineStages::DEVICE } else { PipelineStages::default() };
+        let from = self.pending.iter().fold(before, |from, (a, _)| from.with(a.stage.into()));
+        self.is_invalid = false;
         for (_, covered) in &mut self.pending {
             *covered = covered.with(to);
         }
-        // Only the readback buffer is ever touched by the host while the device runs.
+        // The host only accesses the readback buffer while the device runs.
         self.pending.retain(|(access, covered)| match access.resource {
-            Resource::Readback => !covered.has(Worker::Host),
+            Resource::Readback => !covered.has(PipelineStage::Host),
             Resource::Slot(..) => false,
         });
         Barrier { from, to }
     }
 
-    fn record(&mut self, access: &Access) {
-        let known = self.pending.iter().any(|(a, covered)| a == access && *covered == Workers::default());
-        if !known {
-            self.pending.push((access.clone(), Workers::default()));
+    fn add(&mut self, access: &Access) {
+        let is_pending = self.pending.iter().any(|(a, covered)| a == access && *covered == PipelineStages::default());
+        if !is_pending {
+            self.pending.push((access.clone(), PipelineStages::default()));
         }
     }
 }
@@ -162,15 +160,16 @@ mod tests {
 
     type Operation = Vec<Access>;
 
-    /// A second opinion, with nothing in common with the tracker: every pair of conflicting operations must have a barrier
-    /// between them that goes from the first one's worker to the second one's.
+    /// An independent check: every pair of conflicting operations must be separated by a barrier from the stage of the first to the stage
+    /// of the second.
     fn uncovered(operations: &[Operation], barriers: &[Option<Barrier>]) -> Option<(usize, usize)> {
         for (j, later) in operations.iter().enumerate() {
             for (i, earlier) in operations[..j].iter().enumerate() {
                 for a in earlier {
                     for b in later.iter().filter(|b| needs_order(a, b)) {
                         let between = &barriers[i + 1..=j];
-                        if !between.iter().flatten().any(|barrier| barrier.from.has(a.by) && barrier.to.has(b.by)) {
+                        if !between.iter().flatten().any(|barrier| barrier.from.has(a.stage) && barrier.to.has(b.stage))
+                        {
                             return Some((i, j));
                         }
                     }
@@ -188,8 +187,8 @@ mod tests {
     }
 
     fn derive(operations: &[Operation]) -> Vec<Option<Barrier>> {
-        let mut tracker = Tracker::default();
-        operations.iter().map(|o| tracker.before(o)).collect()
+        let mut tracker = BarrierTracker::default();
+        operations.iter().map(|o| tracker.record(o)).collect()
     }
 
     fn operation() -> impl Strategy<Value = Operation> {
@@ -197,9 +196,14 @@ mod tests {
         let accesses = prop::collection::vec(device, 1..4);
         (accesses, 0u8..8).prop_map(|(accesses, kind)| {
             if kind == 0 {
-                return vec![Access { resource: Resource::Readback, parts: 0..1, write: false, by: Worker::Host }];
+                return vec![Access {
+                    resource: Resource::Readback,
+                    parts: 0..1,
+                    write: false,
+                    stage: PipelineStage::Host,
+                }];
             }
-            let by = if kind < 3 { Worker::Copy } else { Worker::Compute };
+            let stage = if kind < 3 { PipelineStage::Copy } else { PipelineStage::Compute };
             accesses
                 .into_iter()
                 .map(|(slot, image, from, count, write)| {
@@ -211,7 +215,7 @@ mod tests {
                         _ => Resource::Readback,
                     };
                     let parts = if slot < 2 { from..from + count } else { 0..1 };
-                    Access { resource, parts, write: write || slot == 4, by }
+                    Access { resource, parts, write: write || slot == 4, stage }
                 })
                 .collect()
         })
@@ -260,7 +264,7 @@ mod tests {
             for slice in 0..6 {
                 let args = DispatchArgs { layer: slice % 4, slice, image, ..DispatchArgs::default() };
                 let layer = args.layer..args.layer + 1;
-                operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, Worker::Copy)]);
+                operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy)]);
                 run(Frequency::Frame, args, &mut operations);
             }
             run(
@@ -281,46 +285,46 @@ mod tests {
     }
 
     fn touch(slot: Slot, parts: Range<u32>, write: bool) -> Access {
-        Access::of_slot(slot, 0, parts, write, Worker::Compute)
+        Access::of_slot(slot, 0, parts, write, PipelineStage::Compute)
     }
 
     #[test]
     fn two_slices_may_be_written_at_once_but_not_read_while_one_is_written() {
-        let mut tracker = Tracker::default();
-        assert!(tracker.before(&[touch(Slot::Volume, 0..1, true)]).is_none());
-        assert!(tracker.before(&[touch(Slot::Volume, 1..2, true)]).is_none());
-        assert!(tracker.before(&[touch(Slot::Volume, 1..2, true)]).is_some(), "write after write, which layers miss");
-        assert!(tracker.before(&[touch(Slot::Volume, 3..4, false)]).is_some());
+        let mut tracker = BarrierTracker::default();
+        assert!(tracker.record(&[touch(Slot::Volume, 0..1, true)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Volume, 1..2, true)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Volume, 1..2, true)]).is_some(), "write after write, which layers miss");
+        assert!(tracker.record(&[touch(Slot::Volume, 3..4, false)]).is_some());
     }
 
     #[test]
     fn after_a_failed_submission_the_next_operation_waits_for_everything() {
-        let mut tracker = Tracker::default();
-        assert!(tracker.before(&[touch(Slot::Picture, 0..1, true)]).is_none());
-        tracker.doubt();
-        let barrier = tracker.before(&[touch(Slot::Distance, 0..1, false)]).expect("a barrier");
-        assert_eq!((barrier.from, barrier.to), (Workers::DEVICE, Workers::DEVICE));
-        assert!(tracker.before(&[touch(Slot::Distance, 0..1, false)]).is_none());
+        let mut tracker = BarrierTracker::default();
+        assert!(tracker.record(&[touch(Slot::Picture, 0..1, true)]).is_none());
+        tracker.invalidate();
+        let barrier = tracker.record(&[touch(Slot::Distance, 0..1, false)]).expect("a barrier");
+        assert_eq!((barrier.from, barrier.to), (PipelineStages::DEVICE, PipelineStages::DEVICE));
+        assert!(tracker.record(&[touch(Slot::Distance, 0..1, false)]).is_none());
     }
 
     #[test]
     fn layers_of_an_array_do_not_wait_for_one_another() {
-        let mut tracker = Tracker::default();
-        let copy = |layer: u32| Access::of_slot(Slot::Frames, 0, layer..layer + 1, true, Worker::Copy);
-        assert!(tracker.before(&[copy(0)]).is_none());
-        assert!(tracker.before(&[copy(1)]).is_none());
-        assert!(tracker.before(&[touch(Slot::Frames, 0..1, false)]).is_some());
-        assert!(tracker.before(&[copy(2)]).is_none());
-        assert!(tracker.before(&[copy(0)]).is_some(), "write after read");
+        let mut tracker = BarrierTracker::default();
+        let copy = |layer: u32| Access::of_slot(Slot::Frames, 0, layer..layer + 1, true, PipelineStage::Copy);
+        assert!(tracker.record(&[copy(0)]).is_none());
+        assert!(tracker.record(&[copy(1)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Frames, 0..1, false)]).is_some());
+        assert!(tracker.record(&[copy(2)]).is_none());
+        assert!(tracker.record(&[copy(0)]).is_some(), "write after read");
     }
 
     #[test]
-    fn volume_images_that_take_turns_are_independent() {
-        let mut tracker = Tracker::default();
-        let on = |image, write| Access::of_slot(Slot::Volume, image, 0..4, write, Worker::Compute);
-        assert!(tracker.before(&[on(0, true)]).is_none());
-        assert!(tracker.before(&[on(1, true)]).is_none());
-        assert!(tracker.before(&[on(0, false)]).is_some());
-        assert!(tracker.before(&[on(1, false)]).is_none(), "the barrier before covered both");
+    fn multibuffered_volume_images_are_independent() {
+        let mut tracker = BarrierTracker::default();
+        let on = |image, write| Access::of_slot(Slot::Volume, image, 0..4, write, PipelineStage::Compute);
+        assert!(tracker.record(&[on(0, true)]).is_none());
+        assert!(tracker.record(&[on(1, true)]).is_none());
+        assert!(tracker.record(&[on(0, false)]).is_some());
+        assert!(tracker.record(&[on(1, false)]).is_none(), "the barrier before covered both");
     }
 }
