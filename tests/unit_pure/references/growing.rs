@@ -179,8 +179,8 @@ fn shares_of_growth_count_what_a_line_passes_through_and_sum_to_one() {
     let growing = |e: &str| slices([4, 2], &format!("enhanced_sigma = {{ {e}, growth = true }}"));
     // Cartesian: every pixel. Beyond the largest window, and before the first, there is nothing.
     let map = rows([[0.0, 1.0, 1.0, 2.0], [0.0, -1.0, 2.0, 9.0]]);
-    assert_eq!(growth::shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
-    assert_eq!(growth::shares(&growing("window = 5, largest = 5"), &map), [1.0]);
+    assert_eq!(growth_shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
+    assert_eq!(growth_shares(&growing("window = 5, largest = 5"), &map), [1.0]);
     // Only pixels inside the sector: outside, every window would have grown by one.
     let probe = Probe { motion: Motion::Translated, slices: Axis::centred(1.0, 3), ..wobbler() };
     let filters = "slices = { pixels = 40, enhanced_sigma = { window = 3, largest = 7, growth = true } }";
