@@ -288,16 +288,17 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     }
     if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
         // Empty space must be consistent with the volume.
-        let leaps = empty_space_of(scene, bricks.slot, inputs.get("volume"));
-        inputs.insert("bricks", leaps);
+        let distances = empty_space_of(scene, bricks.slot, inputs.get("volume"));
+        inputs.insert("bricks", distances);
     }
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
-        let mut quads = Arrays::default();
+        let mut packed = Arrays::default();
         let channels = Slot::PackedNeighbours.format(scene).channels();
-        quads.insert("packed_neighbours", Texels::untouched(shape_size(Slot::PackedNeighbours.shape(scene)), channels));
+        packed
+            .insert("packed_neighbours", Texels::untouched(shape_size(Slot::PackedNeighbours.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut quads);
-        inputs.insert("packed_neighbours", quads.get("packed_neighbours").clone());
+        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut packed);
+        inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());
     }
     inputs
 }

@@ -36,7 +36,7 @@ fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
     }
     let smoothed = scene(voxels([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
-    assert_eq!(pass("median_slice").link_slots(&smoothed, &args(0)), Some((Slot::SliceA, Slot::SharpVolume)));
+    assert_eq!(self::link(&smoothed, "median_slice", 0), (Slot::SliceA, Slot::SharpVolume));
 }
 
 #[test]
