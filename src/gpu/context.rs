@@ -20,8 +20,9 @@ const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 const TIMELINE_VALIDATION: u32 = vk::make_api_version(0, 1, 3, 297);
 
 /// Which device a [`Context`] uses, and how.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ContextOptions {
+    /// The device. The default is the best one.
     pub device: DeviceChoice,
     /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
     pub validation: bool,

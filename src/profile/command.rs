@@ -10,7 +10,7 @@ use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest profile that is read, bytes.
-const LONGEST: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
@@ -156,6 +156,6 @@ impl Profile {
 
 fn read(file: &Path) -> Result<model::Profile, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, LONGEST, "profile").map_err(|e| fault(&e))?;
+    let text = read_text(file, MAX_BYTES, "profile").map_err(|e| fault(&e))?;
     model::Profile::from_json(&text).map_err(|e| fault(&e))
 }
