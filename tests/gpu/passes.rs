@@ -1,4 +1,4 @@
-//! Every pass alone against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
+//! Every pass separately against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
 //! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
 
 use crate::common::gpu::*;
@@ -14,7 +14,7 @@ use echolume::verify::report::Level;
 use echolume::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
 
-/// What `echolume verify --full` does of passes: every input in every scene.
+/// The pass checks of `echolume verify --full`: every input in every scene.
 #[test]
 fn every_pass_matches_its_reference() {
     let device = Device::new();
@@ -32,22 +32,22 @@ fn every_pass_matches_its_reference() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// How texels are read may cost time, never a bit: every pass that reads some, in every format and variant that the scenes have.
+/// The method of reading texels may change the time, but no bit: every pass that reads some, in every format and variant of the scenes.
 #[test]
-fn texels_loaded_are_the_texels_fetched() {
+fn storage_loads_and_texture_fetches_give_the_same_texels() {
     let device = Device::new();
     let ways = [TexelAccess::Textures, TexelAccess::Storage];
     let mut singles = ways.map(|fetch| PassRunner::with_texel_access(&device, fetch).expect("single"));
     let (mut seen, mut loaded) = (HashSet::new(), 0);
     for (name, mut scene) in scenes() {
-        // Automatic sampling would be another for each way.
+        // Automatic sampling would differ between the two methods.
         if scene.settings.ray.sampling == Sampling::Auto {
             (scene.settings.ray.sampling, scene.sampling) = (Sampling::Exact, Sampling::Exact);
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             let reads: Vec<_> =
                 (pass.reads)(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
-            // Once with each shader and the formats of what it reads: that is what is rewritten.
+            // Once for each shader and formats of its inputs: these determine the rewritten shader.
             if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
@@ -91,7 +91,7 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
 }
 
 #[test]
-fn what_measures_the_device_computes_what_it_says() {
+fn device_measurements_compute_the_stated_result() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
     for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
@@ -110,7 +110,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let mut single = PassRunner::new(&device).expect("single");
     let base = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\n{ALL_FILTERS}"));
     let lit = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'sr'\n{ALL_FILTERS}"));
-    // What the reference is told differs from what the device is told, by one small thing.
+    // Reference and device differ by one small change.
     let mut half_pixel = base.clone();
     half_pixel.rays.origin += half_pixel.rays.right * 0.3;
     let mut half_slice_pixel = base.clone();
@@ -170,7 +170,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
 }
 
 #[test]
-fn what_is_outside_the_sector_is_not_touched() {
+fn texels_outside_the_sector_are_not_written() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");

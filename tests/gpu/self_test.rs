@@ -1,4 +1,4 @@
-//! Whether the self-test of `echolume verify` can fail. That what it plants is detection is `cli`'s to say.
+//! The self-test of `echolume verify` can fail. The tests of `cli` check that its injected faults are caught.
 
 use crate::common::gpu::chosen;
 use echolume::gpu::ContextOptions;
@@ -10,7 +10,7 @@ fn options() -> ContextOptions {
     ContextOptions { device: chosen(), validation: false }
 }
 
-/// Looked at with `--nocapture`: which check detection what.
+/// For output with `--nocapture`: which check caught which fault.
 fn told(detection: &Detection) {
     println!(
         "{:5.2} s  {:36} {}: {}",
@@ -21,9 +21,9 @@ fn told(detection: &Detection) {
     );
 }
 
-/// Prevents that everything is called detection.
+/// Prevents a self-test that reports everything as caught.
 #[test]
-fn a_fault_without_effect_is_reported_as_uncaught() {
+fn an_injected_fault_without_effect_is_reported_as_uncaught() {
     let faults = [
         InjectedFault {
             name: "nowhere",

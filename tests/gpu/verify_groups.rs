@@ -1,5 +1,5 @@
-//! The groups of `echolume verify` that look at the whole program: each notices what it is there to notice. That all of
-//! them pass is `cli`'s to say.
+//! The groups of `echolume verify` that check the complete program: each detects its faults. The tests of `cli` check that all of
+//! them pass.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
@@ -16,13 +16,13 @@ fn bench() -> DeviceUnderTest {
     prepared(None)
 }
 
-/// A bench with something wrong in every context.
+/// A bench with a fault in every context.
 fn prepared(wrong: Option<fn(&Context)>) -> DeviceUnderTest {
     let options = ContextOptions { device: chosen(), validation: true };
     DeviceUnderTest::prepared(&options, Level::Quick, wrong).expect("bench")
 }
 
-/// The one check of that name.
+/// The only check of that name.
 fn named(checks: Vec<Check>, name: &str) -> Vec<Check> {
     let mut checks = checks;
     checks.retain(|check| check.name == name);
@@ -30,7 +30,7 @@ fn named(checks: Vec<Check>, name: &str) -> Vec<Check> {
     checks
 }
 
-/// Runs checks; what failed, in words.
+/// Runs checks. Returns the failures as text.
 fn failures(bench: &mut DeviceUnderTest, checks: &[Check]) -> Vec<String> {
     let tell = |outcome: &Outcome| {
         println!("{}: {} {:.2} s {:?}", outcome.group, outcome.name, outcome.seconds, outcome.verdict);
@@ -53,9 +53,9 @@ fn spans(first: [f64; 2], second: [f64; 2]) -> Vec<Span> {
     ]
 }
 
-/// A program that says something else than this one, or nothing, or is not there.
+/// A program with another output than this one, or with none, or that does not exist.
 #[test]
-fn other_bits_of_another_number_of_threads_are_seen() {
+fn a_result_that_depends_on_the_number_of_threads_is_detected() {
     let mut bench = bench();
     if !bench.context.candidate.name.contains("llvmpipe") {
         return;
@@ -85,7 +85,7 @@ fn other_bits_of_another_number_of_threads_are_seen() {
 }
 
 #[test]
-fn a_picture_that_differs_by_one_bit_is_seen() {
+fn a_picture_that_differs_by_one_bit_is_detected() {
     let mut bench = bench();
     let modes = bench.modes().expect("pictures");
     let mut other = modes[3].picture.clone();
@@ -97,16 +97,16 @@ fn a_picture_that_differs_by_one_bit_is_seen() {
     assert!(found.faults[0].what.contains("1 of") && found.pictures.len() == 1, "{:?}", found.faults);
 }
 
-/// A pass that is left out leaves its output as it was: zeros, that look like a dark picture.
+/// A skipped pass does not change its output: zeros, which look like a dark picture.
 #[test]
-fn an_output_that_is_not_written_is_seen() {
+fn an_output_that_is_not_written_is_detected() {
     let mut bench = prepared(Some(|context| context.faults.slow_down("light", 0)));
     let seen = failures(&mut bench, &named(verify::memory::checks(Level::Quick), "every mode on poisoned memory"));
     assert!(seen.iter().any(|fault| fault.contains("'picture' are never written")), "{seen:?}");
 }
 
 #[test]
-fn memory_that_is_not_given_back_is_seen() {
+fn leaked_memory_is_detected() {
     let context: Arc<Context> = bench().context.clone();
     let before = context.allocated();
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }");
@@ -119,9 +119,9 @@ fn memory_that_is_not_given_back_is_seen() {
     assert_eq!(found.faults.len(), 1);
 }
 
-/// A volume that lies half a voxel aside.
+/// A volume that is shifted by half a voxel.
 #[test]
-fn a_picture_that_is_not_the_reference_s_is_seen() {
+fn a_picture_unlike_the_reference_is_detected() {
     use verify::formats::LargestDifference;
     use verify::render::stored_reference_picture;
     let bench = bench();
@@ -141,9 +141,9 @@ fn a_picture_that_is_not_the_reference_s_is_seen() {
     assert!(found.faults.len() == 1 && found.pictures.len() == 1, "{:?}", found.faults);
 }
 
-/// Each volume is sent into the image that is drawn, and not into the other.
+/// Each volume is sent into the image that is drawn, instead of the other one.
 #[test]
-fn two_volumes_in_one_image_are_seen() {
+fn two_volumes_in_one_image_are_detected() {
     let bench = bench();
     let mut found = Findings::default();
     let into_the_same = |round: usize| round as u32 % 2;
@@ -152,9 +152,9 @@ fn two_volumes_in_one_image_are_seen() {
     assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
 }
 
-/// What is planted here is seen by the known answers; each that fails has pictures of one size that differ.
+/// The known answers detect the injected faults; each failure has two different pictures of the same size.
 #[test]
-fn a_known_answer_that_is_another_is_shown() {
+fn a_wrong_known_answer_is_shown() {
     let sound = bench();
     for planted in verify::self_test::faults().filter(|p| ["stale slice", "shifted half pixel"].contains(&p.name)) {
         let mut bench = sound.with_fault(planted.change).expect("bench");
@@ -168,7 +168,7 @@ fn a_known_answer_that_is_another_is_shown() {
             assert_eq!(size, (shown.expected.width, shown.expected.height));
             let fault = &outcome.faults[shown.fault.expect("its fault")];
             assert!(fault.worst.is_some() || fault.what.contains("miss a surface"), "{fault:?}");
-            // A millionth is in the numbers, and in no picture of 8 bits.
+            // A millionth is visible in the numbers, but in no picture of 8 bits.
             let is_large = fault.worst.as_ref().is_none_or(|w| (w.expected - w.got).abs() > 1e-3);
             let is_shown = shown.difference.rgba.chunks_exact(4).any(|texel| texel[0] > 0);
             assert!(is_shown || !is_large, "{}: {fault:?}", outcome.name);
@@ -176,9 +176,9 @@ fn a_known_answer_that_is_another_is_shown() {
     }
 }
 
-/// A tile of a picture is less than one in a hundred of its values: of all of them 2 may be far off, of a tile's half.
+/// A tile is less than one hundredth of a picture: 2 of all values may be far off, but half of a tile.
 #[test]
-fn one_lost_workgroup_of_a_picture_is_seen() {
+fn one_lost_workgroup_is_detected() {
     let grey = Picture { width: 80, height: 64, rgba: vec![128; 4 * 80 * 64] };
     let judged = |first: u32, size: [u32; 2]| {
         let (mut found, mut got) = (Findings::default(), grey.clone());
@@ -211,9 +211,9 @@ fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
     assert!(outside > 0.5, "the device's clock is another");
 }
 
-/// A frame of something else arrives before each picture.
+/// A frame of another body arrives before each picture.
 #[test]
-fn a_renderer_that_draws_otherwise_than_a_fresh_one_is_seen_by_the_stress() {
+fn a_renderer_unlike_a_fresh_one_is_detected_by_the_stress_check() {
     let spoil = |renderer: &mut Renderer, image: u32| {
         let frame = vec![200; renderer.frame_bytes()];
         renderer.frame(4, &frame, image)

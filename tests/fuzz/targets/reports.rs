@@ -1,4 +1,4 @@
-//! What an earlier run wrote, and ordinary pictures.
+//! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
 use echolume::error_report::{Measure, Report, choose, export as error_export};
@@ -55,7 +55,7 @@ pub fn picture(bytes: &[u8]) -> String {
     }
 }
 
-/// What is taken is written out and read back, does not differ from itself, and makes reports.
+/// An accepted run round-trips, does not differ from itself, and makes reports.
 pub fn verification(bytes: &[u8]) -> String {
     let run = match report::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(run) => run,

@@ -1,4 +1,4 @@
-//! Runs against earlier ones.
+//! Runs compared with earlier ones.
 
 use super::profile;
 use super::profile::Random;
@@ -16,7 +16,7 @@ fn told(compared: &BaselineComparison) -> Vec<(Class, String)> {
     compared.changes.iter().map(|c| (c.class, c.to_string())).collect()
 }
 
-/// A run with the errors of another and its own times, from the same one.
+/// Two runs with the same errors and different times of the same distribution.
 fn changed(change: impl Fn(&mut Run)) -> BaselineComparison {
     let old = run(1);
     let mut new = old.clone();
@@ -25,7 +25,7 @@ fn changed(change: impl Fn(&mut Run)) -> BaselineComparison {
 }
 
 #[test]
-fn a_run_against_itself_has_nothing_to_tell() {
+fn a_run_compared_with_itself_reports_nothing() {
     let mut same = run(1);
     fail(&mut same, "passes", "shade");
     check(&mut same, "passes", "tone").figures[0].value = f64::NAN;
@@ -36,7 +36,7 @@ fn a_run_against_itself_has_nothing_to_tell() {
 }
 
 #[test]
-fn an_error_that_grew_is_told_though_it_passes() {
+fn an_error_that_grew_is_reported_even_if_it_passes() {
     let grew = changed(|new| check(new, "passes", "raycast_volume").figures[0].value = 1.9);
     let line = "passes / raycast_volume: largest error 0.74 -> 1.9 levels, still under 2".to_string();
     assert_eq!(told(&grew), [(Class::Changed, line.clone())]);
@@ -46,7 +46,7 @@ fn an_error_that_grew_is_told_though_it_passes() {
 }
 
 #[test]
-fn an_error_that_left_its_tolerance_is_worse_and_so_is_one_that_is_no_number() {
+fn errors_beyond_their_tolerance_or_not_finite_are_worse() {
     for (value, shown) in [(2.5, "2.5"), (f64::NAN, "NaN"), (f64::INFINITY, "infinity")] {
         let left = changed(|new| check(new, "passes", "median").figures[0].value = value);
         let line = format!("passes / median: largest error 0.8 -> {shown} levels, now over 2");
@@ -87,7 +87,7 @@ fn what_fails_now_is_worse_and_what_passes_now_is_better() {
 }
 
 #[test]
-fn checks_and_figures_that_only_one_run_has_are_told() {
+fn checks_and_figures_of_only_one_run_are_reported() {
     let differing = changed(|new| {
         new.outcomes.retain(|o| o.name != "shadow" || o.group != "passes");
         new.outcomes.push(outcome("passes", "glow", Verdict::Passed));
@@ -110,7 +110,7 @@ fn checks_and_figures_that_only_one_run_has_are_told() {
 }
 
 #[test]
-fn a_terminal_is_told_of_every_check_that_is_worse_and_of_some_of_the_rest() {
+fn the_terminal_lists_every_worse_check_and_some_others() {
     let many = |value: f64| {
         let mut many = run(1);
         for i in 0..100 {
@@ -161,7 +161,7 @@ fn fourteen_percent_slower_is_worse_and_faster_is_better() {
 }
 
 #[test]
-fn slower_within_the_threshold_is_told_and_fails_nothing() {
+fn slower_within_the_threshold_is_reported_and_fails_nothing() {
     let quiet = profile::Noise { spread: 0.002, ..profile::Noise::default() };
     let timed = |seed: u64, factor: f64| {
         let mut run = run(1);
@@ -191,7 +191,7 @@ fn a_threshold_below_one_is_refused() {
 }
 
 #[test]
-fn too_few_times_and_times_of_another_device_are_not_judged_and_that_is_said() {
+fn too_few_times_and_other_devices_are_not_compared_and_reported() {
     let mut few = run(1);
     few.outcomes.iter_mut().flat_map(|o| &mut o.figures).for_each(|f| f.samples.truncate(3));
     let compared_few = compared(&run(1), &few);
@@ -237,7 +237,7 @@ fn other_levels_compare_what_both_have() {
 }
 
 #[test]
-fn the_words_have_the_worst_first() {
+fn the_text_lists_the_worst_first() {
     let both = changed(|new| {
         new.device.driver = "none 1.1".into();
         check(new, "passes", "median").figures[0].value = 1.0;

@@ -5,7 +5,7 @@ use echolume::verify::report::{Figure, Run, Unit};
 use echolume::verify::report::{MAX_OUTCOMES, MAX_SAMPLES, from_json, to_json};
 use proptest::prelude::*;
 
-/// The numbers that JSON knows no numbers for make runs unequal to themselves: equal by their text.
+/// Non-finite numbers make runs unequal to themselves: they are compared by their text.
 fn comes_back(run: &Run) {
     let text = to_json(run).expect("JSON");
     let again = from_json(&text).expect("run");
@@ -14,7 +14,7 @@ fn comes_back(run: &Run) {
 }
 
 #[test]
-fn a_run_comes_back_as_it_went() {
+fn a_run_round_trips_without_a_change() {
     let whole = run(1);
     assert_eq!(from_json(&to_json(&whole).expect("JSON")).expect("run"), whole);
     comes_back(&whole);
@@ -22,7 +22,7 @@ fn a_run_comes_back_as_it_went() {
 }
 
 #[test]
-fn what_is_not_a_number_is_a_finding_and_is_kept() {
+fn non_finite_findings_are_kept() {
     for (value, word) in [(f64::NAN, "NaN"), (f64::INFINITY, "Infinity"), (f64::NEG_INFINITY, "-Infinity")] {
         let mut run = run(2);
         fail(&mut run, "passes", "shade");
@@ -120,7 +120,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_run_comes_back(run in any_run()) {
+    fn any_run_round_trips(run in any_run()) {
         comes_back(&run);
     }
 

@@ -7,7 +7,7 @@ use echolume::verify::report::{Figure, Outcome, Unit, Verdict, summary};
 use proptest::prelude::*;
 
 #[test]
-fn a_failure_is_told_in_full() {
+fn a_failure_is_reported_in_full() {
     let mut run = run(1);
     fail(&mut run, "passes", "shade");
     let shade = check(&mut run, "passes", "shade");
@@ -111,7 +111,7 @@ fn times_become_their_median() {
 }
 
 #[test]
-fn no_text_drives_the_terminal() {
+fn no_text_controls_the_terminal() {
     assert_eq!(escaped("a\u{1b}[2J\n\u{202e}"), "a\\u{1b}[2J\\n\\u{202e}");
     assert_eq!(escaped("'quotes' and \"those\" \\ stay"), "'quotes' and \"those\" \\ stay");
     assert_eq!(escaped(&"x".repeat(5000)).len(), 604);
@@ -121,7 +121,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_run_is_told_in_lines(run in any_run()) {
+    fn any_run_is_reported_in_lines(run in any_run()) {
         let is_line = |text: &str| !text.chars().any(char::is_control);
         prop_assert!(is_line(&summary::summary(&run)));
         for (group, outcomes) in run.groups() {
