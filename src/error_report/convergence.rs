@@ -20,7 +20,7 @@ pub struct Range {
 
 /// Factor over the floor from which points are fitted. Squared errors add: at three times the floor the step's share is
 /// sqrt(1 - 1/9) = 94 % of the total.
-pub const ABOVE_FLOOR: f64 = 3.0;
+const ABOVE_FLOOR: f64 = 3.0;
 
 /// error = coefficient * step^order, by least squares on the logarithms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

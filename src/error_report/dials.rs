@@ -28,7 +28,7 @@ pub struct Dial {
 }
 
 /// Names of all dials.
-pub const NAMES: &[&str] = &[
+pub(crate) const NAMES: &[&str] = &[
     "step",
     "compositing",
     "format",

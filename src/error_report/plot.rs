@@ -310,7 +310,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         self.area.draw(&PathElement::new(points, self.styled(style))).map_err(|e| fault(&e))
     }
 
-    pub fn boxed(&self, [left, top, right, bottom]: Frame, style: impl Into<ShapeStyle>) -> Drawn {
+    pub(crate) fn boxed(&self, [left, top, right, bottom]: Frame, style: impl Into<ShapeStyle>) -> Drawn {
         let corners = [self.pixel([left, top]), self.pixel([right, bottom])];
         self.area.draw(&Rectangle::new(corners, self.styled(style))).map_err(|e| fault(&e))
     }
@@ -322,7 +322,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     }
 
     /// One of five shapes that differ without colour, about 9 pixels across.
-    pub fn mark(&self, at: [f64; 2], shape: usize, colour: RGBColor) -> Drawn {
+    pub(crate) fn mark(&self, at: [f64; 2], shape: usize, colour: RGBColor) -> Drawn {
         let polygon = |corners: &[[f64; 2]]| {
             let points: Vec<_> = corners.iter().map(|c| self.pixel([at[0] + c[0], at[1] + c[1]])).collect();
             self.area.draw(&Polygon::new(points, colour.filled())).map_err(|e| fault(&e))
@@ -346,7 +346,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     }
 
     /// Vertical text, read upwards, centred.
-    pub fn upright(&self, text: &str, at: [f64; 2], size: u32) -> Drawn {
+    pub(crate) fn upright(&self, text: &str, at: [f64; 2], size: u32) -> Drawn {
         let font = (FONT, size * self.medium.scale).into_font().transform(FontTransform::Rotate270);
         let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
         self.area.draw(&Text::new(text.to_string(), self.pixel(at), style)).map_err(|e| fault(&e))
@@ -459,11 +459,11 @@ struct Labels {
 }
 
 impl Labels {
-    pub fn keep_off(&mut self, at: [f64; 2], radius: f64) {
+    fn keep_off(&mut self, at: [f64; 2], radius: f64) {
         self.taken.push([at[0] - radius, at[1] - radius, at[0] + radius, at[1] + radius]);
     }
 
-    pub fn keep_off_line(&mut self, points: &[[f64; 2]]) {
+    fn keep_off_line(&mut self, points: &[[f64; 2]]) {
         for pair in points.windows(2) {
             let [dx, dy] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
             let count = (dx.hypot(dy) / 3.0).ceil().max(1.0);

@@ -344,7 +344,7 @@ fn comparison_row(line: &Line) -> Vec<String> {
 
 /// Pass times of one run as a table: one line per pass, the sum, and the acquisition floor if a probe swept the volume. Without
 /// time stamps no time is printed.
-pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
+pub(crate) fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
     let mut text = String::new();
     if measured.is_empty() {
         text.push_str("times: this device has no time stamps\n");
@@ -366,7 +366,7 @@ pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
 }
 
 /// A sentence with the acquisition floor: `seconds` is the travel time of sound for a volume, `sound_speed` in m/s.
-pub fn acquisition_floor(seconds: f64, sound_speed: f64) -> String {
+pub(crate) fn acquisition_floor(seconds: f64, sound_speed: f64) -> String {
     let ms = seconds * 1e3;
     format!("sound itself needs {ms:.1} ms for this volume ({sound_speed} m/s): no display is faster")
 }

@@ -15,10 +15,10 @@ use statistics::Sample;
 /// Version of the JSON format.
 pub const FORMAT: &str = "echolume-profile-2";
 /// The previous version, still read: it has no CPU time and no rotating camera.
-pub const FORMAT_BEFORE: &str = "echolume-profile-1";
+const FORMAT_BEFORE: &str = "echolume-profile-1";
 
 /// Target coverage of confidence intervals.
-pub const LEVEL: f64 = 0.95;
+pub(crate) const LEVEL: f64 = 0.95;
 
 /// Why a profile cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -213,7 +213,7 @@ impl PassProfile {
 
 impl Profile {
     /// True if the device has time stamps, so that passes have times.
-    pub fn has_time_stamps(&self) -> bool {
+    pub(crate) fn has_time_stamps(&self) -> bool {
         self.device.valid_bits > 0
     }
 

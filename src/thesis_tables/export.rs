@@ -11,7 +11,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// Tables 3-6 as CSV, one line per row; a missing time is an empty field.
-pub fn tables_csv(report: &Report) -> String {
+pub(crate) fn tables_csv(report: &Report) -> String {
     let mut text = String::from(
         "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
          stage_1_least_ms,stage_1_most_ms,surface_mm,surface_share,repeats,frames,lines,samples,volume,filter_3d,filter_2d,device,driver,date\n",
@@ -43,7 +43,7 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
 }
 
 /// Tables 7-9 as CSV, one line per picture, sigma, starting window and step of growth; shares in 0..1.
-pub fn growth_csv(grown: &[Grown]) -> String {
+pub(crate) fn growth_csv(grown: &[Grown]) -> String {
     let mut text = String::from("picture,sigma,window,largest,grew,share\n");
     for picture in grown {
         for row in &picture.rows {

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Half the edge of the rendered region across the beam, mm: at the depth of the surfaces all of it is within the sweep.
-pub const HALF_REGION: f64 = 45.0;
+const HALF_REGION: f64 = 45.0;
 /// Sigma of the 2D filter, mm.
 const SIGMA: f64 = 0.5;
 

@@ -13,15 +13,15 @@ use crate::profile::statistics::Sample;
 use growth::Grown;
 
 /// Conditions of the thesis (4.3) unless varied. Angle over the scan lines of a frame, deg.
-pub const SECTOR_ANGLE: f64 = 77.0;
+pub(crate) const SECTOR_ANGLE: f64 = 77.0;
 /// Angle over the frames of a volume, deg.
-pub const FAN_ANGLE: f64 = 61.0;
+pub(crate) const FAN_ANGLE: f64 = 61.0;
 /// Depth, mm.
 pub const DEPTH: f64 = 160.0;
 /// Samples per scan line.
-pub const SAMPLES: usize = 512;
+pub(crate) const SAMPLES: usize = 512;
 /// Speed of sound, m/s.
-pub const SOUND_SPEED: f64 = 1540.0;
+pub(crate) const SOUND_SPEED: f64 = 1540.0;
 /// Time that the thesis measured under these conditions, ms.
 const USUAL_MS: f64 = 54.6;
 
@@ -137,7 +137,7 @@ impl Table {
     }
 
     /// The same ratio of the figures of the thesis.
-    pub fn thesis_ratio(&self, row: &Row) -> Option<f64> {
+    pub(crate) fn thesis_ratio(&self, row: &Row) -> Option<f64> {
         self.rows.get(self.usual).map(|usual| row.thesis.ms / usual.thesis.ms)
     }
 }
@@ -208,7 +208,7 @@ pub struct Report {
 
 impl Report {
     /// True if any row has times.
-    pub fn has_times(&self) -> bool {
+    pub(crate) fn has_times(&self) -> bool {
         self.tables.iter().flat_map(|t| &t.rows).any(|r| !r.times.picture.is_empty())
     }
 }

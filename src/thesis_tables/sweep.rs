@@ -15,9 +15,9 @@ const WOBBLE_RADIUS: f64 = 25.0;
 /// Radius of the ball, mm: as wide as a fetal head.
 pub const BALL_RADIUS: f64 = 45.0;
 /// Depth of its centre below the face, mm.
-pub const BALL_DEPTH: f64 = 100.0;
+const BALL_DEPTH: f64 = 100.0;
 /// Depth of the wall below the face, mm.
-pub const WALL_DEPTH: f64 = 130.0;
+const WALL_DEPTH: f64 = 130.0;
 
 /// Value of samples in fluid, 0..1.
 const FLUID: f64 = 0.15;

@@ -244,7 +244,7 @@ impl DeviceUnderTest {
     }
 
     /// A run of these outcomes that ends now.
-    pub fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+    pub(crate) fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
         Run {
             format: FORMAT.into(),
             program: machine::program(),
@@ -294,7 +294,7 @@ impl IsolatedContext {
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
-    pub fn of_queues(dut: &DeviceUnderTest, queues: usize) -> Result<IsolatedContext, GpuError> {
+    pub(crate) fn of_queues(dut: &DeviceUnderTest, queues: usize) -> Result<IsolatedContext, GpuError> {
         let context = dut.another()?;
         Ok(IsolatedContext { hears_submissions: context.queue_count() >= queues, context })
     }
@@ -303,7 +303,7 @@ impl IsolatedContext {
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
-    pub fn of_changes(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
+    pub(crate) fn of_changes(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
         Ok(IsolatedContext { hears_submissions: false, context: dut.another()? })
     }
 
@@ -311,7 +311,10 @@ impl IsolatedContext {
     ///
     /// # Errors
     /// As [`DeviceUnderTest::another`].
-    pub fn lacking(dut: &DeviceUnderTest, change: impl FnOnce(&mut Context)) -> Result<IsolatedContext, GpuError> {
+    pub(crate) fn lacking(
+        dut: &DeviceUnderTest,
+        change: impl FnOnce(&mut Context),
+    ) -> Result<IsolatedContext, GpuError> {
         let mut isolated = IsolatedContext::new(dut)?;
         let own = Arc::get_mut(&mut isolated.context);
         own.map(change).ok_or(GpuError::Broken("the isolated context is shared".into()))?;
@@ -319,7 +322,7 @@ impl IsolatedContext {
     }
 
     /// Adds the validation messages as faults.
-    pub fn report_validation(&self, findings: &mut Findings) {
+    pub(crate) fn report_validation(&self, findings: &mut Findings) {
         let messages = credible_messages(&self.context, self.context.messages(), self.hears_submissions);
         findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
     }

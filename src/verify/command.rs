@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Longest baseline that is read, bytes.
+/// Maximum size of a baseline file, bytes.
 const MAX_BASELINE: u64 = 256 << 20;
 
 #[derive(clap::Args)]

@@ -138,11 +138,11 @@ pub fn compare_outputs(
 
 /// Maximum mean difference of a picture from its reference over the values that are near, levels of 255. Rounding causes some tenths
 /// of a level.
-pub const MAX_MEAN: f64 = 0.2;
+const MAX_MEAN: f64 = 0.2;
 /// Difference above which a value is far off, levels.
-pub const FAR_LEVELS: u8 = 8;
+const FAR_LEVELS: u8 = 8;
 /// Maximum share of values that are far off: edges may move by a pixel where a threshold of a detector or shadow is met.
-pub const MAX_FAR_SHARE: f64 = 0.02;
+pub(crate) const MAX_FAR_SHARE: f64 = 0.02;
 
 /// Edge of a tile, which one workgroup renders, pixels.
 const TILE: u32 = 8;
@@ -163,7 +163,7 @@ pub struct PictureDifference {
 }
 
 /// The difference of two pictures of equal size.
-pub fn picture_difference(expected: &Picture, got: &Picture) -> PictureDifference {
+pub(crate) fn picture_difference(expected: &Picture, got: &Picture) -> PictureDifference {
     let (mut sum, mut far, mut largest, mut at) = (0.0, 0, 0, 0);
     for (i, (e, g)) in expected.rgba.iter().zip(&got.rgba).enumerate() {
         let apart = e.abs_diff(*g);
@@ -246,7 +246,7 @@ pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Pictu
 }
 
 /// Records how many pictures were compared, and how many differ.
-pub fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
+pub(crate) fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
     let figure =
         |what: &str, value: usize, allowed| Figure { allowed, ..Figure::error(what, value as f64, 0.0, Unit::Count) };
     findings.figures.push(figure("pictures compared", compared, None));
@@ -256,7 +256,7 @@ pub fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usiz
 /// A comparison picture of one slice of two arrays, both with the same grey scale: the minimum and maximum expected value are black and
 /// white. Of four channels the first three are red, green and blue; of two channels the first is drawn. Misses and unwritten texels
 /// are black.
-pub fn texel_comparison(what: &str, expected: &Texels, got: &Texels, slice: usize) -> PictureComparison {
+pub(crate) fn texel_comparison(what: &str, expected: &Texels, got: &Texels, slice: usize) -> PictureComparison {
     let visible = |v: f64| v.is_finite() && is_hit(v.abs());
     let plane = expected.size[0] * expected.size[1] * expected.channels;
     let from = (slice * plane).min(expected.values.len().saturating_sub(plane));
@@ -294,7 +294,7 @@ pub fn texel_comparison(what: &str, expected: &Texels, got: &Texels, slice: usiz
 }
 
 /// A comparison picture of two pictures of equal size.
-pub fn picture_comparison(what: &str, expected: &Picture, got: &Picture) -> PictureComparison {
+pub(crate) fn picture_comparison(what: &str, expected: &Picture, got: &Picture) -> PictureComparison {
     let largest = expected.rgba.iter().zip(&got.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
     let gain = (255 / u32::from(largest.max(1))).clamp(1, 64);
     let apart = expected.rgba.iter().zip(&got.rgba).enumerate();
@@ -308,6 +308,6 @@ pub fn picture_comparison(what: &str, expected: &Picture, got: &Picture) -> Pict
 }
 
 /// An informative count without limit.
-pub fn count_figure(what: &str, value: usize) -> Figure {
+pub(crate) fn count_figure(what: &str, value: usize) -> Figure {
     Figure { allowed: None, ..Figure::error(what, value as f64, 0.0, Unit::Count) }
 }

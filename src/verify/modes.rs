@@ -109,7 +109,7 @@ fn views() -> Vec<(&'static str, Subject, &'static str)> {
 ///
 /// # Errors
 /// One line: a built-in scene is invalid.
-pub fn mode_views() -> Result<Vec<View>, String> {
+fn mode_views() -> Result<Vec<View>, String> {
     views().into_iter().map(|(name, of, toml)| view(name, of, toml)).collect()
 }
 

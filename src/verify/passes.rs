@@ -19,7 +19,7 @@ use std::collections::HashSet;
 pub const POISON: f64 = 0.654_321;
 
 /// Maximum mean signed error of a dispatch, as a share of the allowed error of a texel. Rounding errors have both signs.
-pub const MAX_BIAS: f64 = 0.1;
+const MAX_BIAS: f64 = 0.1;
 
 /// Maximum number of faults of one pass that are listed.
 const MAX_FAULTS: usize = 8;
@@ -91,7 +91,7 @@ fn check(dut: &mut DeviceUnderTest, n: usize, pass: &'static Pass) -> Result<Fin
 ///
 /// # Errors
 /// A device that fails.
-pub fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Result<Findings, GpuError> {
+pub(crate) fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Result<Findings, GpuError> {
     let mut sum = PassSummary::default();
     sum.add(dut, n, &PASSES[n], scene, true)?;
     Ok(sum.into_findings(&PASSES[n]))
@@ -184,7 +184,7 @@ impl PassSummary {
 
 /// Kinds of inputs: noise, all zero, all one, a single bright texel. Noise of distances is a smooth surface with cliffs and misses, of
 /// volumes blurred, so that it resembles tissue.
-pub const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
+pub(crate) const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
 
 fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
     let format = bind.slot.format(scene);

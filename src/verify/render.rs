@@ -73,7 +73,7 @@ pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
 }
 
 /// The picture by the f64 reference.
-pub fn reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
+pub(crate) fn reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
     let mut slots = reference::render(scene, frames);
     let screen = slots.remove(&Slot::Screen).unwrap_or_else(|| Texels::untouched([0; 3], 4));
     Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
