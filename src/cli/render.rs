@@ -109,7 +109,7 @@ impl Render {
         let measure = Measure::Rmse;
         let choice = choose::most_accurate_under(&report, measure, time, 0.1)
             .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
-        say!("budget {budget}: {}, measured on {}", choice.say(measure), report.device);
+        say!("budget {budget}: {}, measured on {}", choice.describe(measure), report.device);
         self.input.open_with(&choice.set)
     }
 

@@ -67,10 +67,10 @@ impl ErrorReport {
             write(&report, measure, folder)?;
         }
         if let Some(error) = self.under_error {
-            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.say(measure));
+            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.describe(measure));
         }
         if let Some(time) = time {
-            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.say(measure));
+            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.describe(measure));
         }
         Ok(())
     }

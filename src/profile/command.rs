@@ -90,7 +90,7 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let asked = measure::ProfileOptions {
+        let options = measure::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
@@ -102,7 +102,7 @@ impl Profile {
             Some(choice) => Some(open_device(Some(choice.clone()), false)?),
             None => None,
         };
-        let run = |context| measure::ProfileRun::new(context, &scene, &asked).map_err(failed);
+        let run = |context| measure::ProfileRun::new(context, &scene, &options).map_err(failed);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.needs_more() {
             first.repeat(&frames).map_err(failed)?;

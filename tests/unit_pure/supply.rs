@@ -1,5 +1,5 @@
-//! Where the crates that are built in come from, under which licences (what deny.toml says, held without cargo-deny), and which Rust
-//! they need. Known faults are looked for by tools/deny, where there is a network.
+//! The sources and licences of the crates, by the rules of deny.toml and without cargo-deny, and the Rust version that they need. Known
+//! vulnerabilities are looked up by tools/deny, which needs a network.
 
 use crate::common::files::repository;
 use serde::Deserialize;
@@ -42,7 +42,7 @@ fn words(value: &toml::Value) -> Vec<String> {
     value.as_array().expect("a list").iter().map(|word| word.as_str().expect("a word").to_string()).collect()
 }
 
-/// Of the crates that this machine builds: of others nothing is here.
+/// The crates that are built on this machine: the others are not downloaded.
 fn packages() -> Vec<Package> {
     let asked = |program: &str, arguments: &[&str]| {
         let output = Command::new(program).args(arguments).current_dir(repository("")).output();

@@ -1,4 +1,4 @@
-//! What a dispatch touches, by its pass, its turn and the part of each slot that it binds.
+//! The accesses of a dispatch, from its pass, its arguments and the part of each slot that it binds.
 
 use super::{FILTERED, scene};
 use crate::common::probes::voxels;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Slot, volume image, and parts.
 type Touched = Vec<(Slot, u32, Range<u32>)>;
 
-/// What it reads and what it writes.
+/// Its reads and its writes.
 fn touched(name: &str, args: DispatchArgs) -> (Touched, Touched) {
     let scene = scene(voxels([6, 8, 5]), FILTERED);
     let all = accesses(&scene, by_name(name).expect("pass"), &args);

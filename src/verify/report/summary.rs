@@ -1,15 +1,15 @@
-//! What a run found, as text for a terminal.
+//! A run as text for a terminal: lines of groups, failures, the summary, and the comparison with a baseline.
 
-use super::baseline::{Class, Compared};
-use super::numbers::{expected_and_got, number, of_allowed, percent, seconds};
+use super::baseline::{BaselineComparison, Class};
+use super::numbers::{expected_and_got, number, percent, seconds, value_of_limit};
 use super::{Fault, Outcome, Run, Verdict, Worst};
 use crate::text::escaped;
 use std::fmt::Write as _;
 
-/// Changes of a kind that a terminal is given, but for those that fail the run.
-const MOST_CHANGES: usize = 40;
+/// Maximum number of changes of a class that are listed, except those that fail the run.
+const MAX_CHANGES: usize = 40;
 
-/// One line on a group, without its end: what came of its checks, how long they took, and which came nearest to its tolerance.
+/// One line on a group, without line break: verdicts, duration, and the check that is closest to its tolerance.
 pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
     let mut line =
@@ -23,15 +23,15 @@ pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     line
 }
 
-/// Passed, failed, left out; what there is none of is not told, but for a run of nothing.
+/// Numbers of passed, failed and left out checks; zeros are omitted.
 fn counts(of: [usize; 3]) -> String {
     let words = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(Verdict::word);
-    let told = of.iter().zip(words).filter(|(count, _)| **count > 0).map(|(count, word)| format!("{count} {word}"));
-    let told: Vec<String> = told.collect();
-    if told.is_empty() { "no checks".into() } else { told.join(", ") }
+    let texts = of.iter().zip(words).filter(|(count, _)| **count > 0).map(|(count, word)| format!("{count} {word}"));
+    let texts: Vec<String> = texts.collect();
+    if texts.is_empty() { "no checks".into() } else { texts.join(", ") }
 }
 
-/// A failed check in full, one line an item, the last with its end.
+/// A failed check in full, one line per item, each with line break.
 pub fn failure(outcome: &Outcome) -> String {
     let mut text = format!("{}: {}\n", outcome.title(), outcome.verdict.word());
     for fault in &outcome.faults {
@@ -41,7 +41,7 @@ pub fn failure(outcome: &Outcome) -> String {
         }
     }
     for figure in outcome.figures.iter().filter(|f| f.used().is_some_and(|used| used > 1.0)) {
-        let _ = writeln!(text, "  {}: {}", escaped(&figure.what), of_allowed(figure));
+        let _ = writeln!(text, "  {}: {}", escaped(&figure.what), value_of_limit(figure));
     }
     for note in &outcome.notes {
         let _ = writeln!(text, "  {}", escaped(note));
@@ -49,7 +49,7 @@ pub fn failure(outcome: &Outcome) -> String {
     text
 }
 
-/// What is known of a fault beside what it is, names first; all on one line each.
+/// Details of a fault as names and values, one line each.
 pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
     let mut items = Vec::new();
     items.extend(fault.pass.as_deref().map(|pass| ("pass", escaped(pass))));
@@ -69,7 +69,7 @@ pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
     items
 }
 
-/// Where the worst texel lies.
+/// Position of the worst texel.
 fn place(worst: &Worst) -> String {
     let [x, y, z] = worst.at;
     format!("at ({x}, {y}, {z}) of {}, channel {}", escaped(&worst.output), worst.channel)
@@ -80,7 +80,7 @@ fn beyond(worst: &Worst) -> String {
     format!("{} of {} texels ({} %)", worst.beyond, worst.texels, number(share))
 }
 
-/// The last line, without its end.
+/// The last line of a run, without line break.
 pub fn summary(run: &Run) -> String {
     let device = &run.device;
     let validation = if run.validation { ", validation layer watching" } else { "" };
@@ -97,24 +97,24 @@ pub fn summary(run: &Run) -> String {
     )
 }
 
-/// What changed since an earlier run, the worst first; lines, the last with its end. What fails the run is told in full; of the
-/// rest, how much more there is.
-pub fn comparison(compared: &Compared) -> String {
+/// Changes since an earlier run, the worst first, in lines. Changes that fail the run are all listed; of the others only some, with
+/// the number of the rest.
+pub fn comparison(compared: &BaselineComparison) -> String {
     let mut text = format!("compared with {}\n", compared.baseline);
     for line in compared.differences.iter().chain(&compared.notes) {
         let _ = writeln!(text, "{line}");
     }
     for class in Class::ALL {
         let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
-        let told = if class == Class::Worse { changes.len() } else { changes.len().min(MOST_CHANGES) };
-        if told > 0 {
+        let listed = if class == Class::Worse { changes.len() } else { changes.len().min(MAX_CHANGES) };
+        if listed > 0 {
             let _ = writeln!(text, "{}:", class.word());
         }
-        for change in &changes[..told] {
+        for change in &changes[..listed] {
             let _ = writeln!(text, "  {change}");
         }
-        if told < changes.len() {
-            let _ = writeln!(text, "  and {} more", changes.len() - told);
+        if listed < changes.len() {
+            let _ = writeln!(text, "  and {} more", changes.len() - listed);
         }
     }
     let _ = writeln!(text, "{}", compared.conclusion());

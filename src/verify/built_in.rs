@@ -1,11 +1,233 @@
-//! Scenes that among them need every pass, in every variant of the geometry.
+//! Inputs built into the program: probes, scenes, bodies and noise, the same on every machine. Tests use them too.
 
-use super::{Asked, BYTES, cartesian, linear, still, uneven, wobbler};
-use crate::probe::{Advance, Geometry, Probe};
-use crate::scene::Input;
+use crate::passes::Texels;
+use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
+use crate::scene::{Input, Scene, Settings};
 use crate::source::StoredType;
+use glam::DVec3;
 
-/// Every filter, look and adjustment at once.
+/// Specification of a scene.
+#[derive(Clone)]
+pub struct SceneSpec {
+    pub name: String,
+    geometry: Geometry,
+    input: Input,
+    /// Settings as TOML.
+    toml: String,
+    /// Use pictures of floats, whatever the settings say.
+    floats: bool,
+}
+
+impl SceneSpec {
+    fn new(name: &str, geometry: &Geometry, input: Input, toml: String) -> SceneSpec {
+        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false }
+    }
+
+    /// Builds the scene.
+    ///
+    /// # Errors
+    /// One line: the settings are invalid.
+    pub fn build(&self) -> Result<Scene, String> {
+        let mut scene =
+            scene(self.geometry.clone(), self.input, &self.toml).map_err(|e| format!("{}: {e}", self.name))?;
+        scene.settings.post.floats |= self.floats;
+        Ok(scene)
+    }
+}
+
+/// Scenes that together need every pass, in every variant of the geometry.
+pub fn scenes() -> Vec<SceneSpec> {
+    let planes = plane_scenes();
+    // Planes that are rendered directly to 8 bits are also rendered via floats.
+    let straight = planes.iter().filter(|spec| spec.build().is_ok_and(|scene| scene.tones_planes()));
+    let in_floats =
+        straight.map(|spec| SceneSpec { name: format!("{}, in floats", spec.name), floats: true, ..spec.clone() });
+    let in_floats: Vec<SceneSpec> = in_floats.collect();
+    ray_scenes().into_iter().chain(planes).chain(in_floats).collect()
+}
+
+/// A scene with settings from TOML.
+///
+/// # Errors
+/// One line: the settings are invalid.
+pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, String> {
+    let settings: Settings = toml::from_str(toml).map_err(|e| format!("settings: {}", e.message()))?;
+    Scene::new(geometry, input, settings).map_err(|e| e.to_string())
+}
+
+/// Pseudorandom numbers in 0..1, the same on every machine (SplitMix64).
+pub struct Noise(pub u64);
+
+impl Noise {
+    // Not an iterator: it never ends.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// A small abdominal wobbler: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples.
+pub fn wobbler() -> Probe {
+    Probe {
+        array: Array::Curved { radius: 20.0 },
+        lines: Axis::centred(0.05, 24),
+        start_depth: 2.0,
+        sample_pitch: 0.8,
+        samples: 64,
+        motion: Motion::Fan { wobble_radius: 12.0 },
+        slices: Axis::centred(0.06, 9),
+        advance: Advance::None,
+        sound_speed: 1540.0,
+    }
+}
+
+/// The same probe with frames at uneven angles.
+pub fn uneven(mut probe: Probe) -> Probe {
+    let at = |k: usize| probe.slices.at(k as f64) + 0.012 * (1.7 * k as f64).sin();
+    probe.slices = Axis::from_table((0..probe.slices.len()).map(at).collect());
+    probe
+}
+
+/// A linear array moved sideways.
+pub fn linear() -> Probe {
+    Probe {
+        array: Array::Linear,
+        lines: Axis::centred(1.1, 20),
+        motion: Motion::Translated,
+        slices: Axis::centred(1.5, 7),
+        samples: 48,
+        ..wobbler()
+    }
+}
+
+pub fn still() -> Probe {
+    Probe { motion: Motion::Still { thickness: 3.0 }, slices: Axis::centred(1.0, 1), ..wobbler() }
+}
+
+pub fn cartesian(size: [usize; 3]) -> Geometry {
+    Geometry::Cartesian(Grid { size, spacing: [0.5, 0.4, 0.9], origin: [-4.0, 1.0, -3.0] })
+}
+
+pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+pub const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
+
+/// Frames of a volume with the values that their textures yield, from a function of texel and slice.
+pub fn frames(scene: &Scene, f: impl Fn([usize; 3]) -> f64) -> Vec<Texels> {
+    let [width, height] = scene.frame_size().map(|n| n as usize);
+    let one = |k| Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f([x, y, k]));
+    (0..scene.slices() as usize).map(one).collect()
+}
+
+/// Frames of a volume that shows a body, given as a function of space (mm).
+pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
+    let place = |[i, j, k]: [usize; 3]| match &scene.geometry {
+        Geometry::Sweep(probe) => probe.to_space(Indices { sample: i as f64, line: j as f64, slice: k as f64 }),
+        Geometry::Cartesian(grid) => {
+            let at = [i, j, k];
+            DVec3::from_array(std::array::from_fn(|a| grid.origin[a] + grid.spacing[a] * at[a] as f64))
+        }
+    };
+    frames(scene, |at| body(place(at)))
+}
+
+/// Names of modes with their settings.
+const MODES: [(&str, &str); 14] = [
+    ("vr", "mode = 'vr'"),
+    ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
+    ("vr, first hit", "mode = 'vr'\nvolume = { shading = 'first-hit' }"),
+    ("sr", "mode = 'sr'"),
+    ("mixed", "mode = 'mixed'"),
+    ("mip", "mode = 'mip'"),
+    ("minip", "mode = 'minip'"),
+    ("mean", "mode = 'mean'"),
+    ("plane", "mode = 'plane'\nplanes = { azimuth = 25, tilt = -15, roll = 40, thickness = 2.5 }"),
+    ("orthogonal", "mode = 'orthogonal'"),
+    ("tomography", "mode = 'tomography'\nplanes = { columns = 3, rows = 2, spacing = 2.5 }"),
+    ("cube", "mode = 'cube'"),
+    ("4-up, sr", "mode = 'sr'\nlayout = 'four'"),
+    ("4-up, vr", "mode = 'vr'\nlayout = 'four'"),
+];
+
+/// Every mode once, each with filters of every stage, in one small sweep.
+pub fn modes() -> Vec<SceneSpec> {
+    let sweep = Geometry::Sweep(wobbler());
+    MODES.iter().map(|(name, toml)| SceneSpec::new(name, &sweep, BYTES, format!("{toml}\n{ALL_FILTERS}"))).collect()
+}
+
+/// Frames of a wavy wall between two slightly uneven tissues: structure to render and filter in every mode. The wall has another depth for
+/// each volume `number`.
+pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
+    let shift = 4.0 * f64::from(number);
+    body_frames(scene, |p| {
+        let depth = p.y - 42.0 - shift + 3.0 * (0.25 * p.x).sin() + 2.0 * (0.3 * p.z).cos();
+        let uneven = 0.08 * (1.9 * p.x + shift).sin() * (1.3 * p.y).cos() * (1.7 * p.z).cos();
+        (0.15 + 0.6 * (0.5 + 0.5 * depth).clamp(0.0, 1.0) + uneven).clamp(0.0, 1.0)
+    })
+}
+
+pub const TURNED: &str = "azimuth = 25, tilt = -15, roll = 40";
+
+/// All variants of the geometry, by name.
+pub fn geometries() -> Vec<(&'static str, Geometry)> {
+    let mut moved = wobbler();
+    moved.advance = Advance::Same(0.7 * moved.slices.pitch());
+    let mut mixed = uneven(wobbler());
+    mixed.advance = Advance::Each((0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect());
+    vec![
+        ("fan", Geometry::Sweep(wobbler())),
+        ("fan, motor moving", Geometry::Sweep(moved)),
+        ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
+        ("fan, uneven and mixed", Geometry::Sweep(mixed)),
+        ("linear array, translated", Geometry::Sweep(linear())),
+        ("single frame", Geometry::Sweep(still())),
+        ("Cartesian", cartesian([17, 23, 9])),
+    ]
+}
+
+/// Scenes of planes, tomography and the block: each mode in every geometry, and extremes in one.
+fn plane_scenes() -> Vec<SceneSpec> {
+    let mut scenes = Vec::new();
+    let base = "slices = { pixels = 33 }\nray = { sampling = 'exact' }";
+    for (name, geometry) in geometries() {
+        for (mode, rest) in [
+            ("plane", format!("picture = {{ size = [23, 31] }}\nplanes = {{ {TURNED}, thickness = 2.5 }}")),
+            ("orthogonal", "picture = { size = [37, 29] }".into()),
+            ("cube", "picture = { size = [21, 25] }\ncamera = { azimuth = 35, elevation = -20, roll = 5 }".into()),
+        ] {
+            let toml = format!("mode = '{mode}'\n{base}\n{rest}");
+            scenes.push(SceneSpec::new(&format!("{name}, {mode}"), &geometry, BYTES, toml));
+        }
+    }
+    for toml in [
+        format!("mode = 'orthogonal'\npicture = {{ size = [41, 33] }}\nplanes = {{ {TURNED}, position = [3, 20, -2] }}"),
+        "mode = 'orthogonal'\npicture = { size = [2, 2] }".into(),
+        "mode = 'orthogonal'\nplanes = { lines = false, window = [0.3, 0.6] }\npicture = { size = [33, 20] }".into(),
+        "mode = 'tomography'\nplanes = { columns = 5, rows = 3, spacing = 3.5, zoom = 1.7 }\npicture = { size = [43, 31] }".into(),
+        "mode = 'tomography'\nplanes = { columns = 2, rows = 7, plane = 'c', thickness = 9, slab = 'max' }\npicture = { size = [31, 31] }".into(),
+        "mode = 'plane'\nplanes = { plane = 'b', thickness = 7, slab = 'min' }\npicture = { size = [19, 26] }\npost = { colour_map = 'ice' }".into(),
+        "mode = 'plane'\nplanes = { position = [900, 20, 0], plane = 'b' }\npicture = { size = [9, 9] }".into(),
+        format!("mode = 'plane'\nplanes = {{ {TURNED} }}\npicture = {{ size = [30, 30] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}, {{ at = [5, 0, 0], normal = [1, 0, 0] }}]"),
+        "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }".into(),
+        "mode = 'cube'\npicture = { size = [40, 30] }\ncamera = { azimuth = -140, elevation = 25, field_of_view = 40 }
+         cube = { shading = 0.8, inset = { left = 9, near = 8, top = 2.5, far = 12 }, tilt = { near = [20, -10], top = [-5, 12] } }
+         clip = [{ at = [0, 40, 0], normal = [0.5, 0.5, -0.3] }]".into(),
+        "mode = 'cube'\npicture = { size = [33, 25] }\ncamera = { azimuth = 90 }\ncube = { shading = 0, edges = false, inset = { left = 12 } }".into(),
+        "mode = 'cube'\npicture = { size = [23, 25] }\ncamera = { field_of_view = 70, zoom = 20 }\ncube = { inset = { near = 10 } }".into(),
+    ] {
+        scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
+    }
+    scenes
+}
+
+/// Settings with every filter, light and adjustment at once.
 pub const ALL_FILTERS: &str = "
     slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
     distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }
@@ -22,16 +244,16 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
     probe
 }
 
-pub(super) fn scenes() -> Vec<Asked> {
+fn ray_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
         if toml.starts_with("mode") {
-            scenes.push(Asked::new(name, geometry, input, toml.into()));
+            scenes.push(SceneSpec::new(name, geometry, input, toml.into()));
             return;
         }
         for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }"] {
             let toml = format!("mode = {mode}\n{toml}");
-            scenes.push(Asked::new(&format!("{name}, {mode}"), geometry, input, toml));
+            scenes.push(SceneSpec::new(&format!("{name}, {mode}"), geometry, input, toml));
         }
     };
     let sweep = Geometry::Sweep(wobbler());
@@ -256,7 +478,7 @@ pub(super) fn scenes() -> Vec<Asked> {
                 "mode = {mode}\nslices = {{ pixels = 30 }}\npicture = {{ size = [15, 11] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}]
                  camera = {{ azimuth = 35, elevation = 8, roll = 11, field_of_view = 40 }}\nray = {{ sampling = 'exact', step = 0.9, early_end = 0.0, {ray} }}"
             );
-            scenes.push(Asked::new(&format!("{ray}, {mode}"), &sweep, BYTES, toml));
+            scenes.push(SceneSpec::new(&format!("{ray}, {mode}"), &sweep, BYTES, toml));
         }
     }
     scenes
