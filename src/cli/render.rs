@@ -2,11 +2,11 @@
 
 use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
-use crate::error_report::command::{nanoseconds, read};
+use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose};
-use crate::gpu::{Options, Renderer};
+use crate::gpu::{Renderer, RendererOptions};
 use crate::plan::Plan;
-use crate::profile::pass_times;
+use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
@@ -77,7 +77,7 @@ impl Render {
         say!("picture: {}", self.output.display());
         if self.timings {
             let measured = renderer.take_times().map_err(failed)?;
-            say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
+            say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;
@@ -92,8 +92,8 @@ impl Render {
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open() };
-        let time = nanoseconds("--budget", budget)?;
-        let report = read(file)?;
+        let time = parse_nanoseconds("--budget", budget)?;
+        let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
         let (there, here) = (report.sizes.volume, scene.volume_size());
         if there != here {
@@ -109,13 +109,13 @@ impl Render {
         let measure = Measure::Rmse;
         let choice = choose::most_accurate_under(&report, measure, time, 0.1)
             .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
-        say!("budget {budget}: {}, measured on {}", choice.say(measure), report.device);
+        say!("budget {budget}: {}, measured on {}", choice.describe(measure), report.device);
         self.input.open_with(&choice.set)
     }
 
     #[cfg(feature = "hot-reload")]
-    fn options(&self) -> Result<Options, Failure> {
-        let mut options = Options::default();
+    fn options(&self) -> Result<RendererOptions, Failure> {
+        let mut options = RendererOptions::default();
         if let Some(folder) = &self.glsl {
             options.shaders = crate::gpu::hot_reload::compile(folder).map_err(input)?;
         }
@@ -123,8 +123,8 @@ impl Render {
     }
 
     #[cfg(not(feature = "hot-reload"))]
-    fn options(&self) -> Result<Options, Failure> {
-        Ok(Options::default())
+    fn options(&self) -> Result<RendererOptions, Failure> {
+        Ok(RendererOptions::default())
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {

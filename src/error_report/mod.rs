@@ -1,23 +1,21 @@
-//! Error against run time: what a measurement of the dials is, as a file, as a table, as a picture, and as the settings to use.
-//! Every approximation is a dial; a dial's points are its settings, each with its errors and its time on the device.
+//! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
+//! errors and its time on the device. [`measure`] fills a [`Report`], which is stored as JSON; [`export`] and [`plot`] write it as
+//! text and as a diagram, [`choose`] picks settings from it.
 
-pub mod analytic;
-mod canvas;
 pub mod choose;
 pub(crate) mod command;
+pub mod convergence;
 pub mod dials;
+pub mod export;
 pub mod measure;
 pub mod metrics;
-pub mod orders;
-pub mod pareto_front;
 pub mod plot;
-pub mod summary_table;
 
+use convergence::Fit;
 use metrics::{PictureError, SurfaceError};
-use orders::Fit;
 use serde::{Deserialize, Serialize};
 
-/// What the first line of a stored report must say; another version is refused, not guessed.
+/// Format version of a stored report; other versions are refused.
 pub const FORMAT: &str = "echolume error report 1";
 
 /// A measurement of one scene on one device.
@@ -28,52 +26,53 @@ pub struct Report {
     pub format: String,
     pub device: String,
     pub driver: String,
-    /// When it was measured, ISO 8601.
+    /// Time of the measurement, ISO 8601.
     pub date: String,
-    /// In words on its first line, then all settings, resolved, as TOML.
+    /// Description of the input on the first line, then all settings, resolved, as TOML.
     pub scene: String,
     pub sizes: Sizes,
-    /// Runs of which a time is the median.
+    /// Number of runs of which each time is the median.
     pub repeats: u32,
     pub dials: Vec<Dial>,
 }
 
+/// Sizes of what was rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
     /// Texels of the volume.
     pub volume: [u32; 3],
-    /// Pixels of the picture by default.
+    /// Pixels of the picture by default (a dial may change it).
     pub picture: [u32; 2],
 }
 
-/// One approximation, turned while all else stays as it is by default.
+/// Measurements of one approximation, varied while all other settings keep their defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
-    /// Unit of the points' values, empty where they are counts or names.
+    /// Unit of the values of the points; empty for counts and names.
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
-    /// Error against the value, where it has an order.
+    /// Order of the error over the value, if it has one.
     pub order: Option<Fit>,
-    /// RMSE of the device against f64 where nothing but its arithmetic and formats differ.
+    /// RMSE of the device against f64 if only its arithmetic and formats differ.
     #[serde(default)]
     pub floor: Option<f64>,
 }
 
-/// What the errors of a dial are taken against.
+/// The reference of the errors of a dial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Reference {
     /// The four stages in f64 on the CPU.
     F64,
-    /// A picture of the device's own, converged as far as it goes.
+    /// A picture by the device itself, converged as far as possible.
     Converged {
-        /// The assignments that make it.
+        /// The assignments that give it.
         set: Vec<String>,
-        /// Its RMSE against the next coarser one, an upper bound for its own error where it converges.
+        /// Its RMSE against the next coarser picture: an upper bound of its own error if it converges.
         rmse: f64,
     },
 }
@@ -82,31 +81,31 @@ pub enum Reference {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
-    /// As short as a plot needs: "0.25", "pre-integrated".
+    /// Short label for plots: "0.25", "pre-integrated".
     pub label: String,
-    /// The assignments that make it, each "key=value" as `--set` takes them.
+    /// Its assignments, each "key=value" as `--set` takes them.
     pub set: Vec<String>,
-    /// Where it lies on the dial, in the dial's unit; for names their number in order.
+    /// Value on the dial's axis, in the dial's unit; for names their index.
     pub value: f64,
     pub errors: Errors,
-    /// None on a device without time stamps.
+    /// Time on the device; None without time stamps.
     pub time: Option<Time>,
-    /// Whether this is what the scene has without any assignment.
+    /// True for the setting of the scene itself, without assignments.
     pub is_default: bool,
 }
 
-/// Pictures on a scale of 0..1; the surface where there is one.
+/// Errors of a picture on a scale of 0..1, and of the surface if there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
     pub rmse: f64,
     pub max: f64,
-    /// dB; none (infinite) for equal pictures.
+    /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
-    /// Of the distance map, mm.
+    /// Error of the distance map, mm.
     pub mm: Option<SurfaceError>,
-    /// Of the normals, degrees.
+    /// Error of the normals, degrees.
     pub degrees: Option<SurfaceError>,
 }
 
@@ -116,7 +115,7 @@ impl From<PictureError> for Errors {
     }
 }
 
-/// Time on the device over the repeats, ns.
+/// Time on the device over the repeats, ns: median, minimum, maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
@@ -126,7 +125,7 @@ pub struct Time {
 }
 
 impl Time {
-    /// None of no run.
+    /// The statistics of the runs, ns; None without runs.
     pub fn of(runs: &[f64]) -> Option<Time> {
         let mut sorted = runs.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -136,19 +135,19 @@ impl Time {
     }
 }
 
-/// Which error is meant where one is enough.
+/// The error measure of a plot or choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// Of the picture, 0..1.
+    /// RMSE of the picture, 0..1.
     Rmse,
-    /// RMS of the distance map.
+    /// RMS error of the distance map, mm.
     Mm,
-    /// RMS of the normals.
+    /// RMS error of the normals, degrees.
     Degrees,
 }
 
 impl Measure {
-    /// None where it was not measured, or is no number.
+    /// The error by this measure; None if it was not measured or is not finite.
     pub fn of(self, errors: &Errors) -> Option<f64> {
         let rms = |surface: &Option<SurfaceError>| surface.and_then(|s| s.error).map(|e| e.rms);
         let error = match self {
@@ -167,8 +166,8 @@ impl Measure {
         }
     }
 
-    /// An error with its unit.
-    pub fn say(self, error: f64) -> String {
+    /// An error with its name and unit, for messages.
+    pub fn format(self, error: f64) -> String {
         match self {
             Measure::Rmse => format!("RMSE {error:.3e}"),
             Measure::Mm => format!("{error:.3e} mm"),
@@ -178,17 +177,21 @@ impl Measure {
 }
 
 impl Report {
+    /// The report as JSON.
+    ///
     /// # Errors
-    /// One line: a number is not finite or an error or time is negative, named by dial and point. JSON has no words for them.
+    /// One line: a number is not finite, or an error or time is negative; it names the dial and the point.
     pub fn to_json(&self) -> Result<String, String> {
         self.check()?;
         serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
     }
 
+    /// Reads a report.
+    ///
     /// # Errors
-    /// One line: no JSON, of another format or version, or with numbers that no measurement gives.
+    /// One line: no JSON, another format or version, or numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
-        Report::read(text).map_err(|e| crate::scene::load::single_line(&e))
+        Report::read(text).map_err(|e| crate::text::single_line(&e))
     }
 
     fn read(text: &str) -> Result<Report, String> {
@@ -197,7 +200,7 @@ impl Report {
             format: String,
         }
         let unread = |e: serde_json::Error| format!("error report: cannot be read: {e}");
-        // The version first: a newer one would fail by its fields, and say so less clearly.
+        // The version first: a newer report would otherwise fail by its fields, with a less clear message.
         let version: Version = serde_json::from_str(text).map_err(unread)?;
         if version.format != FORMAT {
             return Err(format!("error report: format is '{}', this program reads '{FORMAT}'", version.format));
@@ -209,12 +212,12 @@ impl Report {
 
     fn check(&self) -> Result<(), String> {
         for dial in &self.dials {
-            let own = match &dial.reference {
+            let reference_rmse = match &dial.reference {
                 Reference::F64 => 0.0,
                 Reference::Converged { rmse, .. } => *rmse,
             };
-            if !(own.is_finite() && own >= 0.0) {
-                return Err(format!("error report: dial '{}': its reference's RMSE is {own}", dial.name));
+            if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
+                return Err(format!("error report: dial '{}': its reference's RMSE is {reference_rmse}", dial.name));
             }
             for point in &dial.points {
                 let (e, bad) = (&point.errors, |v: f64| !v.is_finite() || v < 0.0);
@@ -236,46 +239,35 @@ impl Report {
         Ok(())
     }
 
-    /// One line a point after a line of names (RFC 4180). What does not apply is empty; times are in ms. `on_front`: no other
-    /// point of the report has both a smaller RMSE and a shorter time.
-    pub fn to_csv(&self) -> String {
-        let front = pareto_front::of_report(self, Measure::Rmse);
-        let mut text = String::from(
-            "dial,unit,value,label,set,default,rmse,max,psnr_db,ssim,mm_rms,mm_median,mm_p95,mm_max,mm_false_hits,mm_missed_hits,\
-             deg_rms,deg_median,deg_p95,deg_max,deg_false_hits,deg_missed_hits,time_ms,time_low_ms,time_high_ms,on_front,\
-             reference,reference_rmse,device,driver,date,repeats\r\n",
-        );
+    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
+    /// without this error are not on it.
+    pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
+        let mut indices = Vec::new();
+        let mut pairs = Vec::new();
         for (d, dial) in self.dials.iter().enumerate() {
             for (p, point) in dial.points.iter().enumerate() {
-                let (e, number) = (&point.errors, |v: Option<f64>| v.map_or(String::new(), |v| v.to_string()));
-                let mut row = vec![dial.name.clone(), dial.unit.clone(), point.value.to_string(), point.label.clone()];
-                row.extend([point.set.join("; "), point.is_default.to_string()]);
-                row.extend([Some(e.rmse), Some(e.max), e.psnr, e.ssim].map(number));
-                for surface in [e.mm, e.degrees] {
-                    let spread = surface.and_then(|s| s.error);
-                    row.extend([spread.map(|s| s.rms), spread.map(|s| s.median)].map(number));
-                    row.extend([spread.map(|s| s.p95), spread.map(|s| s.max)].map(number));
-                    row.extend([surface.map(|s| s.false_hits), surface.map(|s| s.missed_hits)].map(number));
+                if let (Some(time), Some(error)) = (point.time, measure.of(&point.errors)) {
+                    indices.push((d, p));
+                    pairs.push([time.median, error]);
                 }
-                let ms = |of: fn(&Time) -> f64| number(point.time.as_ref().map(|t| of(t) * 1e-6));
-                row.extend([ms(|t| t.median), ms(|t| t.low), ms(|t| t.high), front.contains(&(d, p)).to_string()]);
-                row.extend(match &dial.reference {
-                    Reference::F64 => ["f64".into(), String::new()],
-                    Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
-                });
-                row.extend([&self.device, &self.driver, &self.date].map(String::clone));
-                row.push(self.repeats.to_string());
-                text.push_str(&row.iter().map(|field| quoted(field)).collect::<Vec<_>>().join(","));
-                text.push_str("\r\n");
             }
         }
-        text
+        pareto_front(&pairs).into_iter().map(|i| indices[i]).collect()
     }
 }
 
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.to_string(),
+/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order
+/// of the first value. Equal pairs all stay, in the order given. Pairs that are not finite are never on the front.
+pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
+    // A stable sort: equal pairs keep their order.
+    order.sort_by(|a, b| pairs[*a][0].total_cmp(&pairs[*b][0]).then(pairs[*a][1].total_cmp(&pairs[*b][1])));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in order {
+        let beaten = kept.last().is_some_and(|last| pairs[*last][1] <= pairs[i][1] && pairs[*last] != pairs[i]);
+        if !beaten {
+            kept.push(i);
+        }
     }
+    kept
 }

@@ -1,34 +1,34 @@
-//! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
+//! Records the barriers that [`crate::barriers`] derives as Vulkan commands.
 
 use super::context::Context;
-use crate::barriers::oracle::Log;
-use crate::barriers::{Access, Barrier, Worker, Workers};
-use crate::queues::{Queues, Wait};
+use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages};
+use crate::queues::oracle::SubmissionLog;
+use crate::queues::{QueueTracker, Wait};
 use ash::vk;
 
-/// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
+/// The barriers and waits of everything that uses the same slots, and a count of the barriers.
 #[derive(Default)]
 pub struct BarrierRecorder {
-    pub queues: Queues,
-    pub barriers: u32,
-    /// Names and extents of the passes dispatched, in order, while someone counts them.
+    pub queues: QueueTracker,
+    pub count: u32,
+    /// The names and invocations of the dispatched passes, in order, while they are counted.
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
-    /// Leaves out the n-th barrier, to show that something notices.
+    /// Fault injection: leaves out the n-th barrier.
     pub drop_barrier: Option<u32>,
-    /// All that is recorded and submitted, while someone looks at it.
-    pub log: Option<Log>,
+    /// Everything recorded and submitted, if it is logged.
+    pub log: Option<SubmissionLog>,
 }
 
 impl BarrierRecorder {
     /// Records the barrier that an operation with these accesses needs, if it needs one.
     pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
-        let barrier = self.queues.before(queue, accesses);
-        self.barriers += u32::from(barrier.is_some());
-        let is_dropped = self.drop_barrier == Some(self.barriers);
-        // A queue that only copies knows no shaders.
+        let barrier = self.queues.record(queue, accesses);
+        self.count += u32::from(barrier.is_some());
+        let is_dropped = self.drop_barrier == Some(self.count);
+        // A transfer queue has no shader stages.
         let computes = context.queue(queue).computes;
-        let known = |all: Workers| if computes { all } else { all.without(Worker::Compute) };
-        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: known(b.from), to: known(b.to) });
+        let supported = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
+        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: supported(b.from), to: supported(b.to) });
         if let Some(log) = &mut self.log {
             log.record(queue, barrier, accesses);
         }
@@ -43,52 +43,52 @@ impl BarrierRecorder {
         unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
     }
 
-    /// A submission of this queue is recorded from here on.
+    /// Begins the recording of a submission to this queue.
     pub(super) fn begin(&mut self, queue: usize) {
         self.queues.begin(queue);
         self.log.iter_mut().for_each(|log| log.begin(queue));
     }
 
-    /// What was recorded on this queue is on its way, behind these waits, and done at this value of its timeline.
+    /// The recording of this queue was submitted with these waits; it is done at this value of the queue's timeline.
     pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.queues.submitted(queue, waits, value);
         self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));
     }
 }
 
-fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: Workers, of: [(Worker, T); 3]) -> T {
+fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
     of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
 }
 
-fn stages(workers: Workers) -> vk::PipelineStageFlags2 {
+fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
-            (Worker::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
-            (Worker::Host, vk::PipelineStageFlags2::HOST),
+            (PipelineStage::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
+            (PipelineStage::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
+            (PipelineStage::Host, vk::PipelineStageFlags2::HOST),
         ],
     )
 }
 
-fn writes(workers: Workers) -> vk::AccessFlags2 {
+fn writes(workers: PipelineStages) -> vk::AccessFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_WRITE),
-            (Worker::Host, vk::AccessFlags2::NONE),
+            (PipelineStage::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_WRITE),
+            (PipelineStage::Host, vk::AccessFlags2::NONE),
         ],
     )
 }
 
-fn reads(workers: Workers) -> vk::AccessFlags2 {
+fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_READ),
-            (Worker::Host, vk::AccessFlags2::HOST_READ),
+            (PipelineStage::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
+            (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
         ],
     )
 }

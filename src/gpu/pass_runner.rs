@@ -1,45 +1,57 @@
-//! One pass alone on inputs of the caller's: what the tests hold against its reference, and what benches time.
+//! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
 use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
-use super::measured::Measured;
-use super::pipelines::{Fetch, Pipeline, Pipelines, embedded};
-use super::recorder::{Place, Recorder, Work};
-use super::renderer::size_of;
-use super::resources::{Buffer, Purpose};
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::recorder::{Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, shape_size};
 use super::slots::Slots;
 use super::timeline::Timelines;
-use super::{GpuError, formats};
+use super::timing::Timings;
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// Runs passes one at a time.
+/// Runs single passes on inputs of the caller.
 pub struct PassRunner {
     context: Arc<Context>,
     pipelines: Pipelines,
-    fetch: Fetch,
+    texel_access: TexelAccess,
 }
 
 impl PassRunner {
+    /// # Errors
+    /// A device that fails.
     pub fn new(context: &Arc<Context>) -> Result<PassRunner, GpuError> {
-        PassRunner::fetching(context, Fetch::of(&context.candidate))
+        PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
 
-    /// With texels read in a way that may not be the device's fastest.
-    pub fn fetching(context: &Arc<Context>, fetch: Fetch) -> Result<PassRunner, GpuError> {
-        Ok(PassRunner { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)?, fetch })
+    /// As [`PassRunner::new`], with texels read in the given way.
+    ///
+    /// # Errors
+    /// A device that fails.
+    pub fn with_texel_access(context: &Arc<Context>, texel_access: TexelAccess) -> Result<PassRunner, GpuError> {
+        Ok(PassRunner {
+            context: context.clone(),
+            pipelines: Pipelines::new(context, embedded(), texel_access)?,
+            texel_access,
+        })
     }
 
-    /// Bits of the weights that the device's own filter has, as it says.
+    /// Number of fractional bits of the weights in the device's texture filter.
     pub fn filter_bits(&self) -> u32 {
         self.context.limits.sub_texel_precision_bits
     }
 
-    /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
-    /// `poison` before, so that what the pass leaves out can be told.
+    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes
+    /// may be missing. Every texel of the outputs holds `poison` before, which shows the texels that the pass does not write.
+    ///
+    /// # Errors
+    /// A slot that the device cannot hold, a shader that does not compile, a device that fails.
     pub fn run(
         &mut self,
         scene: &Scene,
@@ -48,13 +60,13 @@ impl PassRunner {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
-        let scene = &formats::suited(&self.context, self.fetch, scene.clone());
+        let scene = &formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
         let mut recorder = Recorder::new(&self.context, 0, pass.name, false)?;
-        let mut order = BarrierRecorder::default();
+        let mut barriers = BarrierRecorder::default();
         let pipeline = self.pipelines.get(pass, scene, args)?;
         let new = slots.fit(&plan, scene)?;
 
@@ -72,12 +84,12 @@ impl PassRunner {
         }
         for bind in &writes {
             let format = bind.slot.format(scene);
-            let poisoned = Texels::from_fn(size_of(bind.slot.shape(scene)), format.channels(), |_, _| poison);
+            let poisoned = Texels::from_fn(shape_size(bind.slot.shape(scene)), format.channels(), |_, _| poison);
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
-        recorder.begin(&mut order, &timelines)?;
-        recorder.clear_new(&mut order, &slots, &new);
+        recorder.begin(&mut barriers, &timelines)?;
+        recorder.clear_new(&mut barriers, &slots, &new);
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
@@ -88,19 +100,19 @@ impl PassRunner {
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_in(&mut order, &staging, image, Place { slot: bind.slot, copy, parts });
+            recorder.copy_in(&mut barriers, &staging, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(staging);
         }
-        recorder.dispatch(&mut order, &Work { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
+        recorder.dispatch(&mut barriers, &Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
             let buffer = Buffer::new(&self.context, "output", bind.slot.bytes(scene), Purpose::Readback)?;
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_out(&mut order, image, bind.slot, copy, &buffer);
-            results.push((bind.name, size_of(image.shape), image.format, buffer));
+            recorder.copy_out(&mut barriers, image, bind.slot, copy, &buffer);
+            results.push((bind.name, shape_size(image.shape), image.format, buffer));
         }
-        recorder.submit(&mut order, &mut timelines)?;
+        recorder.submit(&mut barriers, &mut timelines)?;
         let done = timelines.wait_all();
         // Everything above is freed at the end, also when waiting failed.
         timelines.drain();
@@ -113,71 +125,74 @@ impl PassRunner {
     }
 }
 
-/// One pass of a scene, with slots and pipelines of its own, to be run and timed as often as wanted.
-pub struct Timed {
-    // Dropped in this order, after `drop` has waited for the device.
+/// Times a single pass of a scene, with its own slots and pipelines.
+pub struct PassTimer {
+    // Fields are dropped in this order, after `drop` has waited for the device.
     recorder: Recorder,
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
     _pipelines: Pipelines,
     slots: Slots,
     timelines: Timelines,
-    order: BarrierRecorder,
+    barriers: BarrierRecorder,
     context: Arc<Context>,
     scene: Scene,
     pass: &'static Pass,
 }
 
-impl Timed {
-    /// `contents` is what images hold before the first run; those left out hold zeros. What the scene makes itself is there in
-    /// any case. A pass of frames works on layer 0 and the middle slice, one of volumes on all slices. Runs once, because
-    /// drivers compile then.
+impl PassTimer {
+    /// `contents` is what images hold before the first run. Slots that the scene computes are filled; all others hold zeros. A pass
+    /// over frames works on layer 0 and the middle slice, a pass over volumes on all slices. Runs the pass once, because drivers
+    /// compile at the first run.
     ///
     /// # Errors
-    /// What the device cannot hold or compile, named.
+    /// A slot that the device cannot hold, a shader that does not compile; the error names it.
     pub fn new(
         context: &Arc<Context>,
         scene: &Scene,
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
-    ) -> Result<Timed, GpuError> {
-        Timed::fetching(context, scene, pass, contents, Fetch::of(&context.candidate))
+    ) -> Result<PassTimer, GpuError> {
+        PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
     }
 
-    /// The same with texels read in a way that may not be the device's fastest.
-    pub fn fetching(
+    /// As [`PassTimer::new`], with texels read in the given way.
+    ///
+    /// # Errors
+    /// As for [`PassTimer::new`].
+    pub fn with_texel_access(
         context: &Arc<Context>,
         scene: &Scene,
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
-        fetch: Fetch,
-    ) -> Result<Timed, GpuError> {
-        let scene = &formats::suited(context, fetch, scene.clone());
+        texel_access: TexelAccess,
+    ) -> Result<PassTimer, GpuError> {
+        let scene = &formats::adapt_scene(context, texel_access, scene.clone());
         let first = DispatchArgs { slice: scene.slices() / 2, ..DispatchArgs::default() };
         let first = if pass.frequency == Frequency::Frame {
             first
         } else {
             DispatchArgs { slice: 0, slices: scene.slices(), ..first }
         };
-        let turns: Vec<DispatchArgs> =
+        let iterations: Vec<DispatchArgs> =
             (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let pipelines = Pipelines::new(context, embedded(), fetch)?;
+        let pipelines = Pipelines::new(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
-        for args in turns {
+        for args in iterations {
             let binds = [(pass.reads)(scene, &args), (pass.writes)(scene, &args)].concat();
             plan.slots.extend(binds.iter().map(|b| b.slot));
             dispatches.push((args, pipelines.get(pass, scene, &args)?));
         }
         plan.slots.sort();
         plan.slots.dedup();
-        let mut timed = Timed {
+        let mut timed = PassTimer {
             recorder: Recorder::new(context, 0, pass.name, false)?,
             dispatches,
             _pipelines: pipelines,
             slots: Slots::new(context, 1),
             timelines: Timelines::new(context, 1)?,
-            order: BarrierRecorder::default(),
+            barriers: BarrierRecorder::default(),
             context: context.clone(),
             scene: scene.clone(),
             pass,
@@ -189,8 +204,8 @@ impl Timed {
 
     fn fill(&mut self, plan: &Plan, contents: &[(Slot, Texels)]) -> Result<(), GpuError> {
         let new = self.slots.fit(plan, &self.scene)?;
-        self.recorder.begin(&mut self.order, &self.timelines)?;
-        self.recorder.clear_new(&mut self.order, &self.slots, &new);
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
+        self.recorder.clear_new(&mut self.barriers, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
             let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, t)| t.encode(slot.format(&self.scene)));
@@ -200,59 +215,68 @@ impl Timed {
                 _ => continue,
             };
             let Some(image) = self.slots.image(slot, copy) else { continue };
-            // As large as the image, whatever was given.
+            // The staging buffer has the size of the image, whatever was given.
             let mut staging = Buffer::new(&self.context, "contents", slot.bytes(&self.scene), Purpose::Staging)?;
             let length = bytes.len().min(staging.bytes().len());
             staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-            let place = Place { slot, copy, parts: 0..image.shape.parts() };
-            self.recorder.copy_in(&mut self.order, &staging, image, place);
+            let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
+            self.recorder.copy_in(&mut self.barriers, &staging, image, place);
             keep.push(staging);
         }
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
         // The staging buffers are freed at the end, also when waiting failed.
         self.timelines.drain();
         done
     }
 
-    /// Runs every iteration of the pass once, in one submission, and waits: the device's time for them all, ns; none where it
-    /// has no time stamps. A pass that repeats works on what it left there the last time.
+    /// Runs all iterations of the pass in one submission, and waits. Returns the device's time for all of them, ns; `None` if the device
+    /// has no time stamps. A repeated pass works on its last results.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
-        self.recorder.begin(&mut self.order, &self.timelines)?;
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
         for (args, pipeline) in &self.dispatches {
-            let work = Work { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
-            self.recorder.dispatch(&mut self.order, &work)?;
+            let dispatch = Dispatch { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
+            self.recorder.dispatch(&mut self.barriers, &dispatch)?;
         }
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
-        let mut measured = Measured::new(&self.context, false);
-        self.recorder.collect(&self.timelines, &mut measured)?;
-        Ok(measured.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
+        let mut timings = Timings::new(&self.context, false);
+        self.recorder.collect(&self.timelines, &mut timings)?;
+        Ok(timings.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
     }
 
-    /// What an image holds now; none for a slot that the pass does not touch, or that is a table.
+    /// The current content of an image slot; `None` for a slot that the pass does not use, or a lookup table in a buffer.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
-        self.recorder.begin(&mut self.order, &self.timelines)?;
-        self.recorder.copy_out(&mut self.order, image, slot, 0, &buffer);
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
+        self.recorder.copy_out(&mut self.barriers, image, slot, 0, &buffer);
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
         self.timelines.drain();
-        done.map(|()| Some(Texels::decode(size_of(image.shape), image.format, buffer.bytes())))
+        done.map(|()| Some(Texels::decode(shape_size(image.shape), image.format, buffer.bytes())))
     }
 }
 
-impl Drop for Timed {
+impl Drop for PassTimer {
     fn drop(&mut self) {
         self.timelines.drain();
     }
 }
 
-/// Times of `count` runs of one pass in a row, ns, each of all its iterations, over slots that hold zeros; empty where the
-/// device has no time stamps. A run before them, which compiles, is left out.
-pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
-    let mut timed = Timed::new(context, scene, pass, &[])?;
+/// Times of `count` consecutive runs of a pass, ns, each with all its iterations, on slots that hold zeros. Empty if the device has
+/// no time stamps. A first run, in which drivers compile, is not counted.
+///
+/// # Errors
+/// As for [`PassTimer::new`].
+pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
+    let mut timed = PassTimer::new(context, scene, pass, &[])?;
     let mut times = Vec::new();
     for _ in 0..count {
         times.extend(timed.run()?);
@@ -260,7 +284,7 @@ pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u
     Ok(times)
 }
 
-/// The bytes that a slot read by a pass holds: the caller's, or the scene's own.
+/// The content of an input slot: the caller's, or what the scene computes.
 fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
     let format = bind.slot.format(scene);
     if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {

@@ -1,10 +1,9 @@
-//! The probe: where its scan lines and frames lie ([`geometry`]), how a TOML file says so ([`mod@file`]), and the motor
+//! The probe: the positions of its scan lines and frames ([`geometry`]), the TOML file that describes them ([`mod@file`]), and the motor
 //! that sweeps it ([`motor`]).
 
 pub mod axis;
 pub mod file;
 pub mod geometry;
-mod geometry_compare;
 pub mod grid;
 pub mod motor;
 pub mod volumes;

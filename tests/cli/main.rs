@@ -4,6 +4,7 @@ mod budget;
 #[path = "../common/mod.rs"]
 mod common;
 mod direct;
+mod docs;
 mod filter;
 mod frames;
 mod inputs;
@@ -141,7 +142,7 @@ fn without_a_device_the_plan_is_still_explained_and_the_rest_says_what_is_missin
         refuses(arguments, &blind(arguments), 1, &["no Vulkan device", "install"]);
     }
     let (code, plan, err) = blind(&["render", BONE, "--size", "16384x16384", "--explain"]);
-    let lines = ["- scan_convert        the volume is Cartesian already", "16384 x 16384 x 1", "in all"];
+    let lines = ["- scan_convert        the volume is Cartesian already", "16384 x 16384 x 1", "total"];
     assert!(code == Some(0) && err.is_empty() && lines.iter().all(|l| plan.contains(l)), "{plan}{err}");
     assert!(folder.names().is_empty());
 }

@@ -3,7 +3,7 @@
 
 use crate::common::program::*;
 use crate::common::wait::eventually;
-use echolume::verify::report::{Verdict, json};
+use echolume::verify::report::{self, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -94,7 +94,7 @@ fn a_signal_ends_verify_with_what_it_found() {
     child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said:?}");
     assert!(said.iter().any(|line| line.starts_with("SIGINT: stopping after this check")), "{said:?}");
-    let run = json::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
     let all = run.outcomes.len() - 1;
     let last = &run.outcomes[all];
     assert_eq!((last.name.as_str(), last.verdict), ("every check was run", Verdict::Failed));

@@ -1,7 +1,7 @@
 //! `echolume verify` as CI and a cart call it: its exit codes, its files, and the comparison with an earlier run.
 
 use crate::common::program::*;
-use echolume::verify::report::{Run, Unit, Verdict, json};
+use echolume::verify::report::{self, Run, Unit, Verdict};
 use echolume::verify::self_test;
 use std::fs;
 use std::process::Command;
@@ -17,7 +17,7 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
     let file = folder.path(name);
     let (code, out, err) = verify(&[more, &["--json", &file]].concat());
     assert_eq!(code, Some(0), "{out}{err}");
-    (file.clone(), json::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
+    (file.clone(), report::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
 }
 
 /// All quick checks pass on this device, and every report file says so.
@@ -67,7 +67,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
     let chosen = [&FEW[..], &["--only", "median_distance"]].concat();
     let (file, earlier) = kept(&folder, "before.json", &chosen);
     let again = |name: &str, changed: &Run, threshold: &str| {
-        let file = folder.write(name, json::to_json(changed).expect("JSON"));
+        let file = folder.write(name, report::to_json(&changed).expect("JSON"));
         verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
     };
     // A busy machine is no slower device: any time passes that is not a hundred times longer.

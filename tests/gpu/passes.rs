@@ -3,16 +3,15 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::renderer::size_of;
-use echolume::gpu::{ContextOptions, Fetch, Options, Renderer};
+use echolume::gpu::resources::shape_size;
+use echolume::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
 use echolume::passes::slots::Shape;
 use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
 use echolume::probe::Geometry;
 use echolume::scene::{Sampling, Scene};
-use echolume::verify::inputs::{inputs_of, turn_of};
-use echolume::verify::passes::{POISON, beside};
+use echolume::verify::passes::{POISON, dispatch_args_of, inputs_of, run_with_reference};
 use echolume::verify::report::Level;
-use echolume::verify::{self, Bench, Slack};
+use echolume::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
 
 /// The pass checks of `echolume verify --full`: every input in every scene.
@@ -21,7 +20,7 @@ fn every_pass_matches_its_reference() {
     let device = Device::new();
     println!("device: {}", device.describe());
     let options = ContextOptions { device: chosen(), validation: true };
-    let mut bench = Bench::new(&options, Level::Full).expect("bench");
+    let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
     let checks = verify::passes::checks(Level::Full);
     assert_eq!(checks.len(), PASSES.len());
     let run = verify::run(&mut bench, &checks, || None, |_| ());
@@ -37,8 +36,8 @@ fn every_pass_matches_its_reference() {
 #[test]
 fn storage_loads_and_texture_fetches_give_the_same_texels() {
     let device = Device::new();
-    let ways = [Fetch::Textures, Fetch::Storage];
-    let mut singles = ways.map(|fetch| PassRunner::fetching(&device, fetch).expect("single"));
+    let ways = [TexelAccess::Textures, TexelAccess::Storage];
+    let mut singles = ways.map(|fetch| PassRunner::with_texel_access(&device, fetch).expect("single"));
     let (mut seen, mut loaded) = (HashSet::new(), 0);
     for (name, mut scene) in scenes() {
         // Automatic sampling would differ between the two methods.
@@ -52,7 +51,7 @@ fn storage_loads_and_texture_fetches_give_the_same_texels() {
             if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
-            let args = turn_of(&scene, 0);
+            let args = dispatch_args_of(&scene, 0);
             let inputs = inputs_of(&scene, pass, &args, "noise", 3);
             let [fetched, stored] =
                 singles.each_mut().map(|s| s.run(&scene, pass, &args, &inputs, POISON).expect("dispatch"));
@@ -74,31 +73,32 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
             "picture.size = [{size}, {size}]\nslices = {{ pixels = 24, still = {still} }}\nray.sampling = '{asked}'"
         );
         let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml);
-        let options = Options { fetch, ..Options::default() };
+        let options = RendererOptions { texel_access: fetch, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
         let before = renderer.scene().sampling;
         renderer.change(scene).expect("change");
         assert_eq!(before, renderer.scene().sampling, "a change of scene changes nothing of it");
         before
     };
-    let (textures, storage) = (Some(Fetch::Textures), Some(Fetch::Storage));
+    let (textures, storage) = (Some(TexelAccess::Textures), Some(TexelAccess::Storage));
     assert_eq!(of(textures, "auto", 64, true), Sampling::Hardware);
     assert_eq!(of(storage, "auto", 64, false), Sampling::Quads);
     assert_eq!(of(storage, "auto", 4, true), Sampling::Quads, "many pictures of one volume");
     assert_eq!(of(storage, "auto", 4, false), Sampling::Exact, "fewer samples than pay for quads");
     assert_eq!(of(storage, "hardware", 64, true), Sampling::Hardware);
     assert_eq!(of(textures, "exact", 64, true), Sampling::Exact);
-    assert_eq!(of(None, "auto", 64, true), Fetch::of(&device.candidate).sampling());
+    assert_eq!(of(None, "auto", 64, true), TexelAccess::for_device(&device.candidate).sampling());
 }
 
 #[test]
 fn device_measurements_compute_the_stated_result() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
-    for fetch in [Fetch::Textures, Fetch::Storage] {
-        let mut single = PassRunner::fetching(&device, fetch).expect("single");
+    for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
+        let mut single = PassRunner::with_texel_access(&device, fetch).expect("single");
         for pass in measure::MEASURES {
-            let worst = beside(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
+            let worst =
+                run_with_reference(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
             assert!(worst.is_none(), "{}: {worst:?}", pass.name);
         }
     }
@@ -133,30 +133,39 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     ];
     for (fault, name, told, wrong) in cases {
         let pass = echolume::passes::by_name(name).expect("pass");
-        let right = beside(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
+        let right = run_with_reference(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
         assert!(right.comparison.worst.is_none(), "{name}, unperturbed: {:?}", right.comparison);
         let args = DispatchArgs { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
         for bind in &right.writes {
             let channels = bind.slot.format(told).channels();
-            expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
+            expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(told)), channels));
         }
         (pass.reference)(wrong, &args, &right.inputs, &mut expected);
-        let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
+        let compared = verify::compare_outputs(
+            pass,
+            told,
+            ExtraTolerance::default(),
+            POISON,
+            &expected,
+            &right.got,
+            &right.writes,
+        );
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
     // One voxel.
     let pass = echolume::passes::by_name("median_slice").expect("pass");
-    let right = beside(&mut single, &base, pass, 0, "zero", 5).expect("dispatch");
+    let right = run_with_reference(&mut single, &base, pass, 0, "zero", 5).expect("dispatch");
     let mut inputs = right.inputs;
     let mut source = inputs.get("source").clone();
     let middle = source.size[0] * (source.size[1] / 2) + source.size[0] / 2;
     (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
     inputs.insert("source", source);
     let mut expected = Arrays::default();
-    expected.insert("target", Texels::untouched(size_of(right.writes[0].slot.shape(&base)), 1));
+    expected.insert("target", Texels::untouched(shape_size(right.writes[0].slot.shape(&base)), 1));
     (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
-    let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
+    let compared =
+        verify::compare_outputs(pass, &base, ExtraTolerance::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
 }
 
@@ -166,7 +175,7 @@ fn texels_outside_the_sector_are_not_written() {
     let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
-    let result = beside(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
+    let result = run_with_reference(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
     let (expected, got) = (result.expected, result.got);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
     let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();

@@ -2,7 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::chain::distance_end;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::scene::{Input, Scene};
@@ -133,7 +133,7 @@ fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
         let mut settings = settings(SETTINGS);
         settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
         let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
-        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         while let Some(frame) = recording.next_frame().expect("frame") {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }

@@ -48,7 +48,7 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/plan", &["crate::gpu", "ash::vk"]),
         ("src/barriers", &["crate::gpu", "ash::vk"]),
-        ("src/queues.rs", &["crate::gpu", "ash::vk"]),
+        ("src/queues", &["crate::gpu", "ash::vk"]),
         ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),
         ("src/files", &["crate::", "ash::vk"]),

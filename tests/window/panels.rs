@@ -7,7 +7,7 @@ use echolume::picture::Picture;
 const WINDOW: [u32; 2] = [1000, 700];
 
 fn picture() -> ([u32; 2], [u32; 2]) {
-    echolume::ui::panels::place(WINDOW, 1.0, true)
+    echolume::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
 /// Waits until the middle of the picture, which has no marks, equals that of a headless one.

@@ -1,71 +1,76 @@
-//! The picture and the panels, onto the next image of the window. One such drawing is on its way at a time: it is a copy and a few
-//! triangles, and takes no time beside a picture.
+//! Presents a picture and panels: copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
+//! and a few triangles take little time compared with a picture.
 
-use super::overlay::{Overlay, Panels};
-use super::stages::{Stage, barrier, region};
+use super::overlay::Overlay;
+pub use super::overlay::Panels;
 use super::swapchain::{PresentMode, Swapchain};
-use super::target::Target;
-use crate::barriers::{Access, Worker};
+use super::target::{MonitorChoice, Target, choose_monitor};
+use crate::barriers::{Access, PipelineStage};
 use crate::gpu::barrier_recorder::BarrierRecorder;
-use crate::gpu::error::Doing;
+use crate::gpu::context::Context;
+use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::resources::{Image, WHOLE};
 use crate::gpu::timeline::Timelines;
-use crate::gpu::{Context, GpuError};
 use crate::passes::Slot;
 use ash::vk;
 use std::sync::Arc;
 
-/// How long an image of the window is waited for, ns: what is covered or unplugged may give none.
-const PATIENCE: u64 = 100_000_000;
-/// What surrounds the picture: the panels' background.
+/// Time-out for acquiring an image of the window, ns. A window that is covered or unplugged may never provide one.
+const ACQUIRE_TIMEOUT_NS: u64 = 100_000_000;
+/// The colour around the picture, which is the background of the panels.
 const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
 
-/// What became of showing something.
+/// The result of presenting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PresentOutcome {
-    Shown,
-    /// There is nothing to show it on now: the window is minimised, covered, or its monitor is gone.
-    Nowhere,
+    Presented,
+    /// Nothing can be presented now: the window is minimised or covered, or its monitor is gone.
+    NotPresentable,
 }
 
-/// The picture that a renderer holds, and what orders it before and after what that renderer does.
+/// The picture of a renderer, and what orders its use among the renderer's work.
 pub(in crate::gpu) struct Drawn<'a> {
     pub image: &'a Image,
-    pub order: &'a mut BarrierRecorder,
+    pub barriers: &'a mut BarrierRecorder,
     pub timelines: &'a mut Timelines,
-    /// Its upper left corner on the window, pixels.
+    /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
 }
 
-/// A window or monitor that is drawn on.
+/// A window or monitor on which pictures are presented.
 pub struct Screen {
-    // Dropped in this order, after `drop` has waited for the device.
+    // Fields are dropped in this order, after `drop` has waited for the device.
     overlay: Option<Overlay>,
     chain: Swapchain,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
-    /// Signalled when the image that was acquired may be written.
+    /// Signalled when the acquired image may be written.
     free: vk::Semaphore,
     /// Signalled when the last drawing is done.
     done: vk::Fence,
     context: Arc<Context>,
-    /// The swapchain does not fit the surface any more.
+    /// The swapchain no longer matches the surface.
     stale: bool,
-    /// The surface itself is gone.
+    /// The surface was lost.
     lost: bool,
-    /// An image was acquired and never shown: its semaphore is of no use any more.
-    spoilt: bool,
+    /// An image was acquired but not presented, so its semaphore cannot be used again.
+    unused_acquire: bool,
     wanted: [u32; 2],
     shown: u64,
 }
 
 impl Screen {
-    /// `size`: of the window, pixels; a monitor has its own.
+    /// `size`: the size of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
-    /// A target that the device cannot show anything on.
-    pub fn new(context: &Arc<Context>, target: Target, size: [u32; 2], pace: PresentMode) -> Result<Screen, GpuError> {
-        let chain = Swapchain::new(context, target, pace)?;
+    /// A target on which the device cannot present.
+    pub fn new(
+        context: &Arc<Context>,
+        target: Target,
+        size: [u32; 2],
+        present_mode: PresentMode,
+    ) -> Result<Screen, GpuError> {
+        let chain = Swapchain::new(context, target, present_mode)?;
         let device = &context.device;
         let mut screen = Screen {
             overlay: None,
@@ -77,44 +82,44 @@ impl Screen {
             context: context.clone(),
             stale: true,
             lost: false,
-            spoilt: false,
+            unused_acquire: false,
             wanted: size,
             shown: 0,
         };
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(0).family);
         // SAFETY: the create structures are complete; a failure drops `screen`, which frees what is made (null is allowed).
         unsafe {
-            screen.pool = device.create_command_pool(&create, None).doing(|| "create commands".into())?;
+            screen.pool = device.create_command_pool(&create, None).context(|| "create commands".into())?;
             let allocate = vk::CommandBufferAllocateInfo::default().command_pool(screen.pool).command_buffer_count(1);
-            screen.commands = device.allocate_command_buffers(&allocate).doing(|| "create commands".into())?[0];
+            screen.commands = device.allocate_command_buffers(&allocate).context(|| "create commands".into())?[0];
             let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-            screen.done = device.create_fence(&signalled, None).doing(|| "create a fence".into())?;
-            screen.free = device.create_semaphore(&Default::default(), None).doing(|| "create a semaphore".into())?;
+            screen.done = device.create_fence(&signalled, None).context(|| "create a fence".into())?;
+            screen.free = device.create_semaphore(&Default::default(), None).context(|| "create a semaphore".into())?;
         }
         context.name(screen.commands, "window");
         Ok(screen)
     }
 
-    /// Pixels; of the last image that was shown.
+    /// Size of the last presented image, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.chain.size
     }
 
-    /// The window has this size from here on, pixels.
+    /// Sets the size of the window, pixels.
     pub fn resize(&mut self, size: [u32; 2]) {
         self.stale |= size != self.wanted || size != self.chain.size;
         self.wanted = size;
     }
 
-    /// How often something was shown.
+    /// Number of presented images.
     pub fn shown(&self) -> u64 {
         self.shown
     }
 
-    /// Shows panels alone: there is no picture yet.
+    /// Presents panels without a picture.
     ///
     /// # Errors
-    /// A device that fails; a surface that is lost and cannot be had anew.
+    /// A device that fails; a lost surface that cannot be recreated.
     pub fn show(&mut self, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(None, panels)
     }
@@ -129,38 +134,38 @@ impl Screen {
             if self.overlay.is_none() {
                 self.overlay = Some(Overlay::new(&self.context, self.chain.format)?);
             }
-            // Also where nothing will be shown: they are told once.
+            // Also if nothing can be presented: each change is reported only once.
             if let Some(overlay) = &mut self.overlay {
                 overlay.take_textures(std::mem::take(&mut panels.textures))?;
             }
         }
-        // Once more where the first image says that it does not fit.
+        // Tries again if the swapchain turns out to be out of date.
         for _ in 0..2 {
             if !self.fit()? {
-                return Ok(PresentOutcome::Nowhere);
+                return Ok(PresentOutcome::NotPresentable);
             }
-            match self.chain.acquire(PATIENCE, self.free) {
+            match self.chain.acquire(ACQUIRE_TIMEOUT_NS, self.free) {
                 Ok(image) => {
-                    self.spoilt = true;
+                    self.unused_acquire = true;
                     self.draw(image, drawn.as_mut(), panels.as_ref())?;
-                    self.spoilt = false;
+                    self.unused_acquire = false;
                     return self.present(image);
                 }
-                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::Nowhere),
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::NotPresentable),
                 Err(result) => self.note(result)?,
             }
         }
-        Ok(PresentOutcome::Nowhere)
+        Ok(PresentOutcome::NotPresentable)
     }
 
-    /// What a call about the surface said: what can be mended is mended before the next one.
+    /// Notes an error of the surface. What can be recreated is recreated at the next call.
     fn note(&mut self, result: vk::Result) -> Result<(), GpuError> {
         match result {
             vk::Result::ERROR_OUT_OF_DATE_KHR => self.stale = true,
             vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
                 (self.lost, self.stale) = (true, true);
             }
-            result => return Err(GpuError::Vulkan { doing: "show a picture".into(), result }),
+            result => return Err(GpuError::Vulkan { operation: "show a picture".into(), result }),
         }
         Ok(())
     }
@@ -170,42 +175,42 @@ impl Screen {
             Ok(unfit) => self.stale |= unfit,
             Err(result) => {
                 self.note(result)?;
-                return Ok(PresentOutcome::Nowhere);
+                return Ok(PresentOutcome::NotPresentable);
             }
         }
         self.shown += 1;
-        Ok(PresentOutcome::Shown)
+        Ok(PresentOutcome::Presented)
     }
 
     /// Waits for the last drawing.
     fn wait(&self) -> Result<(), GpuError> {
-        // SAFETY: the fence is alive; it is signalled or a submission that signals it is on its way.
+        // SAFETY: the fence is alive; it is signalled, or a submission in flight will signal it.
         unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
-            .doing(|| "draw on the window".into())
+            .context(|| "draw on the window".into())
     }
 
-    /// Images that fit the surface; false where there is nothing to show on.
+    /// Recreates what no longer matches the surface; false if nothing can be presented.
     fn fit(&mut self) -> Result<bool, GpuError> {
         if self.lost {
             self.chain.renew_surface()?;
-            // Another surface may take another format.
+            // Another surface may need another format.
             self.overlay = None;
             self.lost = false;
             return Ok(false);
         }
-        if !(self.stale || self.spoilt) {
+        if !(self.stale || self.unused_acquire) {
             return Ok(true);
         }
         self.context.wait_idle();
-        if self.spoilt {
+        if self.unused_acquire {
             // SAFETY: the device is idle.
             unsafe {
                 self.context.device.destroy_semaphore(self.free, None);
                 self.free = vk::Semaphore::null();
                 let made = self.context.device.create_semaphore(&Default::default(), None);
-                self.free = made.doing(|| "create a semaphore".into())?;
+                self.free = made.context(|| "create a semaphore".into())?;
             }
-            self.spoilt = false;
+            self.unused_acquire = false;
         }
         match self.chain.fit(self.wanted) {
             Ok(fits) => {
@@ -233,7 +238,7 @@ impl Screen {
                 .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
                 .and_then(|()| device.begin_command_buffer(commands, &begin))
         }
-        .doing(|| "record the window".into())?;
+        .context(|| "record the window".into())?;
         let mut at = Stage::Acquired;
         let mut go = |to: Stage| {
             barrier(&device, commands, target, at, to);
@@ -250,12 +255,12 @@ impl Screen {
             go(Stage::Copied);
         }
         if let (Some(drawn), Some((region, [w, h]))) = (drawn, region) {
-            drawn.order.begin(0);
-            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, Worker::Copy);
-            drawn.order.before(&self.context, 0, commands, &[read]);
+            drawn.barriers.begin(0);
+            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
+            drawn.barriers.before(&self.context, 0, commands, &[read]);
             if w > 0 && h > 0 {
-                // Of the same size: no value changes, only the order of the channels.
-                // SAFETY: both images are alive and in these layouts; the region lies in both.
+                // The size is the same: only the order of the channels changes.
+                // SAFETY: both images are alive and in these layouts; the region is inside both.
                 unsafe {
                     device.cmd_blit_image(
                         commands,
@@ -268,7 +273,7 @@ impl Screen {
                     );
                 }
             }
-            queued = Some((&mut *drawn.order, &mut *drawn.timelines));
+            queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
         }
         if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
             go(Stage::Drawn);
@@ -288,7 +293,7 @@ impl Screen {
         }
         go(Stage::Shown);
         // SAFETY: the command buffer is being recorded.
-        unsafe { device.end_command_buffer(commands) }.doing(|| "record the window".into())?;
+        unsafe { device.end_command_buffer(commands) }.context(|| "record the window".into())?;
         self.submit(after, queued)
     }
 
@@ -303,13 +308,13 @@ impl Screen {
         let mut signals = vec![semaphore(drawn).stage_mask(everything)];
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let mut after = Vec::new();
-        if let Some((order, timelines)) = &queued {
-            after = order.queues.waits(0);
+        if let Some((barriers, timelines)) = &queued {
+            after = barriers.queues.waits(0);
             let wait = |w: &crate::queues::Wait| {
                 semaphore(timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
             };
             waits.extend(after.iter().map(wait));
-            // What the renderer does later comes after this too.
+            // Later work of the renderer waits for this too.
             let timeline = timelines.of(0);
             signals.push(semaphore(timeline.semaphore).value(timeline.submitted + 1).stage_mask(everything));
         }
@@ -318,23 +323,23 @@ impl Screen {
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(&signals);
         // SAFETY: its last submission is done.
-        unsafe { self.context.device.reset_fences(&[self.done]) }.doing(|| "reset a fence".into())?;
+        unsafe { self.context.device.reset_fences(&[self.done]) }.context(|| "reset a fence".into())?;
         let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
         if let Err(error) = sent {
-            // Nothing is on its way that would signal it.
+            // No submission in flight would signal the fence.
             self.signal();
             return Err(error);
         }
-        if let Some((order, timelines)) = queued {
+        if let Some((barriers, timelines)) = queued {
             let timeline = timelines.of_mut(0);
             timeline.submitted += 1;
-            timeline.doing = "window".into();
-            order.submitted(0, &after, timeline.submitted);
+            timeline.label = "window".into();
+            barriers.submitted(0, &after, timeline.submitted);
         }
         Ok(())
     }
 
-    /// An empty submission that signals the fence; where even that fails the device is lost, and nothing waits.
+    /// Signals the fence by an empty submission. If that fails too, the device is lost and nothing waits for the fence.
     fn signal(&self) {
         // SAFETY: the fence is not in use.
         let _ = self.context.on_queue(|queue| unsafe { self.context.device.queue_submit2(queue, &[], self.done) });
@@ -352,4 +357,87 @@ impl Drop for Screen {
             self.context.device.destroy_fence(self.done, None);
         }
     }
+}
+
+/// Resolution of the mode that `choice` selects, pixels.
+///
+/// # Errors
+/// No such monitor or mode; a context that was not opened for a monitor.
+pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2], GpuError> {
+    let displays = context.presentation.as_ref().and_then(|p| p.displays.as_ref());
+    let displays = displays.ok_or_else(|| GpuError::Window("the device was not opened for a monitor".into()))?;
+    let region = choose_monitor(displays, context.candidate.handle, choice)?.mode.parameters.visible_region;
+    Ok([region.width, region.height])
+}
+
+/// The blit that copies a picture to pixel `at` of a window of this size, and the size that it covers. Pictures are cropped, never
+/// scaled.
+fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u32; 2]) {
+    let from = [image.extent.width, image.extent.height];
+    let [w, h] = std::array::from_fn(|i| from[i].min(size[i].saturating_sub(at[i])));
+    let layers =
+        vk::ImageSubresourceLayers { aspect_mask: vk::ImageAspectFlags::COLOR, layer_count: 1, ..Default::default() };
+    let corner = |x: u32, y: u32, z: i32| vk::Offset3D { x: x as i32, y: y as i32, z };
+    let blit = vk::ImageBlit {
+        src_subresource: layers,
+        src_offsets: [corner(0, 0, 0), corner(w, h, 1)],
+        dst_subresource: layers,
+        dst_offsets: [corner(at[0], at[1], 0), corner(at[0] + w, at[1] + h, 1)],
+    };
+    (blit, [w, h])
+}
+
+/// The stages of an image of the window, in order.
+#[derive(Clone, Copy)]
+enum Stage {
+    Acquired,
+    Copied,
+    Drawn,
+    Shown,
+}
+
+impl Stage {
+    fn layout(self) -> vk::ImageLayout {
+        match self {
+            Stage::Acquired => vk::ImageLayout::UNDEFINED,
+            Stage::Copied => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+            Stage::Drawn => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            Stage::Shown => vk::ImageLayout::PRESENT_SRC_KHR,
+        }
+    }
+
+    fn stages(self) -> vk::PipelineStageFlags2 {
+        match self {
+            // The stage of the wait for the semaphore of the acquired image.
+            Stage::Acquired | Stage::Copied => vk::PipelineStageFlags2::ALL_TRANSFER,
+            Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+            // The stage of the semaphore that presentation waits for.
+            Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
+        }
+    }
+
+    fn accesses(self) -> vk::AccessFlags2 {
+        match self {
+            Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
+            Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
+            Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,
+        }
+    }
+}
+
+/// Records the transition of a window's image from one stage to another.
+fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
+    let barrier = [vk::ImageMemoryBarrier2::default()
+        .src_stage_mask(from.stages())
+        .src_access_mask(from.accesses())
+        .dst_stage_mask(to.stages())
+        .dst_access_mask(to.accesses())
+        .old_layout(from.layout())
+        .new_layout(to.layout())
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .image(image)
+        .subresource_range(WHOLE)];
+    // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image was acquired.
+    unsafe { device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&barrier)) };
 }

@@ -1,34 +1,33 @@
-//! The motor of a probe: where it is, home, back and forth over the sweep, stop. Nothing moves before the limits are checked,
-//! and nothing goes on moving after a fault.
+//! Drives the motor of a probe: status, home, sweep, stop. Nothing moves before the limits are checked, and every fault stops the motor.
+//!
+//! Home is found by the module's own reference search, or by this program with the home switch.
 
 use super::fault::{Fault, MotorError, Stopped};
 use super::guard::{Guard, Interrupter};
-use super::port::{Answer, Port, PortSettings};
+use super::port::{Answer, PERIOD, Port, PortSettings};
 use super::sweep::{Direction, Position, Sweep};
-use super::table::{MotorTable, Side};
+use super::table::{Home, MotorTable, Side};
 use super::tmcl::{self, Request, axis};
 use std::time::{Duration, Instant};
 
-/// Shortest time between two questions for the position.
-pub(super) const PERIOD: Duration = Duration::from_millis(5);
-/// Without any movement for so long the motor does not follow.
-const STILL: Duration = Duration::from_millis(400);
-/// Every how many positions the limit switch ahead is looked at as well.
+/// Without any movement for so long the motor has stalled.
+const STALL_TIME: Duration = Duration::from_millis(400);
+/// The limit switch ahead is read after so many positions.
 const LOOK_AHEAD: usize = 8;
 
-/// What the module says of itself.
+/// Status of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorStatus {
-    /// Number and firmware, `TMCM-1140 firmware 1.16`.
+    /// Number and firmware, for example `TMCM-1140 firmware 1.16`.
     pub module: String,
-    /// Degrees; true only after home.
+    /// Degrees; valid only after [`Drive::home`].
     pub angle: f64,
     /// Degrees a second.
     pub speed: f64,
     pub home_switch: bool,
     pub left_limit: bool,
     pub right_limit: bool,
-    /// Time of the module's own watchdog; zero if it is off, nothing if it has none.
+    /// Time-out of the module's own watchdog; zero if it is off, None if it has none.
     pub watchdog: Option<Duration>,
 }
 
@@ -40,10 +39,10 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Opens the port and makes sure that the module is the one of the table. Moves nothing.
+    /// Opens the port and checks that the module is the one of the table. Moves nothing.
     ///
     /// # Errors
-    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that already turns is then stopped if it can be.
+    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that is already moving is then stopped if possible.
     pub fn open(settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let mut drive = Drive::connect("open", settings, table)?;
         let module = drive.identify();
@@ -58,7 +57,7 @@ impl Drive {
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
 
-    /// Where the motor is and how the module stands. Moves nothing.
+    /// Position, speed, switches and watchdog. Moves nothing.
     ///
     /// # Errors
     /// Any [`Fault`] of the port.
@@ -67,7 +66,7 @@ impl Drive {
         self.done("status", status)
     }
 
-    /// Finds home and counts positions from there.
+    /// Finds home. Positions are counted from there.
     ///
     /// # Errors
     /// Any [`Fault`]; the motor is then stopped.
@@ -78,27 +77,27 @@ impl Drive {
         self.done("home", found)
     }
 
-    /// Goes to the sweep's start and back and forth over it; [`Drive::home`] comes first. Each position that was read goes to
-    /// `seen`, its time in seconds since `start`, rising.
+    /// Moves to the start of the sweep and back and forth over it. Call [`Drive::home`] first. Each position that is read is passed to
+    /// `on_position`, with its time in s since `start`, in rising order. Returns the number of passes.
     ///
     /// # Errors
-    /// Any [`Fault`], [`Fault::OutOfRange`] before anything has moved; the motor is then stopped.
+    /// Any [`Fault`], [`Fault::OutOfRange`] before anything moves. The motor is stopped after any other.
     pub fn sweep(
         &mut self,
         sweep: &Sweep,
         start: Instant,
-        seen: &mut dyn FnMut(Position),
+        on_position: &mut dyn FnMut(Position),
     ) -> Result<usize, MotorError> {
-        let swept = self.sweep_all(sweep, start, seen);
+        let swept = self.sweep_all(sweep, start, on_position);
         self.done("sweep", swept)
     }
 
-    /// Ends from another thread whatever this one is doing. The motor is stopped within one request and its reply.
+    /// A handle that stops the motor from another thread, within one request and its reply.
     pub fn interrupter(&self) -> Interrupter {
         self.guard.interrupter().clone()
     }
 
-    /// Opens the port and stops the motor before anything else is asked, whichever module it is.
+    /// Opens the port and stops the motor before anything else is requested, whichever module it is.
     ///
     /// # Errors
     /// As [`Drive::stop`], and [`Fault::NotOpened`].
@@ -106,10 +105,10 @@ impl Drive {
         Drive::connect("stop", settings, table)?.stop()
     }
 
-    /// Stops the motor and waits until it stands.
+    /// Stops the motor and waits until it is at rest.
     ///
     /// # Errors
-    /// When the module does not confirm it, or turns on.
+    /// The module does not confirm it, or the motor keeps moving.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         let stopped = self.guard.stop();
         let path = self.guard.port().settings().path.clone();
@@ -117,23 +116,23 @@ impl Drive {
             let fault = Fault::NoReply { request: "MST".into(), timeout: self.guard.port().settings().timeout };
             return Err(MotorError { port: path, operation: "stop", fault, stopped });
         }
-        let stands = self.wait_still();
-        self.done("stop", stands)
+        let stopped = self.wait_still();
+        self.done("stop", stopped)
     }
 
     fn done<T>(&mut self, operation: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
         result.map_err(|fault| self.guard.fail(operation, fault))
     }
 
-    pub(super) fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
+    fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
         self.guard.ask(&request(self.table.address, self.table.motor))
     }
 
-    pub(super) fn get(&mut self, parameter: u8) -> Result<i32, Fault> {
+    fn get(&mut self, parameter: u8) -> Result<i32, Fault> {
         self.ask(|a, m| Request::get_axis(a, m, parameter)).map(|answer| answer.value)
     }
 
-    pub(super) fn set(&mut self, parameter: u8, value: i32) -> Result<(), Fault> {
+    fn set(&mut self, parameter: u8, value: i32) -> Result<(), Fault> {
         self.ask(|a, m| Request::set_axis(a, m, parameter, value)).map(drop)
     }
 
@@ -141,14 +140,14 @@ impl Drive {
         let answer = self.guard.ask(&Request::version(self.table.address))?.value as u32;
         let (mut module, mut version) = ((answer >> 16) as u16, format!("{}.{}", answer >> 8 & 0xff, answer & 0xff));
         if module == 0 {
-            // Older firmware gives its number as text only.
+            // Older firmware reports its number as text only.
             let bytes = self.guard.ask_raw(&Request::version_text(self.table.address))?;
             (module, version) = tmcl::version_text(&bytes).unwrap_or((0, version));
         }
         match self.table.module {
-            Some(wanted) if wanted != module => Err(Fault::WrongModule {
+            Some(expected) if expected != module => Err(Fault::WrongModule {
                 found: format!("module {module}, firmware {version}"),
-                wanted: format!("module {wanted}"),
+                wanted: format!("module {expected}"),
             }),
             _ => Ok(format!("TMCM-{module} firmware {version}")),
         }
@@ -170,26 +169,31 @@ impl Drive {
     fn watchdog(&mut self) -> Result<Option<Duration>, Fault> {
         match self.guard.ask(&Request::get_global(self.table.address, tmcl::WATCHDOG)) {
             Ok(answer) => Ok(Some(Duration::from_millis(answer.value.max(0) as u64))),
-            // It knows no such parameter, or no global ones at all.
+            // The module has no such parameter, or no global parameters at all.
             Err(Fault::Refused { status: 2..=4 | 6, .. }) => Ok(None),
             Err(fault) => Err(fault),
         }
     }
 
-    /// Sets the module's watchdog as the table has it. The module keeps it over power-off, so it is written only when it differs.
+    /// Sets the module's watchdog to the value of the table. The module stores it permanently, so it is written only if it differs.
     fn set_watchdog(&mut self) -> Result<(), Fault> {
-        let Some(wanted) = self.table.watchdog_ms else { return Ok(()) };
+        let Some(expected) = self.table.watchdog_ms else { return Ok(()) };
         match self.watchdog()? {
             None => tracing::warn!("the module has no watchdog: if this process is killed, the motor is not stopped"),
-            Some(now) if now.as_millis() == u128::from(wanted) => {}
+            Some(now) if now.as_millis() == u128::from(expected) => {}
             Some(_) => {
-                self.guard.ask(&Request::set_global(self.table.address, tmcl::WATCHDOG, i32::from(wanted)))?;
+                self.guard.ask(&Request::set_global(self.table.address, tmcl::WATCHDOG, i32::from(expected)))?;
             }
         }
         Ok(())
     }
 
-    fn sweep_all(&mut self, sweep: &Sweep, start: Instant, seen: &mut dyn FnMut(Position)) -> Result<usize, Fault> {
+    fn sweep_all(
+        &mut self,
+        sweep: &Sweep,
+        start: Instant,
+        on_position: &mut dyn FnMut(Position),
+    ) -> Result<usize, Fault> {
         let speed = sweep.speed(&self.table, self.guard.port().settings().round_trip())?;
         self.set_watchdog()?;
         for side in [Side::Left, Side::Right] {
@@ -208,7 +212,7 @@ impl Drive {
                 let time = at.saturating_duration_since(start).as_secs_f64();
                 if time > last {
                     last = time;
-                    seen(Position { time, angle, direction, pass });
+                    on_position(Position { time, angle, direction, pass });
                 }
             })?;
         }
@@ -216,8 +220,8 @@ impl Drive {
         Ok(volumes)
     }
 
-    /// Goes to an angle and watches it get there.
-    fn travel(&mut self, angle: f64, speed: f64, seen: &mut dyn FnMut(Instant, f64)) -> Result<(), Fault> {
+    /// Moves to an angle, reading positions until it is reached.
+    fn travel(&mut self, angle: f64, speed: f64, on_position: &mut dyn FnMut(Instant, f64)) -> Result<(), Fault> {
         let target = self.table.position(angle);
         let begin = self.get(axis::POSITION)?;
         let from = self.table.angle(begin);
@@ -230,7 +234,7 @@ impl Drive {
             let asked = Instant::now();
             let answer = self.ask(|a, m| Request::get_axis(a, m, axis::POSITION))?;
             if !answer.repeated {
-                seen(answer.at, self.table.angle(answer.value));
+                on_position(answer.at, self.table.angle(answer.value));
             }
             if answer.value == target {
                 return Ok(());
@@ -238,7 +242,7 @@ impl Drive {
             if last != Some(answer.value) {
                 (last, moved) = (Some(answer.value), Instant::now());
             }
-            let still = moved.elapsed() > STILL;
+            let still = moved.elapsed() > STALL_TIME;
             if still || usize::is_multiple_of(count, LOOK_AHEAD) {
                 self.check_limit(ahead)?;
             }
@@ -247,14 +251,14 @@ impl Drive {
                 return Err(Fault::Stalled { angle: self.table.angle(answer.value) });
             }
             if start.elapsed() > limit {
-                return Err(Fault::TooLong { what: "the way to the end of the sweep", limit });
+                return Err(Fault::TooLong { what: "the move to the end of the sweep", limit });
             }
             std::thread::sleep(PERIOD.saturating_sub(asked.elapsed()));
         }
         Ok(())
     }
 
-    pub(super) fn limit_closed(&mut self, side: Side) -> Result<bool, Fault> {
+    fn limit_closed(&mut self, side: Side) -> Result<bool, Fault> {
         let switch = if side == Side::Left { axis::LEFT_LIMIT } else { axis::RIGHT_LIMIT };
         Ok(self.get(switch)? != 0)
     }
@@ -267,12 +271,12 @@ impl Drive {
         Ok(())
     }
 
-    pub(super) fn at_home_switch(&mut self) -> Result<bool, Fault> {
+    fn at_home_switch(&mut self) -> Result<bool, Fault> {
         Ok((self.get(axis::HOME_SWITCH)? != 0) != self.table.home_inverted)
     }
 
-    /// Waits until the motor stands, 5 s at most.
-    pub(super) fn wait_still(&mut self) -> Result<(), Fault> {
+    /// Waits until the motor is at rest, 5 s at most.
+    fn wait_still(&mut self) -> Result<(), Fault> {
         let (start, limit) = (Instant::now(), Duration::from_secs(5));
         while self.get(axis::SPEED)? != 0 {
             if start.elapsed() > limit {
@@ -281,5 +285,144 @@ impl Drive {
             std::thread::sleep(PERIOD);
         }
         Ok(())
+    }
+}
+
+/// Without any movement for so long a search has stalled. The module's own search may pause between its steps.
+const SEARCH_STALL_TIME: Duration = Duration::from_millis(1500);
+/// Speed of the last, exact approach to the switch, as a fraction of that of the first.
+const SLOW_APPROACH: f64 = 0.1;
+
+/// What ended a rotation.
+enum RotationEnd {
+    /// The home switch reached the requested state, at this position.
+    Switch(i32),
+    /// The limit switch ahead is closed.
+    Limit,
+}
+
+impl Drive {
+    fn find_home(&mut self) -> Result<(), Fault> {
+        self.set(axis::LARGEST_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
+        match self.table.home {
+            Home::ReferenceSearch => self.search_by_module(),
+            Home::Switch => self.search_by_switch(),
+        }?;
+        self.wait_still()?;
+        self.guard.at_rest();
+        Ok(())
+    }
+
+    /// Longest time that a search may take: twice the time to and fro over the whole travel.
+    fn longest_search(&self) -> Duration {
+        Duration::from_secs_f64(5.0 + 4.0 * self.table.largest_angle_deg / self.table.search_speed())
+    }
+
+    fn search_by_module(&mut self) -> Result<(), Fault> {
+        if let Some(speed) = self.table.search_speed_deg_per_s {
+            let velocity = self.table.velocity(speed);
+            self.set(axis::SEARCH_SPEED, velocity)?;
+            self.set(axis::SWITCH_SPEED, (velocity / 2).max(1))?;
+        }
+        let limit = self.longest_search();
+        self.ask(Request::search_start)?;
+        let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
+        while self.ask(Request::search_status)?.value != 0 {
+            let position = self.get(axis::POSITION)?;
+            if last != Some(position) {
+                (last, moved) = (Some(position), Instant::now());
+            }
+            self.check_moves(position, moved)?;
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "the module's reference search", limit });
+            }
+        }
+        Ok(())
+    }
+
+    /// Rotates towards the switch, reversing once at a limit switch, then slowly back over its edge, which is home. The edge is always
+    /// approached from the same side, so that the backlash of the gear has no effect.
+    fn search_by_switch(&mut self) -> Result<(), Fault> {
+        let (towards, speed) = (self.table.home_direction, self.table.search_speed());
+        if !self.at_home_switch()? && matches!(self.rotate(towards, speed, true)?, RotationEnd::Limit) {
+            self.rest()?;
+            if let RotationEnd::Limit = self.rotate(towards.other(), speed, true)? {
+                return Err(Fault::HomeNotFound);
+            }
+        }
+        self.rest()?;
+        // Fast off the switch and onto it again, so that the slow approach below is short wherever the search began.
+        if let RotationEnd::Limit = self.rotate(towards.other(), speed, false)? {
+            return Err(Fault::HomeNotFound);
+        }
+        self.rest()?;
+        if let RotationEnd::Limit = self.rotate(towards, speed * SLOW_APPROACH.sqrt(), true)? {
+            return Err(Fault::HomeNotFound);
+        }
+        self.rest()?;
+        let RotationEnd::Switch(edge) = self.rotate(towards.other(), speed * SLOW_APPROACH, false)? else {
+            return Err(Fault::HomeNotFound);
+        };
+        self.rest()?;
+        // Position and target are set together, at rest, so that the motor does not move.
+        let position = self.get(axis::POSITION)?.saturating_sub(edge);
+        self.set(axis::POSITION, position)?;
+        self.set(axis::TARGET, position)
+    }
+
+    fn rest(&mut self) -> Result<(), Fault> {
+        self.ask(Request::stop)?;
+        self.wait_still()
+    }
+
+    /// Rotates until the home switch is closed (or open), or the limit switch ahead is closed.
+    fn rotate(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<RotationEnd, Fault> {
+        let (velocity, limit) = (self.table.velocity(speed), self.longest_search().mul_f64(1.0 / SLOW_APPROACH));
+        let request = if side == Side::Left { Request::rotate_left } else { Request::rotate_right };
+        if self.limit_closed(side)? {
+            return Ok(RotationEnd::Limit);
+        }
+        let first = self.get(axis::POSITION)?;
+        let travel = 1.5 * self.table.largest_angle_deg * self.table.steps_per_degree();
+        self.ask(|a, m| request(a, m, velocity))?;
+        let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
+        loop {
+            // The switch changed between the position before and the one after.
+            let before = self.get(axis::POSITION)?;
+            if self.at_home_switch()? == until_closed {
+                let after = self.get(axis::POSITION)?;
+                return Ok(RotationEnd::Switch(((i64::from(before) + i64::from(after)) / 2) as i32));
+            }
+            if self.limit_closed(side)? {
+                return Ok(RotationEnd::Limit);
+            }
+            if last != Some(before) {
+                (last, moved) = (Some(before), Instant::now());
+            }
+            self.check_moves(before, moved)?;
+            if (f64::from(before) - f64::from(first)).abs() > travel {
+                return Err(Fault::HomeNotFound);
+            }
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "the search for the home switch", limit });
+            }
+        }
+    }
+
+    /// Checks that the motor moved lately.
+    ///
+    /// # Errors
+    /// It did not: it is at a limit switch, or has stalled.
+    fn check_moves(&mut self, position: i32, moved: Instant) -> Result<(), Fault> {
+        if moved.elapsed() < SEARCH_STALL_TIME {
+            return Ok(());
+        }
+        let angle = self.table.angle(position);
+        for side in [Side::Left, Side::Right] {
+            if self.limit_closed(side)? {
+                return Err(Fault::LimitSwitch { side, angle });
+            }
+        }
+        Err(Fault::Stalled { angle })
     }
 }

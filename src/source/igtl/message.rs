@@ -1,6 +1,7 @@
-//! What a consumer gets.
+//! The messages, as the user of a client receives them.
 
-use super::image::Image;
+use super::wire::{Fault, Fields};
+use glam::{DMat4, DVec3, DVec4};
 
 /// A decoded message.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +19,7 @@ pub enum Message {
 pub struct Transform {
     /// At most 20 bytes on the wire.
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
     /// Upper three rows of the 4 x 4 matrix; the last column in mm. Finite.
     pub matrix: [[f32; 4]; 3],
@@ -28,9 +29,9 @@ pub struct Transform {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackingData {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// Those that are seen at the moment; may be none.
+    /// The tools that are visible at the moment; may be empty.
     pub tools: Vec<Tool>,
 }
 
@@ -44,7 +45,7 @@ pub struct Tool {
     pub matrix: [[f32; 4]; 3],
 }
 
-/// What of a tool's pose is known (trackingdata.md).
+/// Which degrees of freedom of a tool are known (trackingdata.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToolKind {
     /// 1: the tracker itself.
@@ -53,19 +54,19 @@ pub enum ToolKind {
     SixD,
     /// 3: only the tip.
     ThreeD,
-    /// 4: tip and handle, but not the turn about the line between them.
+    /// 4: tip and handle, but not the rotation about the line between them.
     FiveD,
 }
 
-/// STATUS: how a device is.
+/// STATUS: the state of a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// 1 is well, 2 to 19 are faults that status.md lists.
+    /// 1 is OK, 2 to 19 are faults that status.md lists.
     pub code: u16,
-    /// The device's own.
+    /// Defined by the device.
     pub subcode: i64,
     /// At most 20 bytes on the wire.
     pub name: String,
@@ -76,21 +77,21 @@ pub struct Status {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// Latin-1 where the message says so, otherwise read as UTF-8, which ASCII is a part of. At most 65535 bytes on the wire.
+    /// Decoded from Latin-1 if the message says so, otherwise from UTF-8. At most 65535 bytes on the wire.
     pub text: String,
 }
 
-/// A message of a type that is not read; its body was checked and passed over.
+/// A message of a type that is not used. The checksum of its body was verified.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Other {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// The type's name, at most 12 bytes on the wire.
+    /// Name of the type, at most 12 bytes on the wire.
     pub kind: String,
-    /// Of the body.
+    /// Length of the body, bytes.
     pub bytes: usize,
 }
 
@@ -123,7 +124,7 @@ impl Message {
         }
     }
 
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub fn time(&self) -> f64 {
         match self {
             Message::Transform(m) => m.time,
@@ -135,7 +136,7 @@ impl Message {
         }
     }
 
-    /// The type's name on the wire.
+    /// Name of the type on the wire.
     pub fn kind(&self) -> &str {
         match self {
             Message::Transform(_) => "TRANSFORM",
@@ -147,7 +148,7 @@ impl Message {
         }
     }
 
-    /// Bytes of memory, about.
+    /// Approximate memory, bytes.
     pub(super) fn weight(&self) -> usize {
         let held = match self {
             Message::TrackingData(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
@@ -158,5 +159,189 @@ impl Message {
             Message::Transform(_) => 0,
         };
         size_of::<Message>() + self.device().len() + held
+    }
+}
+
+/// IMAGE: a 2D image, a volume, or a part of one. On the wire: 72 bytes that describe the samples, then the samples (image.md).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    pub device: String,
+    /// Time stamp, s since 1970; 0: none.
+    pub time: f64,
+    /// Pixels of the whole image along i (fastest), j and k, each at least 1.
+    pub size: [u16; 3],
+    /// The part of the image that this message contains; usually all of it.
+    pub region: Region,
+    pub scalar: Scalar,
+    /// Values of a pixel, interleaved; at least 1.
+    pub components: u8,
+    /// Coordinate system of `axes` and `centre`.
+    pub coordinates: Coordinates,
+    /// One step along i, j and k, mm: direction times spacing. Finite; may be 0 for an axis of one pixel.
+    pub axes: [[f32; 3]; 3],
+    /// Centre of the whole image, mm. Finite.
+    pub centre: [f32; 3],
+    /// Samples of the region, converted to little-endian, i fastest.
+    pub bytes: Vec<u8>,
+}
+
+/// A rectangular part of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// The first pixel.
+    pub offset: [u16; 3],
+    pub size: [u16; 3],
+}
+
+/// Type of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+/// Coordinate system of the patient: x to the right or left, y to the front or back, z to the head.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Right, anterior, superior.
+    Ras,
+    /// Left, posterior, superior.
+    Lps,
+}
+
+const SCALARS: [(u8, Scalar); 8] = [
+    (2, Scalar::I8),
+    (3, Scalar::U8),
+    (4, Scalar::I16),
+    (5, Scalar::U16),
+    (6, Scalar::I32),
+    (7, Scalar::U32),
+    (10, Scalar::F32),
+    (11, Scalar::F64),
+];
+/// Version of the image's own header.
+const VERSION: u16 = 1;
+const BIG: u8 = 1;
+const LITTLE: u8 = 2;
+
+impl Scalar {
+    pub fn bytes(self) -> usize {
+        match self {
+            Scalar::I8 | Scalar::U8 => 1,
+            Scalar::I16 | Scalar::U16 => 2,
+            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
+            Scalar::F64 => 8,
+        }
+    }
+}
+
+impl Image {
+    /// The transformation from pixel index (of the pixel's centre, from 0, in the whole image) to mm in the given coordinate system.
+    ///
+    /// The position in the message is the centre of the image (image.md, note of 2011), that is index (size - 1) / 2.
+    pub fn index_to_mm(&self, coordinates: Coordinates) -> DMat4 {
+        let axes = self.axes.map(|a| DVec3::from(a.map(f64::from)));
+        let middle = self.size.map(|n| (f64::from(n) - 1.0) / 2.0);
+        let first =
+            DVec3::from(self.centre.map(f64::from)) - axes[0] * middle[0] - axes[1] * middle[1] - axes[2] * middle[2];
+        let own = DMat4::from_cols(axes[0].extend(0.0), axes[1].extend(0.0), axes[2].extend(0.0), first.extend(1.0));
+        match coordinates == self.coordinates {
+            true => own,
+            false => DMat4::from_diagonal(DVec4::new(-1.0, -1.0, 1.0, 1.0)) * own,
+        }
+    }
+
+    /// Distance between neighbouring pixels along i, j and k, mm.
+    pub fn spacing(&self) -> [f64; 3] {
+        self.axes.map(|a| DVec3::from(a.map(f64::from)).length())
+    }
+
+    pub(super) fn read(device: String, time: f64, content: &[u8]) -> Result<Image, Fault> {
+        let mut fields = Fields(content);
+        let version = fields.u16("image version")?;
+        if version != VERSION {
+            return Err(Fault::new("image version", format!("is {version}, must be {VERSION}")));
+        }
+        let components = fields.u8("components")?;
+        let scalar = fields.u8("scalar type")?;
+        let endian = fields.u8("byte order")?;
+        let coordinates = fields.u8("coordinates")?;
+        if components == 0 {
+            return Err(Fault::new("components", "is 0, must be 1 to 255"));
+        }
+        let Some((_, scalar)) = SCALARS.into_iter().find(|(number, _)| *number == scalar) else {
+            return Err(Fault::new("scalar type", format!("is {scalar}, must be 2 to 7, 10 or 11")));
+        };
+        if ![BIG, LITTLE].contains(&endian) {
+            return Err(Fault::new("byte order", format!("is {endian}, must be 1 (big) or 2 (little)")));
+        }
+        let coordinates = match coordinates {
+            1 => Coordinates::Ras,
+            2 => Coordinates::Lps,
+            other => return Err(Fault::new("coordinates", format!("is {other}, must be 1 (RAS) or 2 (LPS)"))),
+        };
+        let size = fields.three("size")?;
+        let axes = [fields.vector("axes")?, fields.vector("axes")?, fields.vector("axes")?];
+        let centre = fields.vector("position")?;
+        let region = Region { offset: fields.three("sub-volume's start")?, size: fields.three("sub-volume's size")? };
+        let bytes = fields.0.to_vec();
+        let mut image = Image { device, time, size, region, scalar, components, coordinates, axes, centre, bytes };
+        image.check()?;
+        if endian == BIG && scalar.bytes() > 1 {
+            image.bytes.chunks_exact_mut(scalar.bytes()).for_each(<[u8]>::reverse);
+        }
+        Ok(image)
+    }
+
+    /// Checks that the sizes agree with each other and with the samples.
+    fn check(&self) -> Result<(), Fault> {
+        let Region { offset, size } = self.region;
+        if self.size.contains(&0) {
+            let [i, j, k] = self.size;
+            return Err(Fault::new("size", format!("is {i} x {j} x {k}, each must be 1 to 65535")));
+        }
+        for axis in 0..3 {
+            let (start, count, whole) = (u32::from(offset[axis]), u32::from(size[axis]), u32::from(self.size[axis]));
+            if count == 0 || start + count > whole {
+                let end = start + count;
+                let fault = format!(
+                    "covers {start} to {end} of {whole} pixels along {}, must lie within",
+                    ["i", "j", "k"][axis]
+                );
+                return Err(Fault::new("sub-volume", fault));
+            }
+        }
+        // Cannot overflow: each below 2^16, at most 255 components of 8 bytes.
+        let pixels: u64 = size.iter().map(|n| u64::from(*n)).product();
+        let bytes = pixels * u64::from(self.components) * self.scalar.bytes() as u64;
+        match self.bytes.len() as u64 == bytes {
+            true => Ok(()),
+            false => Err(Fault::new("samples", format!("are {} bytes, must be {bytes}", self.bytes.len()))),
+        }
+    }
+
+    pub(super) fn write(&self, content: &mut Vec<u8>) -> Result<(), Fault> {
+        if self.components == 0 {
+            return Err(Fault::new("components", "is 0, must be 1 to 255"));
+        }
+        if let Some(value) = self.axes.iter().flatten().chain(&self.centre).find(|v| !v.is_finite()) {
+            return Err(Fault::new("axes and position", format!("have {value}, must be finite")));
+        }
+        self.check()?;
+        let scalar = SCALARS.iter().find(|(_, s)| *s == self.scalar).map_or(0, |(number, _)| *number);
+        let coordinates = if self.coordinates == Coordinates::Ras { 1 } else { 2 };
+        content.extend(VERSION.to_be_bytes());
+        content.extend([self.components, scalar, LITTLE, coordinates]);
+        content.extend(self.size.iter().flat_map(|v| v.to_be_bytes()));
+        content.extend(self.axes.iter().flatten().chain(&self.centre).flat_map(|v| v.to_be_bytes()));
+        content.extend(self.region.offset.iter().chain(&self.region.size).flat_map(|v| v.to_be_bytes()));
+        content.extend_from_slice(&self.bytes);
+        Ok(())
     }
 }

@@ -1,13 +1,16 @@
-//! One scan line as a straight line in space.
+//! One scan line as a straight line in space, and the echoes along it.
 
 use crate::probe::{Indices, Probe};
 use glam::{DVec3, Vec3};
 
-/// Where and when one scan line looks. Space is that of [`Probe`], mm.
+/// Range of the grey scale, dB: 255 is 0 dB, 0 is so far below.
+pub const DYNAMIC_RANGE: f64 = 50.0;
+
+/// Position, direction and time of one scan line. Space is that of [`Probe`], mm.
 pub(super) struct Beam {
-    /// Place of sample 0.
+    /// Position of sample 0.
     pub first: DVec3,
-    /// From one sample to the next: both maps of the probe are linear along a line.
+    /// Step from one sample to the next. Both maps of the probe are linear along a line.
     pub step: DVec3,
     /// mm from sample to sample.
     pub pitch: f64,
@@ -25,7 +28,7 @@ impl Beam {
     pub fn new(probe: &Probe, line: usize, slice: usize, time: f64) -> Beam {
         let (line, slice) = (line as f64, slice as f64);
         let place = |sample| probe.to_space(Indices { sample, line, slice });
-        // Over the whole length, so that no digits are lost.
+        // Computed over the whole length, for precision.
         let last = (probe.samples - 1) as f64;
         Beam {
             first: place(0.0),
@@ -43,8 +46,8 @@ impl Beam {
         self.first + self.step * sample as f64
     }
 
-    /// In f32, for bodies whose distances need no more.
-    pub fn rough_place(&self, sample: usize) -> Vec3 {
+    /// In f32, for bodies that need no higher precision.
+    pub(crate) fn rough_place(&self, sample: usize) -> Vec3 {
         self.place(sample).as_vec3()
     }
 
@@ -52,4 +55,32 @@ impl Beam {
     pub fn direction(&self) -> Vec3 {
         (self.step / self.pitch).as_vec3()
     }
+}
+
+/// Echo of a point, dB re full scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Echo {
+    /// From many unresolved scatterers, which give speckle.
+    pub diffuse: f32,
+    /// From a surface or wire, without speckle.
+    pub mirror: f32,
+}
+
+impl Echo {
+    /// Far below the dynamic range.
+    pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
+
+    /// The level without speckle: the sum of both powers, dB.
+    pub fn bare(self) -> f32 {
+        if self.mirror <= Echo::SILENT.mirror {
+            return self.diffuse;
+        }
+        10.0 * (10f32.powf(self.diffuse / 10.0) + 10f32.powf(self.mirror / 10.0)).log10()
+    }
+}
+
+/// Grey value of an echo in dB re full scale.
+pub(super) fn grey(level: f32) -> u8 {
+    // Saturates at 0 and 255.
+    ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
 }

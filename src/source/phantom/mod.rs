@@ -1,56 +1,57 @@
-//! The phantom: sweeps of a body that is known exactly, as a wobbling abdominal probe would see it.
+//! The phantom: simulated sweeps of an exactly known body with a wobbling abdominal probe.
 //!
-//! Each scan line looks along its own straight line through the body, at the motor's angle and the time at which that line
-//! is fired (`beam`); what it meets is an echogenicity (`body`, `head`), to which `speckle` gives the grain of a real
-//! picture. The same options give the same bytes on any machine with the same mathematics library, on any number of threads.
+//! Each scan line is a straight line through the body, at the motor's angle and the time at which it is fired (`beam`). The body defines
+//! an echogenicity (`body`, `head`), and `speckle` adds the speckle of a real image. The same options give the same bytes on every machine
+//! with the same mathematics library, with any number of threads.
 
 mod anatomy;
 mod beam;
 mod body;
 mod head;
-mod shape;
 mod speckle;
-mod write;
 
+pub use beam::DYNAMIC_RANGE;
 pub use body::{Body, RampTruth, Truth, Wire};
 
+use crate::files::InputError;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
-use crate::source::{Frame, InputError};
-use beam::Beam;
-use body::Scatterers;
+use crate::source::frame::Frame;
+use crate::source::samples::SampleType;
+use crate::source::sequence::{self, MAX_FRAMES};
+use beam::{Beam, Echo, grey};
+use body::{Scatterers, refusal};
 use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::io::Write;
 use std::path::Path;
 
 /// Geometry of an abdominal wobbler: Ra 40..42 mm, Rw 22..27 mm, 70..77 deg, are common.
 const ARRAY_RADIUS: f64 = 40.0;
 const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
-/// From its first frame to the last.
+/// Angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
 /// m/s.
 const SOUND_SPEED: f64 = 1540.0;
 
-/// The grey scale: 255 is 0 dB, 0 is this far below. dB.
-pub const DYNAMIC_RANGE: f64 = 50.0;
+/// Most samples of one volume. Its complex field takes eight bytes a sample.
+const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
-/// Most samples of one volume; its complex field takes eight bytes a sample.
-const LARGEST_VOLUME: usize = 1 << 25;
-
-/// What is to be made.
+/// What to simulate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
-    /// Other seeds give other speckle; the body stays.
+    /// Seed of the speckle. The body does not depend on it.
     pub seed: u64,
     pub body: Body,
-    /// Volumes, one after the other in time, 1..=10000.
+    /// Number of volumes, consecutive in time, 1..=10000.
     pub volumes: usize,
     /// Every second volume is swept backwards.
     pub both_ways: bool,
-    /// Without it samples are the bare echogenicity: for exact answers.
+    /// Adds speckle. Without it samples are the exact echogenicity.
     pub speckle: bool,
-    /// Share of the way to the next frame that the motor travels while one frame is acquired, 0..=1.
+    /// Fraction of the distance to the next frame that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
     /// Frames a volume, 2..=1024.
     pub frames: usize,
@@ -79,14 +80,15 @@ impl Default for PhantomOptions {
 /// PhantomOptions that were checked, and the probe that they make. Frames are computed when asked for.
 pub struct Phantom {
     options: PhantomOptions,
-    /// Swept forwards, without its advance.
+    /// Without its advance.
     probe: Probe,
     volumes: Volumes,
     scatterers: Scatterers,
 }
 
 impl Phantom {
-    /// Refuses what cannot be swept, on one line.
+    /// # Errors
+    /// An option that is out of its range.
     pub fn new(options: PhantomOptions) -> Result<Phantom, InputError> {
         let whole = |field, value: usize, least: usize, most: usize| match (least..=most).contains(&value) {
             true => Ok(()),
@@ -97,8 +99,8 @@ impl Phantom {
         whole("lines", options.lines, 2, 1024)?;
         whole("samples", options.samples, 16, 8192)?;
         // Cannot overflow: 2^10 frames of 2^10 lines of 2^13 samples.
-        if options.frames * options.lines * options.samples > LARGEST_VOLUME {
-            return Err(refusal("samples", format!("more than {LARGEST_VOLUME} in a volume")));
+        if options.frames * options.lines * options.samples > MAX_VOLUME_SAMPLES {
+            return Err(refusal("samples", format!("more than {MAX_VOLUME_SAMPLES} in a volume")));
         }
         if !(0.0..=1.0).contains(&options.speed_ratio) {
             return Err(refusal("speed_ratio", format!("is {}, must lie in 0..=1", options.speed_ratio)));
@@ -136,30 +138,30 @@ impl Phantom {
         self.volumes.count
     }
 
-    /// Where the samples of a volume lie, the motor's way during each frame included.
+    /// The probe of a volume, including the motor's travel during each frame.
     pub fn probe(&self, volume: usize) -> Probe {
         Probe { advance: self.volumes.advance(volume, &self.probe.slices), ..self.probe.clone() }
     }
 
-    /// What the body is, in the space of [`Probe`] and in grey values without speckle.
+    /// The ground truth of the body, in the space of [`Probe`] and in grey values without speckle.
     pub fn truth(&self) -> Truth {
         self.scatterers.truth()
     }
 
-    /// The frames of a volume in the order in which they are acquired: u8, log-compressed, over [`DYNAMIC_RANGE`].
+    /// The frames of a volume in order of acquisition: u8, log-compressed over [`DYNAMIC_RANGE`].
     pub fn volume(&self, volume: usize) -> Vec<Frame> {
         let probe = self.probe(volume);
         let backward = self.volumes.backward(volume);
         let frames = self.options.frames;
         let number_of = |slice: usize| if backward { frames - 1 - slice } else { slice };
-        // A line takes 2 d / c (thesis 4.3), and the next follows at once.
+        // A line takes 2 d / c (thesis 4.3), and the next one follows at once.
         let line_time = probe.acquisition_time() / (frames * self.options.lines) as f64;
         let time_of = |slice: usize| ((volume * frames + number_of(slice)) * self.options.lines) as f64 * line_time;
 
-        let echoes: Vec<Vec<body::Echo>> = (0..frames)
+        let echoes: Vec<Vec<Echo>> = (0..frames)
             .into_par_iter()
             .map(|slice| {
-                let mut echoes = vec![body::Echo::SILENT; self.options.lines * self.options.samples];
+                let mut echoes = vec![Echo::SILENT; self.options.lines * self.options.samples];
                 for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
                     let time = time_of(slice) + line as f64 * line_time;
                     self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
@@ -167,7 +169,7 @@ impl Phantom {
                 echoes
             })
             .collect();
-        // Scatterers that stay give the same speckle every time; in a body that moves, they do not stay.
+        // Scatterers at rest give the same speckle in every volume. Those of a moving body do not.
         let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
         let slices: Vec<Vec<u8>> = match self.options.speckle {
             true => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
@@ -189,19 +191,76 @@ impl Phantom {
         made
     }
 
-    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml` beside it. Both appear whole or
-    /// not at all.
+    /// Writes all volumes as a PLUS sequence (`.mha`), and its probe file `<stem>.probe.toml`. Both files are complete, or neither exists.
+    ///
+    /// # Errors
+    /// More than 20000 frames, a path that does not end in .mha, a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), InputError> {
-        write::sweep(self, path)
+        write_sequence(self, path)
     }
 }
 
-/// Grey value of an echo in dB re full scale.
-fn grey(level: f32) -> u8 {
-    // A float turns into the nearest end of u8 where it lies outside.
-    ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
+fn write_sequence(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
+    let frames = phantom.options().frames * phantom.volumes();
+    if frames > MAX_FRAMES {
+        return Err(InputError::new(
+            path,
+            "volumes",
+            format!("make {frames} frames, a file holds at most {MAX_FRAMES}"),
+        ));
+    }
+    sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
+        for volume in 0..phantom.volumes() {
+            for frame in phantom.volume(volume) {
+                file.write_all(&frame.bytes).map_err(|e| InputError::unwritable(path, &e))?;
+            }
+        }
+        Ok(())
+    })
 }
 
-fn refusal(field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
-    InputError::new(Path::new("phantom"), field, fault)
+/// The header of the sequence. If the keys of a pre-scan sweep can describe all of it, they are added, so that the file needs no probe
+/// file.
+fn header(phantom: &Phantom) -> String {
+    let options = phantom.options();
+    let probe = phantom.probe(0);
+    let frames = options.frames * phantom.volumes();
+    let mut more = String::new();
+    if phantom.volumes() == 1 && options.speed_ratio == 0.0 {
+        // Metres and radians. Writing to a String cannot fail.
+        let _ = write!(
+            more,
+            "IsTransducerConvex = True\nTransducerRadius = {}\nScanLinePitch = {}\nAxialResolution = {}\n\
+             MotorType = TiltingMotor\nMotorRadius = {}\nFramePitch = {}\n",
+            ARRAY_RADIUS / 1e3,
+            probe.lines.pitch(),
+            probe.sample_pitch / 1e3,
+            WOBBLE_RADIUS / 1e3,
+            probe.slices.pitch()
+        );
+    }
+    let frame_time = probe.acquisition_time() / options.frames as f64;
+    let times = (0..frames).map(|n| (n, format!("{:.6}", n as f64 * frame_time)));
+    sequence::header([options.samples, options.lines, frames], SampleType::U8, &more, times)
+}
+
+fn probe_file(phantom: &Phantom) -> String {
+    let options = phantom.options();
+    let mut text = format!(
+        "# Probe of a phantom sweep: body {}, seed {}, speckle {}. Lengths in mm, angles in degrees.\n",
+        options.body, options.seed, options.speckle
+    );
+    let probe = phantom.probe(0);
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "[array]\nkind = \"curved\"\nradius_mm = {ARRAY_RADIUS:?}\n\n\
+         [lines]\nsector_angle_deg = {SECTOR_ANGLE_DEG:?}\n\n\
+         [depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n\n\
+         [motion]\nkind = \"fan\"\nwobble_radius_mm = {WOBBLE_RADIUS:?}\nfan_angle_deg = {FAN_ANGLE_DEG:?}\n\
+         frames_per_volume = {}\nboth_ways = {}\nspeed_ratio = {:?}\n\n\
+         [sound]\nspeed_m_per_s = {SOUND_SPEED:?}\n",
+        probe.start_depth, probe.sample_pitch, options.frames, options.both_ways, options.speed_ratio
+    );
+    text
 }

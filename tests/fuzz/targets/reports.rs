@@ -1,12 +1,12 @@
 //! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
-use echolume::error_report::{Measure, Report, choose, summary_table};
-use echolume::picture::grey::Grey;
-use echolume::profile::{compare, formats, table as passes};
+use echolume::error_report::{Measure, Report, choose, export as error_export};
+use echolume::picture::Grey;
+use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
 use echolume::ui::quality_ladder;
-use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
+use echolume::verify::report::{self, baseline, html as page, junit, summary};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -17,29 +17,29 @@ pub fn error_report(bytes: &[u8]) -> String {
     assert_eq!(Report::from_json(&written).expect("what was written is right"), report);
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
-        summary_table::table(&report, measure);
-        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
-        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
+        error_export::summary_table(&report, measure);
+        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.describe(measure));
+        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.describe(measure));
     }
     #[cfg(not(feature = "view"))]
     let rungs = 0;
     #[cfg(feature = "view")]
     let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
-    format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
+    format!("{} {rungs} {}", outcome.len(), error_export::csv(&report).len())
 }
 
 pub fn profile(bytes: &[u8]) -> String {
-    let profile = match formats::from_json(&String::from_utf8_lossy(bytes)) {
+    let profile = match Profile::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(profile) => profile,
         Err(error) => return told(error),
     };
-    let written = formats::to_json(&profile).expect("it was checked");
-    assert_eq!(formats::from_json(&written).expect("what was written is right"), profile);
-    let _ = (formats::csv(&profile), formats::csv_samples(&profile), passes::profile(&profile));
-    match compare::compare(&profile, &profile, &compare::Options::default()) {
+    let written = profile.to_json().expect("it was checked");
+    assert_eq!(Profile::from_json(&written).expect("what was written is right"), profile);
+    let _ = (export::csv(&profile), export::csv_samples(&profile), export::profile_table(&profile));
+    match compare::compare(&profile, &profile, &compare::CompareOptions::default()) {
         Ok(compared) => {
             assert_eq!(compared.regressions().count(), 0, "it is no slower than itself");
-            passes::comparison(&compared)
+            export::comparison_table(&compared)
         }
         Err(error) => error.to_string(),
     }
@@ -57,16 +57,16 @@ pub fn picture(bytes: &[u8]) -> String {
 
 /// An accepted run round-trips, does not differ from itself, and makes reports.
 pub fn verification(bytes: &[u8]) -> String {
-    let run = match verified::from_json(&String::from_utf8_lossy(bytes)) {
+    let run = match report::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(run) => run,
         Err(error) => return told(error),
     };
-    let written = verified::to_json(&run).expect("JSON");
-    let again = verified::from_json(&written).expect("what was written out is right");
-    assert_eq!(verified::to_json(&again).expect("JSON"), written);
-    let compared = baseline::compare(&run, &again, &baseline::Options::default());
+    let written = report::to_json(&run).expect("JSON");
+    let again = report::from_json(&written).expect("what was written out is right");
+    assert_eq!(report::to_json(&again).expect("JSON"), written);
+    let compared = baseline::compare(&run, &again, &baseline::BaselineOptions::default());
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
     page::html(&run, Some(&compared)).expect("a page");
-    told(words::summary(&run))
+    told(summary::summary(&run))
 }

@@ -95,7 +95,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
         if stream.is_idle() {
             places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
             // The requested wake-up happens at once.
-            now = next.at.expect("a loop goes on").max(now);
+            now = next.wake_at.expect("a loop goes on").max(now);
         }
     }
     assert!(places.windows(2).all(|w| w[1] == (w[0] + 1) % 3), "{places:?}");
@@ -109,7 +109,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
 #[test]
 fn exported_files_are_what_was_shown_and_recorded() {
     let (device, folder) = (Device::new(), Folder::new("saved"));
-    let mut desk = Desk::new(&device, Options { folder: folder.0.clone(), ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
     // An export without a picture is no fault.
     desk.press(Key::Char('p'));
     desk.press(Key::Char('r'));
@@ -139,7 +139,7 @@ fn exported_files_are_what_was_shown_and_recorded() {
 #[test]
 fn panels_take_space_and_change_nothing_else() {
     let device = Device::new();
-    let mut desk = Desk::new(&device, Options { panels: true, scale: 0.5, ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { panels: true, scale: 0.5, ..options() });
     desk.begin();
     desk.live(0);
     for size in [[400, 240], [60, 50], [1, 1], [0, 0], [417, 233]] {
@@ -154,7 +154,7 @@ fn panels_take_space_and_change_nothing_else() {
     desk.rest();
     assert!(desk.drawn().picture.size == [417, 233] && beside[0] < 417 && beside[1] < 233);
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));
-    desk.console.command(&Command::Help, Instant::now());
+    desk.console.execute(&Command::ToggleHelp, Instant::now());
     desk.press(Key::Function(2));
     desk.rest();
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));

@@ -73,7 +73,7 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
     let before = simulator.received().len();
     drop(drive);
     assert_eq!(simulator.received().len(), before);
-    assert!(!simulator.turning() && (simulator.angle() - 12.0).abs() < 0.02);
+    assert!(!simulator.is_moving() && (simulator.angle() - 12.0).abs() < 0.02);
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn a_panic_in_the_caller_and_an_early_drop_stop_the_motor() {
     }));
     assert!(panicked.is_err());
     assert!(stopped_at_last(&simulator.received()));
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
     assert!(simulator.angle() < 19.0, "long before the end of the pass");
 }
 

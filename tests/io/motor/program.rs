@@ -41,7 +41,7 @@ fn long_sweep(simulator: &Simulator, more: &[&str]) -> Child {
     let arguments = ["--angle", "40", "--rate", "0.1", "--timeout", "2000"];
     let child = probe(simulator, "sweep", &[&arguments, more].concat()).spawn().expect("start the program");
     let moves = || simulator.received().iter().filter(|r| r.command == command::MOVE_TO).count();
-    assert!(eventually(|| moves() == 2 && simulator.turning()), "the pass begins");
+    assert!(eventually(|| moves() == 2 && simulator.is_moving()), "the pass begins");
     child
 }
 
@@ -87,7 +87,7 @@ fn the_fault_matrix() {
             };
             assert!(if *told { eventually(stopped) } else { !stopped() }, "{said}: {:?}", simulator.received());
             if *told {
-                assert!(eventually(|| !simulator.turning()), "{said}");
+                assert!(eventually(|| !simulator.is_moving()), "{said}");
             }
         }
     };
@@ -151,7 +151,7 @@ fn a_signal_stops_the_motor() {
         let (code, _, err) = finish(child);
         assert!(code == Some(1) && err.contains(&format!("interrupted by {name}. The motor was stopped")), "{err}");
         assert!(stopped_at_last(&simulator.received()));
-        assert!(eventually(|| !simulator.turning()) && simulator.angle() < 19.0);
+        assert!(eventually(|| !simulator.is_moving()) && simulator.angle() < 19.0);
     };
     std::thread::scope(|scope| {
         for (wanted, name) in [(Signal::INT, "SIGINT"), (Signal::TERM, "SIGTERM"), (Signal::HUP, "SIGHUP")] {
@@ -177,7 +177,7 @@ fn a_killed_sweep_is_stopped_by_the_watchdog_and_the_port_is_free_again() {
     signal(&child, Signal::KILL);
     finish(child);
     assert!(!stopped_at_last(&simulator.received()), "nobody was left to");
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
     assert!(simulator.angle() < 19.0, "the watchdog, and not the end of the pass");
     let (code, out, err) = run(&mut probe(&simulator, "status", &["--timeout", "2000"]));
     assert_eq!(code, Some(0), "{out}{err}");

@@ -158,7 +158,7 @@ fn volumes_are_complete_with_the_slices_and_directions_of_the_array() {
         assert!(of_first.is_sorted());
         drop(swept);
         assert!(stopped_at_last(&simulator.received()));
-        assert!(eventually(|| !simulator.turning()));
+        assert!(eventually(|| !simulator.is_moving()));
     };
     std::thread::scope(|scope| {
         scope.spawn(|| one(false, ARRIVAL));
@@ -178,7 +178,7 @@ fn a_fault_of_the_motor_ends_the_stream_with_the_motor_stopped() {
         assert!(matches!(swept.next(Duration::ZERO), Event::End(Some(again)) if again == why));
         if told {
             assert!(stopped_at_last(&simulator.received()), "{fault}");
-            assert!(eventually(|| !simulator.turning()), "{fault}");
+            assert!(eventually(|| !simulator.is_moving()), "{fault}");
         }
     };
     std::thread::scope(|scope| {
@@ -193,18 +193,18 @@ fn a_fault_of_the_motor_ends_the_stream_with_the_motor_stopped() {
 fn dropping_the_source_stops_the_motor_while_it_looks_for_home_too() {
     let simulator = Arc::new(simulated(None));
     let mut source = swept(&simulator, Free::new(&simulator), ARRIVAL);
-    assert!(eventually(|| simulator.turning()), "it looks for home");
+    assert!(eventually(|| simulator.is_moving()), "it looks for home");
     assert!(matches!(source.next(Duration::ZERO), Event::Begin(_)));
     drop(source);
     assert!(stopped_at_last(&simulator.received()));
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
 }
 
 #[test]
 fn frames_without_a_motor_position_are_reported_at_once() {
     let simulator = Arc::new(simulated(None));
     for (motion, named) in
-        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be whole")]
+        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be complete")]
     {
         let wide = Axis::centred(20f64.to_radians(), 9);
         let header = header(Probe { motion, slices: wide, ..probe() });
@@ -215,7 +215,7 @@ fn frames_without_a_motor_position_are_reported_at_once() {
         });
         assert!(said.as_ref().is_some_and(|s| s.contains(named)), "{said:?}");
     }
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
 }
 
 /// The frames of the phantom lose their positions and are put back in place.
@@ -227,7 +227,7 @@ fn the_phantom_on_a_free_running_array_is_reassembled() {
     let options = phantom::PhantomOptions { volumes: 2, lines: 64, samples: 32, ..phantom::PhantomOptions::default() };
     let whole = FreeRunning::phantom(options.clone(), motor.speed()).expect("a phantom");
     let known: Vec<Vec<Frame>> = (0..2).map(|volume| whole.volume(volume)).collect();
-    let source = FreeRunning::new(whole, motor.watch().clone());
+    let source = FreeRunning::new(whole, motor.positions().clone());
     let mut swept = MotorTracked::new(Box::new(source), motor, MotorTrackingOptions { clock: ARRIVAL, holds: false });
     let (frames, end) = frames(&mut swept, 2);
     assert_eq!(end, None);

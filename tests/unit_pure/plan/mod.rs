@@ -97,10 +97,10 @@ fn a_plan_explains_itself() {
     assert_eq!(line("filter/aos_backward.rows"), "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows");
     assert!(line("samples of the volume").contains("fastest"));
     assert_eq!(
-        line("seen"),
-        "seen: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
+        line("visible"),
+        "visible: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
     );
-    assert_eq!(line("in all"), "in all 2352 bytes");
+    assert_eq!(line("total"), "total 2352 bytes");
 }
 
 #[test]

@@ -3,21 +3,21 @@
 use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
-use echolume::verify::report::baseline::{Class, Compared, Options, compare};
-use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, words};
+use echolume::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
+use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, summary};
 use proptest::prelude::*;
 
-fn compared(old: &Run, new: &Run) -> Compared {
-    compare(old, new, &Options::default())
+fn compared(old: &Run, new: &Run) -> BaselineComparison {
+    compare(old, new, &BaselineOptions::default())
 }
 
 /// Class and text of every change.
-fn told(compared: &Compared) -> Vec<(Class, String)> {
+fn told(compared: &BaselineComparison) -> Vec<(Class, String)> {
     compared.changes.iter().map(|c| (c.class, c.to_string())).collect()
 }
 
 /// Two runs with the same errors and different times of the same distribution.
-fn changed(change: impl Fn(&mut Run)) -> Compared {
+fn changed(change: impl Fn(&mut Run)) -> BaselineComparison {
     let old = run(1);
     let mut new = old.clone();
     change(&mut new);
@@ -120,12 +120,12 @@ fn the_terminal_lists_every_worse_check_and_some_others() {
         }
         many
     };
-    let text = words::comparison(&compared(&many(0.5), &many(1.0)));
+    let text = summary::comparison(&compared(&many(0.5), &many(1.0)));
     assert!(
         text.contains("input 39: ") && !text.contains("input 40: ") && text.contains("\n  and 60 more\n"),
         "{text}"
     );
-    let text = words::comparison(&compared(&many(0.5), &many(3.0)));
+    let text = summary::comparison(&compared(&many(0.5), &many(3.0)));
     assert!(text.contains("input 99: ") && !text.contains(" more\n"), "{text}");
 }
 
@@ -177,17 +177,17 @@ fn slower_within_the_threshold_is_reported_and_fails_nothing() {
     assert!(!small.is_worse() && small.changes.len() == 1, "{:?}", small.lines());
     assert!(small.lines()[0].starts_with("speed / shade: device time 3.0 % slower (1.0"), "{:?}", small.lines());
     assert!(small.lines()[0].ends_with(", within the threshold of 5 %"), "{:?}", small.lines());
-    let strict = Options::new(1.01).expect("options");
+    let strict = BaselineOptions::new(1.01).expect("options");
     assert!(compare(&old, &new, &strict).is_worse());
 }
 
 #[test]
 fn a_threshold_below_one_is_refused() {
     for threshold in [0.99, f64::NAN, f64::INFINITY, -1.0] {
-        let error = Options::new(threshold).expect_err("refused");
+        let error = BaselineOptions::new(threshold).expect_err("refused");
         assert!(error.ends_with("is not a ratio of at least 1 (1.05 is five percent slower)"), "{error}");
     }
-    assert_eq!(Options::default().threshold(), 1.05);
+    assert_eq!(BaselineOptions::default().threshold(), 1.05);
 }
 
 #[test]
@@ -243,7 +243,7 @@ fn the_text_lists_the_worst_first() {
         check(new, "passes", "median").figures[0].value = 1.0;
         fail(new, "modes", "vr");
     });
-    let text = words::comparison(&both);
+    let text = summary::comparison(&both);
     let expected = "compared with the run of 2026-01-02T03:04:05Z (echolume 0.1.0, release, quick) on simulated, none 1.0\n\
         driver: none 1.0 -> none 1.1\n\
         worse:\n  modes / vr: passed -> failed: the output differs by more than its tolerance\n\
@@ -257,9 +257,9 @@ proptest! {
 
     #[test]
     fn any_two_runs_compare_in_lines_and_none_differs_from_itself(old in any_run(), new in any_run()) {
-        let compared = compare(&old, &new, &Options::default());
+        let compared = compare(&old, &new, &BaselineOptions::default());
         prop_assert!(compared.lines().iter().all(|line| !line.chars().any(char::is_control)));
-        let itself = compare(&new, &new, &Options::default());
+        let itself = compare(&new, &new, &BaselineOptions::default());
         prop_assert!(itself.lines().is_empty(), "{:?}", itself.lines());
     }
 }

@@ -3,7 +3,7 @@
 use super::profile;
 use super::profile::{Noise, Random};
 use echolume::picture::Picture;
-use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Unit, Verdict, Worst};
+use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst};
 use proptest::prelude::*;
 
 /// Passes that are timed and checked.
@@ -105,7 +105,7 @@ pub fn fail(run: &mut Run, group: &str, name: &str) {
 }
 
 /// A lit sphere, one with a wrong corner, and ten times their difference.
-pub fn shown(what: &str, size: u32, fault: Option<usize>) -> Shown {
+pub fn shown(what: &str, size: u32, fault: Option<usize>) -> PictureComparison {
     let pixel = |x: u32, y: u32, wrong: bool| {
         let at = |v: u32| 2.2 * (f64::from(v) + 0.5) / f64::from(size) - 1.1;
         let (x, y) = (at(x), at(y));
@@ -125,7 +125,7 @@ pub fn shown(what: &str, size: u32, fault: Option<usize>) -> Shown {
         let (a, b) = (pixel(x, y, true), pixel(x, y, false));
         std::array::from_fn(|c| a[c].abs_diff(b[c]).saturating_mul(10))
     };
-    Shown {
+    PictureComparison {
         what: what.into(),
         actual: picture(&|x, y| pixel(x, y, fault.is_some())),
         expected: picture(&|x, y| pixel(x, y, false)),

@@ -1,98 +1,56 @@
-//! OpenIGTLink as a live source: whole volumes as they come, and tracked 2D frames compounded into one.
+//! OpenIGTLink as a live source: Cartesian volumes, and tracked 2D frames that are compounded into a volume.
 //!
-//! An IMAGE of several slices is a Cartesian volume; one that brings only some whole slices of it updates those. An IMAGE of one slice is a
-//! frame of a freehand sweep. Whichever changed is then given slice by slice under a new volume's number, always all of its slices, so that
-//! whoever receives them has a whole volume every time and need not know what is behind it.
+//! An IMAGE of several slices is a Cartesian volume; one with only some complete slices of it updates those. An IMAGE of one slice is a
+//! frame of a freehand sweep. After a change, all slices of the volume are emitted under a new volume number, so that the receiver
+//! always gets complete volumes and need not know their origin.
 
+mod assembly;
 mod faults;
-mod samples;
-mod sweep;
-mod whole;
 
-use super::client::{self, Client, ClientStatistics};
-use super::decode::BODY_LIMIT;
+pub use assembly::{NetworkOptions, Poses};
+
+use super::client::{Client, ClientStatistics};
 use super::message::Message;
+use crate::source::frame::{Frame, Header};
 use crate::source::live::{Event, Live};
-use crate::source::recorder::Header;
-use crate::source::{Frame, freehand};
-use faults::{Faults, Kind};
+use assembly::{CartesianVolume, FreehandSweep};
+use faults::{FaultKind, Faults};
 use std::io;
 use std::time::{Duration, Instant};
-use sweep::Sweep;
-use whole::Whole;
 
-/// How often statistics are looked at while nothing comes.
+/// How often the statistics are checked while nothing arrives.
 const POLL: Duration = Duration::from_millis(100);
-/// Messages that are looked through although patience is at its end, so that one who never waits gets on, too.
-const AT_ONCE: usize = 256;
+/// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
+const MAX_AT_ONCE: usize = 256;
 
-/// Where the pose of a 2D frame comes from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Poses {
-    /// TRANSFORM and TDATA messages, chosen as [`Pairing::new`](super::Pairing::new) says: device, tolerance and patience in s.
-    Messages { device: Option<String>, tolerance: f64, patience: f64 },
-    /// The image's own matrix.
-    Image,
-}
-
-/// How a [`Network`] behaves.
-#[derive(Clone, Debug)]
-pub struct NetworkOptions {
-    pub client: client::ClientOptions,
-    pub poses: Poses,
-    pub freehand: freehand::CompoundingOptions,
-    /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
-    pub first: usize,
-    /// A sweep is given out so often, s, while frames come ...
-    pub update: f64,
-    /// ... or after so many frames.
-    pub frames: usize,
-    /// Largest volume, bytes as it is stored.
-    pub volume_bytes: usize,
-}
-
-impl Default for NetworkOptions {
-    fn default() -> NetworkOptions {
-        NetworkOptions {
-            client: client::ClientOptions::default(),
-            poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
-            freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
-            first: 100,
-            update: 0.5,
-            frames: 64,
-            volume_bytes: BODY_LIMIT,
-        }
-    }
-}
-
-/// What comes from an OpenIGTLink server, which is connected to again whenever it is lost.
+/// A live source: the images of an OpenIGTLink server. It reconnects whenever the connection is lost, and never ends by itself.
 ///
-/// Nothing is taken from the client while slices are given out; what then does not fit its queue is lost by whole messages, and counted.
-/// What is amiss comes as [`Event::Fault`], each kind at most once a second and with how often it was. It never ends by itself.
+/// No messages are processed while slices are emitted; messages that then exceed the client's queue are dropped and counted. Faults are
+/// reported as [`Event::Fault`], each kind at most once a second and with its count.
 ///
-/// Memory: the [`Client`]'s, one volume of at most `volume_bytes` and the message it came in, the first frames of a sweep (256 MiB), and
-/// what a [`Compounder`](freehand::Compounder) and a [`Pairing`](super::Pairing) take.
+/// Memory: that of the [`Client`], one volume of at most `volume_bytes` and its message, the first frames of a sweep (256 MiB), and that
+/// of a [`Compounder`](crate::source::freehand::Compounder) and a [`Pairing`](super::Pairing).
 pub struct Network {
     client: Client,
-    /// What the faults have been told of.
+    /// Statistics that were reported as faults.
     known: ClientStatistics,
     last_error: Option<String>,
-    /// There ever was a connection.
+    /// There was at least one connection.
     connected: bool,
-    /// Connections.
+    /// Lost connections.
     lost: u64,
     faults: Faults,
-    whole: Option<Whole>,
-    sweep: Sweep,
+    whole: Option<CartesianVolume>,
+    sweep: FreehandSweep,
     volume_bytes: usize,
-    /// Given with the last `Begin`.
+    /// Header of the last `Begin`.
     begun: Option<Header>,
-    giving: Option<Giving>,
+    output: Option<VolumeOutput>,
     volumes: u32,
 }
 
-/// A volume whose slices are given out.
-struct Giving {
+/// A volume whose slices are being emitted.
+struct VolumeOutput {
     of_sweep: bool,
     begin: bool,
     volume: u32,
@@ -101,10 +59,10 @@ struct Giving {
 }
 
 impl Network {
-    /// Starts connecting, as [`Client::connect`] does.
+    /// Starts to connect, as [`Client::connect`].
     ///
     /// # Errors
-    /// The operating system starts no thread.
+    /// The thread cannot be started.
     pub fn connect(address: &str, options: NetworkOptions) -> io::Result<Network> {
         Ok(Network {
             client: Client::connect(address, options.client.clone())?,
@@ -115,35 +73,35 @@ impl Network {
             faults: Faults::new(address),
             whole: None,
             volume_bytes: options.volume_bytes,
-            sweep: Sweep::new(options),
+            sweep: FreehandSweep::new(options),
             begun: None,
-            giving: None,
+            output: None,
             volumes: 0,
         })
     }
 
-    /// Of the connection.
+    /// Statistics of the connection.
     pub fn statistics(&self) -> ClientStatistics {
         self.client.statistics()
     }
 
-    /// Tells the faults what has happened to the connection since the last time.
-    fn look(&mut self) {
+    /// Records what happened to the connection since the last call.
+    fn check_connection(&mut self) {
         let now = self.client.statistics();
         let error = self.client.last_error();
         let why = error.as_deref().unwrap_or("no reason is known");
         let (known, faults) = (&self.known, &mut self.faults);
-        faults.note(Kind::Checksum, now.checksum_failures - known.checksum_failures, why);
-        faults.note(Kind::Malformed, now.malformed - known.malformed, why);
-        faults.note(Kind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
-        faults.note(Kind::Again, now.reconnects - known.reconnects, "");
-        // Every connection but the one that stands was lost, however short it was.
+        faults.note(FaultKind::Checksum, now.checksum_failures - known.checksum_failures, why);
+        faults.note(FaultKind::Malformed, now.malformed - known.malformed, why);
+        faults.note(FaultKind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
+        faults.note(FaultKind::Again, now.reconnects - known.reconnects, "");
+        // Every connection except the present one was lost.
         self.connected |= now.connected || now.bytes > 0 || now.reconnects > 0;
         let lost = now.reconnects + u64::from(self.connected) - u64::from(now.connected);
-        faults.note(Kind::Lost, lost.saturating_sub(self.lost), why);
-        let is_told = lost > self.lost || error == self.last_error;
-        if !now.connected && !is_told && error.is_some() {
-            faults.note(Kind::Unreachable, 1, why);
+        faults.note(FaultKind::Lost, lost.saturating_sub(self.lost), why);
+        let is_reported = lost > self.lost || error == self.last_error;
+        if !now.connected && !is_reported && error.is_some() {
+            faults.note(FaultKind::Unreachable, 1, why);
         }
         (self.known, self.last_error, self.lost) = (now, error, lost);
     }
@@ -152,48 +110,48 @@ impl Network {
         match message {
             Message::Image(image) if image.size[2] > 1 => {
                 let time = (image.time > 0.0).then_some(image.time);
-                match Whole::take(&mut self.whole, image, self.volume_bytes) {
+                match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
                     Ok(replaced) => {
-                        self.faults.note(Kind::Samples, replaced, "they read as 0");
-                        self.give(false, time);
+                        self.faults.note(FaultKind::Samples, replaced, "they read as 0");
+                        self.start_output(false, time);
                     }
-                    Err(fault) => self.faults.note(Kind::Image, 1, &fault),
+                    Err(fault) => self.faults.note(FaultKind::Image, 1, &fault),
                 }
             }
             other => self.sweep.take(other, &mut self.faults),
         }
     }
 
-    /// Begins to give a volume out.
-    fn give(&mut self, of_sweep: bool, time: Option<f64>) {
-        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(Whole::header) };
+    /// Starts to emit a volume.
+    fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
+        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
         let Some(header) = header else { return };
         if let Err((field, fault)) = header.check() {
-            return self.faults.note(Kind::Image, 1, &format!("{field} {fault}"));
+            return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
         }
         let begin = self.begun.as_ref() != Some(&header);
         self.begun = Some(header);
-        self.giving = Some(Giving { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time });
         self.volumes = self.volumes.wrapping_add(1);
     }
 
-    /// What is next of the volume that is given out.
-    fn given(&mut self) -> Option<Event> {
-        let giving = self.giving.as_mut()?;
-        if std::mem::take(&mut giving.begin) {
+    /// The next event of the volume that is being emitted.
+    fn next_output(&mut self) -> Option<Event> {
+        let output = self.output.as_mut()?;
+        if std::mem::take(&mut output.begin) {
             return self.begun.clone().map(|header| Event::Begin(Box::new(header)));
         }
-        let k = giving.next;
-        giving.next += 1;
-        let slice = match giving.of_sweep {
+        let k = output.next;
+        output.next += 1;
+        let slice = match output.of_sweep {
             true => self.sweep.slice(k),
             false => self.whole.as_ref().and_then(|whole| whole.slice(k)),
         };
         let Some(slice) = slice else {
-            self.giving = None;
+            self.output = None;
             return None;
         };
-        let (volume, time, bytes) = (giving.volume, giving.time, slice.to_vec());
+        let (volume, time, bytes) = (output.volume, output.time, slice.to_vec());
         Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
     }
 }
@@ -203,20 +161,20 @@ impl Live for Network {
         let started = Instant::now();
         let mut taken = 0;
         loop {
-            self.look();
+            self.check_connection();
             if let Some(fault) = self.faults.due() {
                 return Event::Fault(fault);
             }
-            if let Some(event) = self.given() {
+            if let Some(event) = self.next_output() {
                 return event;
             }
             if let Some(time) = self.sweep.update(&mut self.faults) {
-                self.give(true, time);
+                self.start_output(true, time);
                 continue;
             }
             let left = patience.saturating_sub(started.elapsed());
-            // Poses alone may come without end.
-            if left.is_zero() && taken >= AT_ONCE {
+            // Poses alone may arrive without end.
+            if left.is_zero() && taken >= MAX_AT_ONCE {
                 return Event::Idle;
             }
             match self.client.next(left.min(POLL)) {

@@ -1,0 +1,141 @@
+//! Frames, the header of a sequence of frames, and the trait of sources that are read on demand.
+
+use super::samples::{SampleType, StoredType};
+use crate::files::InputError;
+use crate::probe::{Advance, Geometry};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Most frames a volume, for every reader.
+const MAX_SLICES: usize = 1 << 16;
+/// Largest frame, bytes.
+const MAX_FRAME_BYTES: u64 = 1 << 30;
+
+/// One polar 2D acquisition, or one slice of a Cartesian volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Number of the volume that the frame belongs to, from 0.
+    pub volume: u32,
+    /// Index in its volume in order of acquisition, from 0.
+    pub number: u32,
+    /// Index in its volume in geometric order, from 0: K - 1 - `number` if it was swept backwards (K frames a volume).
+    pub slice: usize,
+    /// The volume was swept backwards.
+    pub backward: bool,
+    /// Time stamp, s, on the clock of the device that acquired it.
+    pub time: Option<f64>,
+    /// Samples of the stored type ([`Header::stored`]), little-endian, line by line (samples fastest).
+    pub bytes: Vec<u8>,
+}
+
+/// What all frames of a file or of a live source have in common.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Geometry of a volume that is swept forwards.
+    pub forward: Geometry,
+    /// Geometry of a volume that is swept backwards; equal to `forward` if the motor stops for each frame.
+    pub backward: Geometry,
+    pub stored: StoredType,
+    /// Stored values that are shown as 0 and 1; finite, the second above the first.
+    pub range: [f64; 2],
+}
+
+impl Header {
+    /// Size of a frame, bytes. None if it is 0 or above 1 GiB.
+    pub fn frame_bytes(&self) -> Option<u64> {
+        let [width, height] = self.forward.frame_size();
+        let samples = (width as u64).checked_mul(height as u64)?;
+        samples.checked_mul(self.stored.bytes() as u64).filter(|n| *n > 0 && *n <= MAX_FRAME_BYTES)
+    }
+
+    /// Checks that frames with this header are possible.
+    ///
+    /// # Errors
+    /// The field, and what is wrong with it.
+    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+        for geometry in [&self.forward, &self.backward] {
+            // Checked first: the other checks visit each slice.
+            if geometry.slices() > MAX_SLICES {
+                return Err(("slices", format!("are {}, at most {MAX_SLICES} a volume", geometry.slices())));
+            }
+            let checked = match geometry {
+                Geometry::Sweep(probe) => probe.check(),
+                Geometry::Cartesian(grid) => grid.check(),
+            };
+            checked.map_err(|e| (e.field, e.fault))?;
+        }
+        let of = |geometry: &Geometry| (geometry.frame_size(), geometry.slices());
+        if of(&self.forward) != of(&self.backward) {
+            return Err(("backward", "has frames of another size or number than forward".into()));
+        }
+        if !self.forward.equals_except_advance(&self.backward) {
+            return Err(("backward", "differs from forward in more than the motor's travel during a frame".into()));
+        }
+        if self.frame_bytes().is_none() {
+            return Err(("forward", format!("makes frames of more than {MAX_FRAME_BYTES} bytes")));
+        }
+        let [low, high] = self.range;
+        match low.is_finite() && high.is_finite() && low < high {
+            true => Ok(()),
+            false => Err(("range", format!("[{low}, {high}] must be finite and rise"))),
+        }
+    }
+}
+
+/// A source of frames that is read on demand, in order of acquisition. For sources with their own clock see [`Live`](super::live::Live).
+pub trait Source: Send {
+    /// Geometry of a volume. The direction of its sweep determines the motor's advance.
+    fn geometry(&self, volume: usize) -> Geometry;
+    /// Type of the samples in [`Frame::bytes`].
+    fn stored_type(&self) -> StoredType;
+    /// Type of the samples in the file.
+    fn sample_type(&self) -> SampleType {
+        self.stored_type().into()
+    }
+    /// Stored values that are shown as 0 and 1.
+    fn range(&self) -> [f64; 2];
+    /// Number of complete volumes.
+    fn volumes(&self) -> usize;
+    fn frames_per_volume(&self) -> usize;
+    /// Moves forwards or back to the first frame of a volume.
+    ///
+    /// # Errors
+    /// A volume that does not exist, or data that cannot be read.
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
+    /// The next frame; None after the last.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
+    /// What all frames have in common.
+    fn header(&self) -> Header {
+        header_of(self)
+    }
+    /// Every file that is read; none for a source that is computed.
+    fn files(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+    /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
+    fn arrival(&self) -> Option<f64> {
+        None
+    }
+}
+
+/// The header of the frames of a source. If all volumes are swept in one direction, both geometries are the same.
+pub(super) fn header_of<S: Source + ?Sized>(source: &S) -> Header {
+    let forward = source.geometry(0);
+    let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
+    let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };
+    Header { forward, backward, stored: source.stored_type(), range: source.range() }
+}
+
+/// True if this geometry is of a backward sweep.
+fn goes_back(geometry: &Geometry) -> bool {
+    let Geometry::Sweep(probe) = geometry else { return false };
+    match &probe.advance {
+        Advance::None => false,
+        Advance::Same(a) => *a < 0.0,
+        Advance::Each(table) => table.iter().any(|a| *a < 0.0),
+    }
+}
