@@ -7,6 +7,7 @@ mod compositing_orders;
 mod error_report;
 mod freehand;
 mod geometry;
+mod module_cycles;
 mod phantom;
 mod plan;
 mod profile;
