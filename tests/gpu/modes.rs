@@ -1,5 +1,5 @@
-//! For every mode which passes and slots it has, what a change makes run again (counted from recorded dispatches), and the
-//! volume kept up to date slice by slice.
+//! For every mode: its passes and slots, reruns after a change (counted from recorded dispatches), and the
+//! incremental update of the volume by slices.
 
 use crate::common::gpu::*;
 use echolume::passes::{Slot, in_runs};
@@ -12,32 +12,32 @@ fn of(toml: &str) -> Scene {
     scene(Geometry::Sweep(wobbler()), BYTES, &format!("{toml}\npicture = {{ size = [24, 24] }}\n{slices}"))
 }
 
-/// Mode (and what belongs to it), its passes, its slots.
+/// A mode with its settings, its passes, its slots.
 const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'vr'",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut pre_integrated picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut pre_integrated picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { shading = 'first-hit' }",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer distance_map veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
     ),
     (
         "mode = 'sr'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map surface picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map surface picture screen",
     ),
     (
         "mode = 'mixed'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps volume_leaps opaque_before sweep_lut transfer distance_map surface veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map surface volume_layer picture screen",
     ),
     (
         "mode = 'mip'",
@@ -51,8 +51,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ),
     (
         "mode = 'mean'",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_projection tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps sweep_lut picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_projection tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances sweep_lut picture screen",
     ),
     (
         "mode = 'mip'\nray = { rays = 2 }",
@@ -73,8 +73,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
     (
         "mode = 'sr'\nlayout = '4up'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut tiles distance_map surface rendered planes picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut tiles distance_map surface rendered planes picture screen",
     ),
 ];
 
@@ -91,9 +91,9 @@ fn every_mode_has_its_passes_and_slots_and_no_others() {
 
 type Change = fn(&mut Scene);
 
-/// What a change may touch: the names of the passes from which on everything that reads runs again.
+/// The effect of a change: the passes from which on all readers run again.
 #[test]
-fn in_every_mode_a_change_runs_again_what_it_touches() {
+fn in_every_mode_a_change_reruns_only_the_affected_passes() {
     let device = Device::new();
     for (mode, passes, _) in MODES {
         let base = of(mode);
@@ -104,15 +104,15 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
         let from = |first: &[&str]| -> Vec<&str> {
             all.iter().position(|p| first.contains(p)).map_or(Vec::new(), |i| all[i..].to_vec())
         };
-        // Planes and bricks lie where they lie, wherever the camera stands.
+        // Planes and bricks do not depend on the camera.
         let aside = [
             "raycast_planes",
             "tile_ranges",
             "brick_ranges",
-            "classify_surface",
-            "leap_surface",
-            "classify_volume",
-            "leap_volume",
+            "classify_bricks_surface",
+            "brick_distance_surface",
+            "classify_bricks_volume",
+            "brick_distance_volume",
         ];
         let moved = |p: &&str| !aside.contains(p);
         let seen_from_elsewhere = match base.is_flat() {
@@ -124,7 +124,7 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
             (
                 "transfer function",
                 |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
-                if base.composites() { from(&["classify_volume"]) } else { vec![] },
+                if base.composites() { from(&["classify_bricks_volume"]) } else { vec![] },
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
             ("contrast", |s| s.settings.post.contrast = 1.5, vec![all[all.len() - 1]]),
@@ -152,8 +152,8 @@ fn smoothed() -> Scene {
     of("mode = 'mip'\nslices = { pixels = 40, smooth = { lateral = 1.0, elevation = 0.3 } }")
 }
 
-/// The 3D filter is kept up to date slice by slice: a new frame makes only the slices near it anew, and what comes out is what
-/// filtering the whole volume gives.
+/// The 3D filter is updated by slices: a new frame refilters only the slices near it, and the result equals
+/// that of filtering the complete volume.
 #[test]
 fn a_new_frame_refilters_only_the_slices_near_it() {
     let device = Device::new();
@@ -184,7 +184,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
         let mut fresh = rendered(&device, smoothed(), &frames);
         fresh.picture().expect("picture");
         assert!(fresh.read(Slot::Volume).expect("read").expect("there") == volume, "{slices:?}");
-        // Nothing new: nothing to filter.
+        // No new frame: nothing to filter.
         renderer.show(0).expect("show");
         let names = renderer.dispatched_passes(|r| r.picture()).expect("picture");
         assert!(!names.contains(&"gaussian_elevation"), "{names:?}");

@@ -38,7 +38,7 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
             Some(Event::Frame(_)) => {
                 frames += 1;
                 if frames == 20 {
-                    // Not SIGINT: what a shell starts in the background has that ignored.
+                    // Not SIGINT: a shell ignores it for background processes.
                     kill_process(getpid(), Signal::TERM).expect("a signal");
                 }
             }

@@ -1,4 +1,4 @@
-//! `echolume probe` over the simulated module: what it says and how it ends, fault by fault.
+//! `echolume probe` over the simulated module: messages and exit codes, fault by fault.
 
 use crate::common::files::{Folder, MOTOR_PROBE, data};
 use crate::common::motor::{simulated, stopped_at_last};
@@ -36,7 +36,7 @@ fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).expect("send a signal");
 }
 
-/// A sweep whose pass takes ten seconds, as it is being done.
+/// A sweep in progress whose pass takes ten seconds.
 fn long_sweep(simulator: &Simulator, more: &[&str]) -> Child {
     let arguments = ["--angle", "40", "--rate", "0.1", "--timeout", "2000"];
     let child = probe(simulator, "sweep", &[&arguments, more].concat()).spawn().expect("start the program");
@@ -48,7 +48,7 @@ fn long_sweep(simulator: &Simulator, more: &[&str]) -> Child {
 #[test]
 fn the_fault_matrix() {
     let sweep = ["--angle", "24", "--rate", "4", "--volumes", "8", "--timeout"];
-    // Fault, time-out in ms, exit code, what is said, whether the module gets MST.
+    // Fault, time-out in ms, exit code, message, whether the module receives a stop (MST).
     let matrix: &[(&str, &str, i32, &[&str], bool)] = &[
         ("mute", "300", 1, &["open: no reply", "power, the cable", "told to stop but has not confirmed"], true),
         ("mute@0.3", "500", 1, &["sweep: no reply to", "told to stop but has not confirmed"], true),
@@ -137,7 +137,7 @@ fn a_stop_that_is_not_confirmed_is_no_success() {
         code == Some(1) && out.is_empty() && err.contains("has not confirmed") && err.contains("power"),
         "{out}{err}"
     );
-    // At once, before anything is asked.
+    // At once, before the first request.
     let stops = vec![Request::stop(1, 0); 3];
     assert!(eventually(|| simulator.received() == stops), "{:?}", simulator.received());
 }
