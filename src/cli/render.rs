@@ -4,7 +4,8 @@ use super::asked::Asked;
 use super::report_error::{nanoseconds, read};
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::shader_reload::ShaderFolder;
+use echolume::gpu::{GpuError, Options, Renderer};
 use echolume::plan::Plan;
 use echolume::report::curves::{Measure, choose};
 use echolume::report::{dump, times};
@@ -45,7 +46,6 @@ pub struct Render {
     #[arg(long)]
     validate: bool,
     /// Compile the shaders from this folder instead of using the built-in ones
-    #[cfg(feature = "hot-reload")]
     #[arg(long, value_name = "DIR")]
     glsl: Option<PathBuf>,
 }
@@ -68,7 +68,10 @@ impl Render {
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let context = self.asked.device(self.validate)?;
-        let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(failed)?;
+        let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(|e| match e {
+            GpuError::Shader { .. } if self.glsl.is_some() => input(e),
+            e => failed(e),
+        })?;
         let send = |frame: Frame| renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed);
         self.asked.frames(&mut *source, send)?;
         renderer.show(0).map_err(failed)?;
@@ -113,18 +116,12 @@ impl Render {
         self.asked.open_over(&choice.set)
     }
 
-    #[cfg(feature = "hot-reload")]
     fn options(&self) -> Result<Options, Failure> {
         let mut options = Options::default();
         if let Some(folder) = &self.glsl {
-            options.shaders = echolume::gpu::hot_reload::compile(folder).map_err(input)?;
+            options.shaders = ShaderFolder::open(folder).map_err(input)?.shaders();
         }
         Ok(options)
-    }
-
-    #[cfg(not(feature = "hot-reload"))]
-    fn options(&self) -> Result<Options, Failure> {
-        Ok(Options::default())
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {

@@ -8,8 +8,6 @@ pub mod context;
 pub mod error;
 pub mod faults;
 pub mod formats;
-#[cfg(feature = "hot-reload")]
-pub mod hot_reload;
 pub mod measured;
 pub mod order;
 pub mod pipelines;
@@ -17,6 +15,7 @@ pub mod recorder;
 pub mod renderer;
 pub mod resources;
 pub mod select;
+pub mod shader_reload;
 pub mod single;
 pub mod slots;
 pub mod timeline;
