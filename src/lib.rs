@@ -22,6 +22,12 @@
 #[forbid(unsafe_code)]
 pub mod barriers;
 #[forbid(unsafe_code)]
+pub mod cli;
+#[forbid(unsafe_code)]
+pub mod dump;
+#[forbid(unsafe_code)]
+pub mod error_report;
+#[forbid(unsafe_code)]
 pub mod files;
 #[allow(unsafe_code)]
 pub mod gpu;
@@ -29,8 +35,6 @@ pub mod gpu;
 pub mod kiosk;
 #[forbid(unsafe_code)]
 pub mod live;
-#[forbid(unsafe_code)]
-pub mod measuring;
 #[forbid(unsafe_code)]
 pub mod passes;
 #[forbid(unsafe_code)]
@@ -40,9 +44,11 @@ pub mod plan;
 #[forbid(unsafe_code)]
 pub mod probe;
 #[forbid(unsafe_code)]
+pub mod profile;
+#[forbid(unsafe_code)]
 pub mod queues;
 #[forbid(unsafe_code)]
-pub mod report;
+pub mod reference;
 #[forbid(unsafe_code)]
 pub mod scene;
 #[cfg(feature = "hot-reload")]
@@ -56,6 +62,8 @@ pub mod shader_tools;
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
+#[forbid(unsafe_code)]
+pub mod thesis_tables;
 #[cfg(feature = "view")]
 #[forbid(unsafe_code)]
 pub mod ui;

@@ -1,7 +1,7 @@
 //! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
 
-use crate::passes::slots::Filled;
-use crate::passes::{PASSES, Part, Pass, Slot, Turn, When, chain};
+use crate::passes::slots::Initializer;
+use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -43,8 +43,8 @@ impl Plan {
         Plan { steps, slots }
     }
 
-    pub fn steps_of(&self, when: When) -> impl Iterator<Item = (usize, &Step)> {
-        self.steps.iter().enumerate().filter(move |(_, s)| s.pass.when == when)
+    pub fn steps_of(&self, frequency: Frequency) -> impl Iterator<Item = (usize, &Step)> {
+        self.steps.iter().enumerate().filter(move |(_, s)| s.pass.frequency == frequency)
     }
 
     /// What the passes of this plan keep on the device, bytes; volume images that take turns counted once.
@@ -63,11 +63,12 @@ impl Plan {
             }
             match (pass.needed)(scene) {
                 Ok(why) => {
-                    let [x, y, z] = pass.invocations(scene, &Turn { slices: scene.slices(), ..Turn::default() });
-                    let each = match pass.when {
-                        When::Frame => "each frame",
-                        When::Volume => "each volume",
-                        When::Picture => "each picture",
+                    let [x, y, z] =
+                        pass.invocations(scene, &DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() });
+                    let each = match pass.frequency {
+                        Frequency::Frame => "each frame",
+                        Frequency::Volume => "each volume",
+                        Frequency::Picture => "each picture",
                     };
                     let times = match (pass.repeat)(scene) {
                         1 => String::new(),
@@ -79,11 +80,13 @@ impl Plan {
                     };
                     // A pass that repeats may take several shaders in turn: each once.
                     let mut told = Vec::new();
-                    for turn in (0..(pass.repeat)(scene)).map(|iteration| Turn { iteration, ..Turn::default() }) {
-                        let shader = (pass.shader)(scene, &turn);
+                    for args in
+                        (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
+                    {
+                        let shader = (pass.shader)(scene, &args);
                         if !told.contains(&shader) {
                             told.push(shader);
-                            let (reads, writes) = ((pass.reads)(scene, &turn), (pass.writes)(scene, &turn));
+                            let (reads, writes) = ((pass.reads)(scene, &args), (pass.writes)(scene, &args));
                             let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
                         }
                     }
@@ -122,7 +125,7 @@ impl Plan {
         let before = Plan::new(old);
         // What frames leave behind; whatever follows from a volume can be made again from it.
         let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
-            let slots = plan.steps.iter().filter(|s| s.pass.when == When::Frame).flat_map(|s| s.slots(scene));
+            let slots = plan.steps.iter().filter(|s| s.pass.frequency == Frequency::Frame).flat_map(|s| s.slots(scene));
             let slots = slots.chain(chain::copied(scene));
             slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
         };
@@ -140,14 +143,14 @@ impl Plan {
         let mut steps = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             let same = before.steps.iter().any(|s| s.is(step) && s.same_work(step, old, new));
-            let reads = (step.pass.reads)(new, &step.turn());
+            let reads = (step.pass.reads)(new, &step.args());
             if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
                 continue;
             }
-            if step.pass.when == When::Frame {
+            if step.pass.frequency == Frequency::Frame {
                 return Rerun::Frames;
             }
-            changed.extend((step.pass.writes)(new, &step.turn()).iter().map(|b| b.slot));
+            changed.extend((step.pass.writes)(new, &step.args()).iter().map(|b| b.slot));
             steps.push(i);
         }
         Rerun::Steps { steps, slots }
@@ -163,13 +166,15 @@ impl Plan {
     pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
         'again: loop {
             let mut now = contents.clone();
-            for (i, step) in self.steps.iter().enumerate().filter(|(_, s)| s.pass.when != When::Frame) {
+            for (i, step) in self.steps.iter().enumerate().filter(|(_, s)| s.pass.frequency != Frequency::Frame) {
                 if !stale[i] {
                     continue;
                 }
-                for bind in (step.pass.reads)(scene, &step.turn()) {
+                for bind in (step.pass.reads)(scene, &step.args()) {
                     let writer = self.steps[..i].iter().rposition(|s| s.writes(scene).contains(&bind.slot));
-                    let Some(j) = writer.filter(|j| self.steps[*j].pass.when != When::Frame) else { continue };
+                    let Some(j) = writer.filter(|j| self.steps[*j].pass.frequency != Frequency::Frame) else {
+                        continue;
+                    };
                     if now.get(&bind.slot) != Some(&self.steps[j].id()) {
                         stale[j] = true;
                         continue 'again;
@@ -198,7 +203,7 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 impl Step {
     /// How many slices on either side a pass over the volume looks at.
     pub fn reach(&self, scene: &Scene) -> u32 {
-        let reads = (self.pass.reads)(scene, &self.turn());
+        let reads = (self.pass.reads)(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
@@ -208,21 +213,21 @@ impl Step {
 
     /// Slots that it reads.
     pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.reads)(scene, &self.turn()).iter().map(|b| b.slot).collect()
+        (self.pass.reads)(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
     /// Slots that it writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.writes)(scene, &self.turn()).iter().map(|b| b.slot).collect()
+        (self.pass.writes)(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
-    pub fn turn(&self) -> Turn {
-        Turn { iteration: self.iteration, ..Turn::default() }
+    pub fn args(&self) -> DispatchArgs {
+        DispatchArgs { iteration: self.iteration, ..DispatchArgs::default() }
     }
 
     fn slots(&self, scene: &Scene) -> Vec<Slot> {
-        let reads = (self.pass.reads)(scene, &self.turn());
-        let writes = (self.pass.writes)(scene, &self.turn());
+        let reads = (self.pass.reads)(scene, &self.args());
+        let writes = (self.pass.writes)(scene, &self.args());
         reads.iter().chain(&writes).map(|b| b.slot).collect()
     }
 
@@ -232,19 +237,19 @@ impl Step {
 
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {
         let (a, b) = (self.pass, other.pass);
-        let turn = self.turn();
-        (a.shader)(old, &turn) == (b.shader)(new, &turn)
-            && (a.constants)(old, &turn) == (b.constants)(new, &turn)
-            && a.numbers(old, &turn) == b.numbers(new, &turn)
-            && a.invocations(old, &turn) == b.invocations(new, &turn)
-            && (a.reads)(old, &turn) == (b.reads)(new, &turn)
-            && (a.writes)(old, &turn) == (b.writes)(new, &turn)
+        let args = self.args();
+        (a.shader)(old, &args) == (b.shader)(new, &args)
+            && (a.constants)(old, &args) == (b.constants)(new, &args)
+            && a.numbers(old, &args) == b.numbers(new, &args)
+            && a.invocations(old, &args) == b.invocations(new, &args)
+            && (a.reads)(old, &args) == (b.reads)(new, &args)
+            && (a.writes)(old, &args) == (b.writes)(new, &args)
     }
 }
 
 /// Whether a slot that the CPU makes from the scene has other content now.
 fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
-    let Filled::ByScene(make) = slot.filled() else { return false };
+    let Initializer::ByScene(make) = slot.filled() else { return false };
     match slot {
         Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
         // Follows from the other, which is shorter.

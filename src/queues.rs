@@ -142,7 +142,7 @@ impl Queues {
 mod tests {
     use super::*;
     use crate::barriers::Worker;
-    use crate::passes::{PASSES, Slot, Turn, When};
+    use crate::passes::{DispatchArgs, Frequency, PASSES, Slot};
     use crate::scene::Scene;
     use proptest::prelude::*;
 
@@ -226,9 +226,9 @@ mod tests {
         let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
         let input = crate::scene::Input { stored: crate::source::StoredType::U8, range: [0.0, 255.0] };
         let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();
-        let of = |when: When, turn: Turn| -> Vec<Access> {
-            let passes = PASSES.iter().filter(|p| p.when == when && p.is_needed(&scene));
-            passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &turn)).collect()
+        let of = |frequency: Frequency, args: DispatchArgs| -> Vec<Access> {
+            let passes = PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene));
+            passes.flat_map(|pass| crate::barriers::accesses(&scene, pass, &args)).collect()
         };
         for (count, images) in (1..=3).flat_map(|count| [(count, 1), (count, 2), (count, 3)]) {
             let (mut queues, mut values, mut all) = (Queues::new(count), [0; MOST], Vec::new());
@@ -239,21 +239,22 @@ mod tests {
             };
             for (n, image) in (0..6u32).map(|n| (n, n % images)) {
                 for slice in 0..6 {
-                    let turn = Turn { layer: (n * 6 + slice) % 4, slice, image, slices: 1, ..Turn::default() };
-                    let layer = turn.layer..turn.layer + 1;
+                    let args =
+                        DispatchArgs { layer: (n * 6 + slice) % 4, slice, image, slices: 1, ..DispatchArgs::default() };
+                    let layer = args.layer..args.layer + 1;
                     let copied = Access::of_slot(Slot::Frames, 0, layer, true, Worker::Copy);
                     // Without a queue of its own the copy goes with the frame.
                     match count {
                         3 => {
                             do_it(Work::Copy, vec![copied]);
-                            do_it(Work::Ingest, of(When::Frame, turn));
+                            do_it(Work::Ingest, of(Frequency::Frame, args));
                         }
-                        _ => do_it(Work::Ingest, [vec![copied], of(When::Frame, turn)].concat()),
+                        _ => do_it(Work::Ingest, [vec![copied], of(Frequency::Frame, args)].concat()),
                     }
                     let rolls = images == 1 && slice % 2 == 1;
                     if rolls || slice == 5 {
-                        let turn = Turn { image, slices: scene.slices(), ..Turn::default() };
-                        do_it(Work::Render, [of(When::Volume, turn), of(When::Picture, turn)].concat());
+                        let args = DispatchArgs { image, slices: scene.slices(), ..DispatchArgs::default() };
+                        do_it(Work::Render, [of(Frequency::Volume, args), of(Frequency::Picture, args)].concat());
                     }
                 }
             }

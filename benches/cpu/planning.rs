@@ -3,7 +3,7 @@
 use crate::common;
 use criterion::{Criterion, Throughput};
 use echolume::barriers::{Barrier, Tracker, accesses};
-use echolume::passes::{Turn, When};
+use echolume::passes::{DispatchArgs, Frequency};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::Geometry;
 use echolume::scene::Scene;
@@ -14,14 +14,14 @@ fn barriers(scene: &Scene, plan: &Plan) -> Vec<Barrier> {
     let mut tracker = Tracker::default();
     let mut found = Vec::new();
     for slice in 0..scene.slices() {
-        for (_, step) in plan.steps_of(When::Frame) {
-            let turn = Turn { layer: slice % 4, slice, slices: 1, ..step.turn() };
-            found.extend(tracker.before(&accesses(scene, step.pass, &turn)));
+        for (_, step) in plan.steps_of(Frequency::Frame) {
+            let args = DispatchArgs { layer: slice % 4, slice, slices: 1, ..step.args() };
+            found.extend(tracker.before(&accesses(scene, step.pass, &args)));
         }
     }
-    for (_, step) in plan.steps_of(When::Volume).chain(plan.steps_of(When::Picture)) {
-        let turn = Turn { slices: scene.slices(), ..step.turn() };
-        found.extend(tracker.before(&accesses(scene, step.pass, &turn)));
+    for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
+        let args = DispatchArgs { slices: scene.slices(), ..step.args() };
+        found.extend(tracker.before(&accesses(scene, step.pass, &args)));
     }
     found
 }
@@ -54,8 +54,8 @@ pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
         return Err("barriers: none were derived".into());
     }
     // Of one operation each.
-    let frames = plan.steps_of(When::Frame).count() * old.slices() as usize;
-    let rest = plan.steps.iter().filter(|s| s.pass.when != When::Frame).count();
+    let frames = plan.steps_of(Frequency::Frame).count() * old.slices() as usize;
+    let rest = plan.steps.iter().filter(|s| s.pass.frequency != Frequency::Frame).count();
     group.throughput(Throughput::Elements((frames + rest) as u64));
     group.bench_function("barriers of a volume and a picture", |b| b.iter(|| barriers(black_box(&old), &plan)));
     group.finish();

@@ -3,9 +3,9 @@
 
 use crate::common::{self, BYTES};
 use criterion::{Criterion, Throughput};
-use echolume::passes::{Arrays, Slot, Texels, Turn, When, by_name};
+use echolume::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, by_name};
 use echolume::probe::Geometry;
-use echolume::report::whole;
+use echolume::reference;
 use echolume::scene::Scene;
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
         let mut volume = phantom.volume(0);
         volume.sort_by_key(|f| f.slice);
         let frames: Vec<Texels> = volume.iter().map(|f| texels(&f.bytes)).collect();
-        whole::render(&scene, &frames)
+        reference::render(&scene, &frames)
     });
     let mut group = criterion.benchmark_group("references");
     for name in
@@ -47,11 +47,11 @@ fn one(
 ) -> Result<(), String> {
     let pass = by_name(name).ok_or_else(|| format!("references: there is no pass '{name}'"))?;
     (pass.needed)(scene).map_err(|why| format!("references: the scene does not need '{name}': {why}"))?;
-    let turn = match pass.when {
-        When::Frame => Turn { slice: scene.slices() / 2, slices: 1, ..Turn::default() },
-        _ => Turn { slices: scene.slices(), ..Turn::default() },
+    let args = match pass.frequency {
+        Frequency::Frame => DispatchArgs { slice: scene.slices() / 2, slices: 1, ..DispatchArgs::default() },
+        _ => DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() },
     };
-    group.throughput(Throughput::Elements((pass.extent)(scene, &turn).map(u64::from).iter().product()));
+    group.throughput(Throughput::Elements((pass.extent)(scene, &args).map(u64::from).iter().product()));
     let mut prepared = None;
     group.bench_function(name, |b| {
         let (reads, writes) = prepared.get_or_insert_with(|| {
@@ -60,9 +60,9 @@ fn one(
                 binds.iter().for_each(|b| arrays.insert(b.name, slots[&b.slot].clone()));
                 arrays
             };
-            (taken((pass.reads)(scene, &turn)), taken((pass.writes)(scene, &turn)))
+            (taken((pass.reads)(scene, &args)), taken((pass.writes)(scene, &args)))
         });
-        b.iter(|| (pass.reference)(scene, &turn, reads, writes));
+        b.iter(|| (pass.reference)(scene, &args, reads, writes));
     });
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::common;
 use criterion::{Criterion, Throughput};
-use echolume::passes::tables;
+use echolume::passes::lookup_tables;
 use echolume::probe::{Axis, Geometry, Probe};
 use std::hint::black_box;
 
@@ -18,18 +18,22 @@ pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
         let scene = common::scene(Geometry::Sweep(probe), &[])?;
         let pixels = scene.grid.size.map(u64::from).iter().product();
         group.throughput(Throughput::Elements(pixels));
-        group.bench_function(format!("scan_lut, {name}"), |b| b.iter(|| tables::scan_lut(black_box(&scene))));
+        group.bench_function(format!("scan_lut, {name}"), |b| b.iter(|| lookup_tables::scan_lut(black_box(&scene))));
         group.throughput(Throughput::Elements(u64::from(scene.settings.ray.entries)));
-        group.bench_function(format!("sweep_lut, {name}"), |b| b.iter(|| tables::sweep_lut(black_box(&scene))));
-        group.bench_function(format!("line_lut, {name}"), |b| b.iter(|| tables::line_lut(black_box(&scene))));
+        group.bench_function(format!("sweep_lut, {name}"), |b| b.iter(|| lookup_tables::sweep_lut(black_box(&scene))));
+        group.bench_function(format!("line_lut, {name}"), |b| b.iter(|| lookup_tables::line_lut(black_box(&scene))));
         group.throughput(Throughput::Elements(u64::from(scene.slices())));
-        group.bench_function(format!("slice_table, {name}"), |b| b.iter(|| tables::slice_table(black_box(&scene))));
+        group.bench_function(format!("slice_table, {name}"), |b| {
+            b.iter(|| lookup_tables::slice_table(black_box(&scene)))
+        });
         if name == "even" {
-            let entries = tables::transfer_table(&scene).len() as u64 / 4;
+            let entries = lookup_tables::transfer_table(&scene).len() as u64 / 4;
             group.throughput(Throughput::Elements(entries));
-            group.bench_function("transfer", |b| b.iter(|| tables::transfer_table(black_box(&scene))));
+            group.bench_function("transfer", |b| b.iter(|| lookup_tables::transfer_table(black_box(&scene))));
             group.throughput(Throughput::Elements(entries * entries));
-            group.bench_function("pre-integrated", |b| b.iter(|| tables::pre_integrated_table(black_box(&scene))));
+            group.bench_function("pre-integrated", |b| {
+                b.iter(|| lookup_tables::pre_integrated_table(black_box(&scene)))
+            });
         }
     }
     group.finish();

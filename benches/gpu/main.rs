@@ -18,11 +18,11 @@ mod scenes;
 
 use common::Run;
 use criterion::{Criterion, SamplingMode, Throughput};
+use echolume::gpu::pass_runner::Timed;
 use echolume::gpu::renderer::size_of;
-use echolume::gpu::single::Timed;
 use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Options, Renderer};
-use echolume::passes::slots::Filled;
-use echolume::passes::{Pass, Slot, Texels, Turn, measure};
+use echolume::passes::slots::Initializer;
+use echolume::passes::{DispatchArgs, Pass, Slot, Texels, measure};
 use echolume::scene::Scene;
 use echolume::source::Frame;
 use scenes::{FULL, SCENES, SMALL, check_that_none_is_forgotten};
@@ -104,8 +104,8 @@ fn bench(
     name: &str,
     mut inputs: impl FnMut() -> Result<Vec<(Slot, Texels)>, String>,
 ) {
-    let turn = Turn { slices: scene.slices(), ..Turn::default() };
-    let invocations = pass.invocations(scene, &turn).map(u64::from).iter().product();
+    let args = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
+    let invocations = pass.invocations(scene, &args).map(u64::from).iter().product();
     let mut timed = None;
     let mut group = criterion.benchmark_group(pass.name);
     // Every sample of as many runs: they do not depend on what came before.
@@ -140,12 +140,12 @@ fn render(context: &Arc<Context>, scene: &Scene, frames: &[Frame]) -> Result<Ren
 /// finds nothing ends early, and its time says nothing.
 fn contents(renderer: &mut Renderer, pass: &Pass) -> Result<Vec<(Slot, Texels)>, String> {
     let scene = renderer.scene().clone();
-    let turns = (0..(pass.repeat)(&scene)).map(|iteration| Turn { iteration, ..Turn::default() });
+    let turns = (0..(pass.repeat)(&scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() });
     let mut slots: Vec<Slot> = turns.flat_map(|t| (pass.reads)(&scene, &t)).map(|b| b.slot).collect();
     slots.sort();
     slots.dedup();
     let mut contents = Vec::new();
-    for slot in slots.into_iter().filter(|s| !matches!(s.filled(), Filled::ByScene(_))) {
+    for slot in slots.into_iter().filter(|s| !matches!(s.filled(), Initializer::ByScene(_))) {
         let Some(texels) = renderer.read(slot).map_err(|e| e.to_string())? else { continue };
         let first = texels.get([0; 3]);
         if texels.values.chunks_exact(texels.channels).all(|t| t == first) {
@@ -171,5 +171,5 @@ fn noise(scene: &Scene, pass: &Pass) -> Vec<(Slot, Texels)> {
         texels.values.fill_with(&mut next);
         (slot, texels)
     };
-    (pass.reads)(scene, &Turn::default()).iter().map(|b| filled(b.slot)).collect()
+    (pass.reads)(scene, &DispatchArgs::default()).iter().map(|b| filled(b.slot)).collect()
 }

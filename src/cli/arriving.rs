@@ -2,17 +2,17 @@
 
 use super::driven::{Driven, Driving};
 use super::{Failure, failed, input};
+use crate::kiosk::config::Config;
+use crate::probe::Geometry;
+use crate::source::Source;
+use crate::source::freehand;
+use crate::source::igtl::{Network, NetworkOptions, Poses};
+use crate::source::live::{Live, Paced, Playback};
+use crate::source::motor_tracking::FreeRunning;
+use crate::source::phantom::{self, Phantom};
+use crate::source::phantom_source::Kept;
+use crate::source::piped::Piped;
 use clap::Parser;
-use echolume::kiosk::config::Config;
-use echolume::probe::Geometry;
-use echolume::source::Source;
-use echolume::source::freehand;
-use echolume::source::igtl::{Network, NetworkOptions, Poses};
-use echolume::source::live::{Live, Pace, Paced};
-use echolume::source::phantom::{self, Phantom};
-use echolume::source::piped::Piped;
-use echolume::source::played::Kept;
-use echolume::source::swept::FreeRunning;
 use std::path::{Path, PathBuf};
 
 /// Volumes of the phantom that are computed beforehand and played in turns: forth and back twice.
@@ -126,7 +126,7 @@ impl Arriving {
             let network = Network::connect(address, self.network()?);
             Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
         } else {
-            let recording = echolume::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
+            let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
             // A free-running probe is as fast as sound lets it.
             let rate = self.rate.or(driving.as_ref().and_then(|_| fastest(&*recording)));
             Box::new(Paced::new(recording, self.pace(rate)?, self.rounds))
@@ -140,14 +140,14 @@ impl Arriving {
         }
     }
 
-    fn pace(&self, rate: Option<f64>) -> Result<Pace, Failure> {
+    fn pace(&self, rate: Option<f64>) -> Result<Playback, Failure> {
         match rate {
-            _ if self.real_time => Ok(Pace::Recorded),
+            _ if self.real_time => Ok(Playback::Recorded),
             Some(rate) if !(rate > 0.0 && rate <= 1e6) => {
                 Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")))
             }
-            Some(rate) => Ok(Pace::Volumes(rate)),
-            None => Ok(Pace::Fast),
+            Some(rate) => Ok(Playback::Volumes(rate)),
+            None => Ok(Playback::Fast),
         }
     }
 

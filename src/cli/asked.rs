@@ -3,13 +3,13 @@
 use super::look::Look;
 use super::targets::{self, Target};
 use super::{Failure, input};
-use echolume::gpu::context::list;
-use echolume::gpu::{Choice, Context, Fetch, select};
-use echolume::scene::load::Layers;
-use echolume::scene::{Input, Scene};
-use echolume::source::phantom::{self, Phantom};
-use echolume::source::played::Played;
-use echolume::source::{self, Frame, Source};
+use crate::gpu::context::list;
+use crate::gpu::{Choice, Context, Fetch, select};
+use crate::scene::load::Layers;
+use crate::scene::{Input, Scene};
+use crate::source::phantom::{self, Phantom};
+use crate::source::phantom_source::Played;
+use crate::source::{self, Frame, Source};
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -2,12 +2,12 @@
 
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::files::signals::Writing;
-use echolume::probe::Geometry;
-use echolume::source::convert::{Volume, VolumeFile, lattice};
-use echolume::source::recorder::{Header, Writer};
-use echolume::source::sequence::{self, Sequence};
-use echolume::source::{self, Source};
+use crate::files::signals::Writing;
+use crate::probe::Geometry;
+use crate::source::convert::{Volume, VolumeFile, lattice};
+use crate::source::recorder::{Header, Writer};
+use crate::source::sequence::{self, Sequence};
+use crate::source::{self, Source};
 use std::path::PathBuf;
 
 /// What messages call it.

@@ -1,7 +1,7 @@
 //! `echolume devices`.
 
 use super::{Failure, failed, say};
-use echolume::gpu::{Choice, context, select};
+use crate::gpu::{Choice, context, select};
 
 #[derive(clap::Args)]
 pub struct Devices {

@@ -2,10 +2,10 @@
 
 use super::serial::{Serial, fault, motor_of};
 use super::{Failure, failed, input};
-use echolume::probe::ProbeFile;
-use echolume::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
-use echolume::source::live::Live;
-use echolume::source::swept::{Clock, Options, Swept};
+use crate::probe::ProbeFile;
+use crate::probe::motor::{Drive, MotorTable, Settings, Sweep, Turning};
+use crate::source::live::Live;
+use crate::source::motor_tracking::{Clock, Options, Swept};
 use std::path::Path;
 
 /// The motor's sweep, of what the frames lie over.

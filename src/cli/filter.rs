@@ -1,15 +1,15 @@
 //! `echolume filter`: the 2D filters of slices on an ordinary picture.
 
 use super::{Failure, failed, input, say, targets};
-use echolume::gpu::{Choice, Context, Options, Renderer};
-use echolume::measuring::growth::{Row, measure, scene};
-use echolume::passes::{Slot, Texels};
-use echolume::picture::{self, grey::Grey};
-use echolume::report::growth;
-use echolume::report::regions::{self, Region};
-use echolume::report::times;
-use echolume::scene::Settings;
-use echolume::scene::load::Layers;
+use crate::gpu::{Choice, Context, Options, Renderer};
+use crate::passes::{Slot, Texels};
+use crate::picture::regions::{self, Region};
+use crate::picture::{self, grey::Grey};
+use crate::profile::pass_times;
+use crate::scene::Settings;
+use crate::scene::load::Layers;
+use crate::thesis_tables::measure_growth::{Row, measure, scene};
+use crate::thesis_tables::window_growth;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -126,7 +126,7 @@ impl Filter {
             }
             if self.timings {
                 let measured = renderer.take_times().map_err(failed)?;
-                say!("{}", times::table(&measured, renderer.scene()).trim_end());
+                say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
             }
         }
         if self.growth_table {
@@ -195,14 +195,14 @@ impl Filter {
         let keys: Vec<&str> = keys.flat_map(|f| f.1.split(',')).filter_map(|k| k.split('=').next()).collect();
         let given = |key: &str| keys.iter().any(|k| k.trim() == key);
         let asked = self.settings(&[])?.slices.enhanced_sigma.unwrap_or_default();
-        let sigmas = if given("sigma") { vec![asked.sigma] } else { growth::SIGMAS.to_vec() };
+        let sigmas = if given("sigma") { vec![asked.sigma] } else { window_growth::SIGMAS.to_vec() };
         if asked.sigma <= 0.0 {
             return Err(input(
                 "--growth-table: with a sigma of 0 no pixel is like another and the filter does nothing",
             ));
         }
         let is_one = given("window") || given("largest");
-        let windows = if is_one { vec![[asked.window, asked.largest]] } else { growth::WINDOWS.to_vec() };
+        let windows = if is_one { vec![[asked.window, asked.largest]] } else { window_growth::WINDOWS.to_vec() };
         let rows = sigmas.iter().flat_map(|sigma| windows.iter().map(move |windows| (*sigma, *windows)));
         rows.map(|(sigma, [window, largest])| {
             let set = format!("{{window={window},largest={largest},sigma={sigma:?},growth=true}}");
@@ -213,9 +213,9 @@ impl Filter {
 
     fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<Row>) -> Result<(), Failure> {
         let rows = measure(context, grey, asked).map_err(failed)?;
-        say!("{}", growth::table(&rows).trim_end());
+        say!("{}", window_growth::table(&rows).trim_end());
         if let Some(csv) = &self.csv {
-            picture::replace(csv, growth::csv(&rows).as_bytes()).map_err(failed)?;
+            picture::replace(csv, window_growth::csv(&rows).as_bytes()).map_err(failed)?;
             say!("table: {}", csv.display());
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! `echolume info FILE`.
 
 use super::{Failure, input, say};
-use echolume::source;
+use crate::source;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -1,8 +1,8 @@
 //! How something is to be looked at: the settings in layers, and the device.
 
 use super::{Failure, failed, input, say};
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
-use echolume::scene::load::Layers;
+use crate::gpu::{Choice, Context, ContextOptions, GpuError};
+use crate::scene::load::Layers;
 use std::path::PathBuf;
 use std::sync::Arc;
 

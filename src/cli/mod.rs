@@ -29,8 +29,8 @@ mod view;
 #[path = "no_view.rs"]
 mod view;
 
+use crate::kiosk::rotating::{self, Rotating};
 use clap::{Parser, Subcommand};
-use echolume::kiosk::rotating::{self, Rotating};
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,8 +1,8 @@
 //! `echolume phantom`.
 
 use super::{Failure, failed, input, say};
-use echolume::picture::check_target;
-use echolume::source::phantom::{Body, Options, Phantom};
+use crate::picture::check_target;
+use crate::source::phantom::{Body, Options, Phantom};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

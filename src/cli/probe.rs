@@ -2,10 +2,10 @@
 
 use super::serial::{Serial, fault, table};
 use super::{Failure, failed, input, say, targets};
+use crate::files::replace;
+use crate::files::signals::Held;
+use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
 use clap::{Args, Subcommand};
-use echolume::files::replace;
-use echolume::files::signals::Held;
-use echolume::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -86,7 +86,7 @@ struct Simulate {
     /// What goes wrong: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS so long after
     /// the sweep's begin
     #[arg(long, value_name = "NAME[@SECONDS]")]
-    fault: Option<echolume::probe::motor::simulate::Injected>,
+    fault: Option<crate::probe::motor::simulate::Injected>,
     /// A module without a watchdog
     #[arg(long)]
     no_watchdog: bool,
@@ -201,7 +201,7 @@ impl SweepArguments {
             Ok(volumes) => say!("swept: {volumes} volumes"),
             // Without a number of volumes this is how it ends.
             Err(MotorError { fault: Fault::Interrupted(signal), stopped, .. })
-                if self.volumes.is_none() && stopped == echolume::probe::motor::Stopped::Confirmed =>
+                if self.volumes.is_none() && stopped == crate::probe::motor::Stopped::Confirmed =>
             {
                 say!("swept: {passes} volumes; the motor was stopped by {signal}");
             }
@@ -222,7 +222,7 @@ fn csv(positions: &[Position]) -> String {
 #[cfg(target_os = "linux")]
 impl Simulate {
     fn run(&self) -> Result<(), Failure> {
-        use echolume::probe::motor::simulate::{Options, Simulator};
+        use crate::probe::motor::simulate::{Options, Simulator};
         let held = Held::take();
         let options = Options {
             table: table(self.probe.as_ref())?.unwrap_or_default(),

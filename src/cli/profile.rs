@@ -4,11 +4,11 @@ use super::asked::Asked;
 use super::look::open_device;
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::files::{read_text, replace};
-use echolume::gpu::Choice;
-use echolume::measuring::profile;
-use echolume::report::profile as model;
-use echolume::report::profile::{compare, formats, table, trace};
+use crate::files::{read_text, replace};
+use crate::gpu::Choice;
+use crate::profile as model;
+use crate::profile::measure;
+use crate::profile::{compare, formats, table, trace};
 use std::path::{Path, PathBuf};
 
 /// Longest profile that is read, bytes.
@@ -93,7 +93,7 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let asked = profile::Asked {
+        let asked = measure::Asked {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
@@ -105,7 +105,7 @@ impl Profile {
             Some(choice) => Some(open_device(Some(choice.clone()), false)?),
             None => None,
         };
-        let run = |context| profile::Run::new(context, &scene, &asked).map_err(failed);
+        let run = |context| measure::Run::new(context, &scene, &asked).map_err(failed);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.wants_more() {
             first.repeat(&frames).map_err(failed)?;

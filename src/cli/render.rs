@@ -4,13 +4,14 @@ use super::asked::Asked;
 use super::report_error::{nanoseconds, read};
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::gpu::shader_reload::ShaderFolder;
-use echolume::gpu::{GpuError, Options, Renderer};
-use echolume::plan::Plan;
-use echolume::report::curves::{Measure, choose};
-use echolume::report::{dump, times};
-use echolume::scene::Scene;
-use echolume::source::{Frame, Source};
+use crate::dump;
+use crate::error_report::{Measure, choose};
+use crate::gpu::shader_reload::ShaderFolder;
+use crate::gpu::{GpuError, Options, Renderer};
+use crate::plan::Plan;
+use crate::profile::pass_times;
+use crate::scene::Scene;
+use crate::source::{Frame, Source};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -80,7 +81,7 @@ impl Render {
         say!("picture: {}", self.output.display());
         if self.timings {
             let measured = renderer.take_times().map_err(failed)?;
-            say!("{}", times::table(&measured, renderer.scene()).trim_end());
+            say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;

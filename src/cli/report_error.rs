@@ -2,11 +2,10 @@
 
 use super::asked::Asked;
 use super::{Failure, failed, input, say};
-use echolume::files::read_text;
-use echolume::measuring::{dials, error};
-use echolume::picture::replace;
-use echolume::report::curves::{self, Measure, choose, plot};
-use echolume::scene::Scene;
+use crate::error_report::{self, Measure, choose, dials, measure, plot};
+use crate::files::read_text;
+use crate::picture::replace;
+use crate::scene::Scene;
 use std::path::{Path, PathBuf};
 
 /// Longest report that is read, bytes.
@@ -63,7 +62,7 @@ impl Error {
             Some(file) => read(file)?,
             None => self.measured()?,
         };
-        say!("{}", curves::table::table(&report, measure).trim_end());
+        say!("{}", error_report::summary_table::table(&report, measure).trim_end());
         if let Some(folder) = &self.output {
             write(&report, measure, folder)?;
         }
@@ -76,11 +75,11 @@ impl Error {
         Ok(())
     }
 
-    fn measured(&self) -> Result<curves::Report, Failure> {
+    fn measured(&self) -> Result<error_report::Report, Failure> {
         let held = match self.against.as_str() {
-            "auto" => error::Held::Auto,
-            "f64" => error::Held::F64,
-            "converged" => error::Held::Converged,
+            "auto" => measure::Held::Auto,
+            "f64" => measure::Held::F64,
+            "converged" => measure::Held::Converged,
             other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
         };
         let (mut source, scene) = self.asked.open()?;
@@ -98,7 +97,7 @@ impl Error {
         let layers = self.asked.layers()?;
         let (repeats, frames, shown) = (self.repeat, &frames[..], self.asked.shown());
         let asked =
-            error::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
+            measure::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
         let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
         let bar = indicatif::ProgressBar::new(places as u64);
         bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
@@ -132,7 +131,7 @@ impl Error {
     }
 }
 
-fn write(report: &curves::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
+fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
     let size = [1200, 800];
     replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
@@ -144,10 +143,10 @@ fn write(report: &curves::Report, measure: Measure, folder: &Path) -> Result<(),
 }
 
 /// A stored report.
-pub(super) fn read(file: &Path) -> Result<curves::Report, Failure> {
+pub(super) fn read(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
-    curves::Report::from_json(&text).map_err(|e| fault(&e))
+    error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }
 
 /// A time such as 16ms, 0.25s or 250us.

@@ -2,11 +2,11 @@
 
 use super::targets::{self, Target};
 use super::{Failure, failed, input, say};
-use echolume::gpu::Choice;
-use echolume::measuring::tables::{Asked, growth, run};
-use echolume::picture::grey::Grey;
-use echolume::picture::replace;
-use echolume::report::tables::{csv, markdown};
+use crate::gpu::Choice;
+use crate::picture::grey::Grey;
+use crate::picture::replace;
+use crate::thesis_tables::measure::{Asked, growth, run};
+use crate::thesis_tables::{csv, markdown};
 use std::path::{Path, PathBuf};
 
 /// Volumes rendered in each row before times count: they compile shaders and wake clocks.

@@ -1,9 +1,9 @@
 //! The serial line to the motor's module: the arguments of every command that drives it, and what is common to its failures.
 
 use super::{Failure, failed, input};
+use crate::probe::ProbeFile;
+use crate::probe::motor::{Fault, MotorError, MotorTable, Parity, Settings, StopBits};
 use clap::{Args, ValueEnum};
-use echolume::probe::ProbeFile;
-use echolume::probe::motor::{Fault, MotorError, MotorTable, Parity, Settings, StopBits};
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -4,14 +4,14 @@ use super::arriving::Arriving;
 use super::look::Look;
 use super::view::rungs;
 use super::{Failure, input};
-use echolume::gpu::window::{Pace, display};
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
-use echolume::kiosk::config::{Config, Present};
-use echolume::live::cine::Room;
-use echolume::source::live::Live;
-use echolume::ui::console::{Amiss, Console, Options};
-use echolume::ui::supply::Open;
-use echolume::ui::window::{self, Make, Shape};
+use crate::gpu::window::{PresentMode, display};
+use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
+use crate::kiosk::config::{Config, Present};
+use crate::live::cine::Room;
+use crate::source::live::Live;
+use crate::ui::console::{Amiss, Console, Options};
+use crate::ui::source_supervisor::Open;
+use crate::ui::window::{self, Make, Shape};
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
@@ -29,7 +29,7 @@ pub struct Place {
 impl Place {
     pub fn usual() -> Place {
         let device = ContextOptions { device: Choice::Best, validation: false };
-        let (monitor, pace, time) = (None, Pace::Fifo, None);
+        let (monitor, pace, time) = (None, PresentMode::Fifo, None);
         let direct = None;
         Place { device, direct, shape: Shape { size: SIZE, full_screen: false, monitor, pace, stays: false, time } }
     }
@@ -45,8 +45,8 @@ impl Place {
             Some(wanted) => {
                 // What is typed would otherwise reach the shell behind, and be run there at the end.
                 let (pace, time) = (self.shape.pace, self.shape.time);
-                let shape = echolume::ui::direct::Shape { wanted, pace, grab: true, time };
-                echolume::ui::direct::run(&self.device, shape, make)
+                let shape = crate::ui::direct::Shape { wanted, pace, grab: true, time };
+                crate::ui::direct::run(&self.device, shape, make)
             }
             #[cfg(not(target_os = "linux"))]
             Some(_) => Err(GpuError::Window("--direct is for Linux".into())),
@@ -60,8 +60,8 @@ impl Place {
         place.shape.full_screen = display.full_screen;
         place.shape.monitor = display.monitor.clone();
         place.shape.pace = match display.present {
-            Present::Fifo => Pace::Fifo,
-            Present::Mailbox => Pace::Mailbox,
+            Present::Fifo => PresentMode::Fifo,
+            Present::Mailbox => PresentMode::Mailbox,
         };
         place.direct = config.display.direct.then(|| display::Wanted {
             monitor: config.display.monitor.clone(),
@@ -139,5 +139,5 @@ impl Wanted {
 
 /// Now, as it goes into names of files.
 fn stamp() -> String {
-    echolume::ui::keep::stamp(SystemTime::now())
+    crate::ui::export::stamp(SystemTime::now())
 }

@@ -2,9 +2,9 @@
 
 use super::arriving::Arriving;
 use super::{Failure, failed, input, say};
-use echolume::kiosk::bundle::Bundle;
-use echolume::kiosk::config::Config;
-use echolume::picture;
+use crate::kiosk::bundle::Bundle;
+use crate::kiosk::config::Config;
+use crate::picture;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -56,7 +56,7 @@ impl SupportBundle {
             return Err(input(format!("--config {}: is no file", config.display())));
         }
         let mut bundle = Bundle::new(self.config.as_deref());
-        let config = self.config.as_deref().unwrap_or(Path::new(echolume::kiosk::config::USUAL));
+        let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::USUAL));
         if let Some(Err(Failure::Input(fault))) = Config::read(config).ok().map(|config| Arriving::configured(&config))
         {
             bundle.note(&format!("configuration: {fault}"));

@@ -1,7 +1,7 @@
 //! What a command writes, looked at before it does any work.
 
 use super::{Failure, failed, input};
-use echolume::files::check_target;
+use crate::files::check_target;
 use std::path::Path;
 
 /// A file to write, and the flag that says so.

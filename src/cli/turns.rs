@@ -1,7 +1,7 @@
 //! How the volumes of a live source become pictures: the arguments that a stream and a view share.
 
 use super::{Failure, input};
-use echolume::live::Update;
+use crate::live::Update;
 
 #[derive(clap::Args)]
 pub struct Turns {

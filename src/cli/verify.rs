@@ -1,13 +1,13 @@
 //! `echolume verify`.
 
 use super::{Failure, failed, input, say, targets};
-use echolume::files::signals::Held;
-use echolume::files::{read_text, replace};
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError};
-use echolume::report::verify::baseline::{self, Compared, compare};
-use echolume::report::verify::{Level, Outcome, Run, Verdict, html, json, junit, words};
-use echolume::verify::self_test::{self, Caught};
-use echolume::verify::{self, Bench, Check};
+use crate::files::signals::Held;
+use crate::files::{read_text, replace};
+use crate::gpu::{Choice, Context, ContextOptions, GpuError};
+use crate::verify::report::baseline::{self, Compared, compare};
+use crate::verify::report::{Level, Outcome, Run, Verdict, html, json, junit, words};
+use crate::verify::self_test::{self, Caught};
+use crate::verify::{self, Bench, Check};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};

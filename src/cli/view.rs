@@ -6,12 +6,12 @@ use super::report_error::{nanoseconds, read};
 use super::shown::{Place, Wanted};
 use super::turns::Turns;
 use super::{Failure, failed, input, say};
-use echolume::gpu::window::{Pace, display};
-use echolume::gpu::{Context, GpuError, Wake};
-use echolume::kiosk::config::{self, Config};
-use echolume::live::cine::Room;
-use echolume::ui::console::{Amiss, Console, Options};
-use echolume::ui::ladder::{self, Rung};
+use crate::gpu::window::{PresentMode, display};
+use crate::gpu::{Context, GpuError, Wake};
+use crate::kiosk::config::{self, Config};
+use crate::live::cine::Room;
+use crate::ui::console::{Amiss, Console, Options};
+use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -53,7 +53,7 @@ pub struct View {
     refresh: Option<f64>,
     /// fifo: each picture with a refresh of the monitor; mailbox: the newest, with less latency
     #[arg(long, value_name = "HOW", default_value = "fifo")]
-    present: Pace,
+    present: PresentMode,
     /// The picture alone: no panels, no marks, nothing over it
     #[arg(long)]
     no_ui: bool,
@@ -246,8 +246,10 @@ impl View {
 /// The dials that hold a budget.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
-        None => Ok(ladder::built_in()),
-        Some(file) => ladder::measured(&read(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display()))),
+        None => Ok(quality_ladder::built_in()),
+        Some(file) => {
+            quality_ladder::measured(&read(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display())))
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested;
 //! slowness, so that what finds it is; and wrong results, so that the checks of the device are.
 
-use crate::passes::planted::Change;
-use crate::passes::slots::{Filled, Format};
-use crate::passes::{Params, Pass, Slot, Turn};
+use crate::passes::fault_injection::Change;
+use crate::passes::slots::{Format, Initializer};
+use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use ash::vk;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -148,20 +148,20 @@ impl Faults {
     }
 
     /// What a dispatch works on; none if it is left out.
-    pub(super) fn turn(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> Option<Turn> {
-        let mut turn = *turn;
-        self.strike(|change| change.turn(pass.name, scene, &mut turn));
-        (!self.strike(|change| change.leaves_out(pass.name, scene, &turn))).then_some(turn)
+    pub(super) fn args(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Option<DispatchArgs> {
+        let mut args = *args;
+        self.strike(|change| change.args(pass.name, scene, &mut args));
+        (!self.strike(|change| change.leaves_out(pass.name, scene, &args))).then_some(args)
     }
 
-    pub(super) fn numbers(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> Params {
-        let mut params = pass.numbers(scene, turn);
+    pub(super) fn numbers(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Params {
+        let mut params = pass.numbers(scene, args);
         self.strike(|change| change.numbers(pass, scene, &mut params));
         params
     }
 
-    pub(super) fn invocations(&self, pass: &Pass, scene: &Scene, turn: &Turn) -> [u32; 3] {
-        let mut extent = pass.invocations(scene, turn);
+    pub(super) fn invocations(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
+        let mut extent = pass.invocations(scene, args);
         self.strike(|change| change.extent(pass.name, &mut extent));
         extent
     }
@@ -192,7 +192,7 @@ impl Faults {
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
             self.frame(scene, &mut bytes);
-        } else if self.planted.get().is_some() && matches!(slot.filled(), Filled::ByScene(_)) {
+        } else if self.planted.get().is_some() && matches!(slot.filled(), Initializer::ByScene(_)) {
             let values = bytemuck::pod_collect_to_vec(&bytes);
             bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();
         }

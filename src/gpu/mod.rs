@@ -4,19 +4,19 @@
 //! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`measured`] what those said; [`timeline`] what is done;
 //! [`renderer`] the four stages; [`single`] one pass alone, for tests; [`window`] what shows their pictures.
 
+pub mod barrier_recorder;
 pub mod context;
 pub mod error;
 pub mod faults;
 pub mod formats;
 pub mod measured;
-pub mod order;
+pub mod pass_runner;
 pub mod pipelines;
 pub mod recorder;
 pub mod renderer;
 pub mod resources;
 pub mod select;
 pub mod shader_reload;
-pub mod single;
 pub mod slots;
 pub mod timeline;
 pub mod timing;

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::resources::{Buffer, Image, Purpose};
 use super::{GpuError, formats};
 use crate::passes::Slot;
-use crate::passes::slots::{Filled, Shape};
+use crate::passes::slots::{Initializer, Shape};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ impl Slots {
         self.there.retain(|(slot, _), resource| plan.slots.contains(slot) && resource.is(*slot, scene));
         let mut made = BTreeMap::new();
         for &slot in &plan.slots {
-            let copies = if slot.takes_turns() { self.images } else { 1 };
+            let copies = if slot.is_multibuffered() { self.images } else { 1 };
             for key in (0..copies).map(|copy| (slot, copy)).filter(|key| !self.there.contains_key(key)) {
                 made.insert(key, Resource::new(&self.context, slot, scene)?);
             }
@@ -53,7 +53,8 @@ impl Slots {
 
     /// Writes a slot made from the scene, if it is a table; images of that kind go through staging.
     pub fn fill(&mut self, slot: Slot, scene: &Scene) {
-        if let (Filled::ByScene(make), Some(Resource::Buffer(buffer))) = (slot.filled(), self.there.get_mut(&(slot, 0)))
+        if let (Initializer::ByScene(make), Some(Resource::Buffer(buffer))) =
+            (slot.filled(), self.there.get_mut(&(slot, 0)))
         {
             let values = self.context.faults.table(slot, scene, make(scene));
             let bytes: &[u8] = bytemuck::cast_slice(&values);
@@ -66,7 +67,7 @@ impl Slots {
     /// # Panics
     /// When the plan has no such slot: a pass declares what its plan then lists.
     pub fn get(&self, slot: Slot, turn_image: u32) -> &Resource {
-        let key = (slot, if slot.takes_turns() { turn_image } else { 0 });
+        let key = (slot, if slot.is_multibuffered() { turn_image } else { 0 });
         match self.there.get(&key) {
             Some(resource) => resource,
             None => panic!("slot '{}' {} is not in the plan", slot.name(), key.1),
@@ -74,7 +75,7 @@ impl Slots {
     }
 
     pub fn image(&self, slot: Slot, turn_image: u32) -> Option<&Image> {
-        match self.there.get(&(slot, if slot.takes_turns() { turn_image } else { 0 })) {
+        match self.there.get(&(slot, if slot.is_multibuffered() { turn_image } else { 0 })) {
             Some(Resource::Image(image)) => Some(image),
             _ => None,
         }

@@ -1,7 +1,7 @@
 //! A live source on a thread of its own, and what has arrived and not been taken yet: bounded, whole frames or lines in order. Where it
 //! overflows a source that can wait is kept waiting, and one that cannot loses frames, which are counted.
 
-use super::tape::Tape;
+use super::recording::RecordingTap;
 use crate::gpu::Wake;
 use crate::source::live::{Event, Live};
 use std::collections::VecDeque;
@@ -118,7 +118,7 @@ impl Feed {
     pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
         let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
         let theirs = shared.clone();
-        let tape = record.map(Tape::new);
+        let tape = record.map(RecordingTap::new);
         let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;
         Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
@@ -174,7 +174,7 @@ impl Drop for Feed {
     }
 }
 
-fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
+fn listen(mut source: Box<dyn Live>, mut tape: Option<RecordingTap>, shared: &Shared) {
     let (can_wait, records) = (source.can_wait(), tape.is_some());
     let _ended = Ended(shared);
     while !shared.stop.load(Ordering::Relaxed) {
@@ -198,7 +198,7 @@ fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
             tape.failing = false;
         }
         let ends = matches!(event, Event::End(_));
-        if ends && let Some(Err(fault)) = tape.take().map(Tape::finish) {
+        if ends && let Some(Err(fault)) = tape.take().map(RecordingTap::finish) {
             shared.put(Arrived { event: Event::Fault(format!("the recording has no index: {fault}")), at }, can_wait);
         }
         if !matches!(event, Event::Idle) {
@@ -208,7 +208,7 @@ fn listen(mut source: Box<dyn Live>, mut tape: Option<Tape>, shared: &Shared) {
             return;
         }
     }
-    if let Some(Err(fault)) = tape.map(Tape::finish) {
+    if let Some(Err(fault)) = tape.map(RecordingTap::finish) {
         tracing::warn!("the recording has no index: {fault}");
     }
 }

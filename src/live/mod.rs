@@ -5,16 +5,16 @@
 
 pub mod cine;
 pub mod feed;
-mod now;
+mod recording;
 mod replay;
+mod session;
 pub mod statistics;
+mod status;
 mod stream;
-mod tape;
-mod told;
-pub mod turns;
 pub mod views;
+pub mod volume_pool;
 
 pub use feed::Feed;
 pub use statistics::Statistics;
 pub use stream::{Options, Shown, Step, Stream, StreamError};
-pub use turns::Update;
+pub use volume_pool::Update;

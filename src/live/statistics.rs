@@ -1,6 +1,6 @@
 //! What a stream did: counts, and how long frames took from their arrival to the pixels that show them.
 
-use super::turns::Counts;
+use super::volume_pool::Counts;
 use crate::passes::PassTime;
 use hdrhistogram::Histogram;
 use std::fmt::Write as _;

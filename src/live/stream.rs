@@ -2,11 +2,11 @@
 
 use super::cine::{Cine, Room};
 use super::feed::{Arrived, Feed};
-use super::now::Now;
 use super::replay::Replay;
+use super::session::Session;
 use super::statistics::Statistics;
-use super::turns::{Turns, Update};
 use super::views::Views;
+use super::volume_pool::{Update, VolumePool};
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
 use crate::picture::Picture;
 use crate::scene::{SceneError, Settings};
@@ -77,7 +77,7 @@ pub struct Stream {
     pub(super) feed: Feed,
     settings: Settings,
     options: Options,
-    pub(super) now: Option<Now>,
+    pub(super) now: Option<Session>,
     pub(super) cine: Cine,
     /// A volume of the cine loop that is being sent once more.
     pub(super) replay: Option<Replay>,
@@ -91,7 +91,7 @@ pub struct Stream {
     pub(super) first: u32,
     pub(super) newest: Option<u32>,
     /// Of a geometry that nothing could be made after.
-    pub(super) before: Option<Turns>,
+    pub(super) before: Option<VolumePool>,
     pub(super) end: Option<Option<String>>,
     pub(super) began: Instant,
     pub(super) statistics: Statistics,
@@ -129,7 +129,7 @@ impl Stream {
         let went = self.go(patience);
         // What cannot draw any more is made anew with the next geometry that is told.
         if went.is_err()
-            && let Some(Now { turns, .. }) = self.now.take_if(|now| now.renderer.is_broken())
+            && let Some(Session { turns, .. }) = self.now.take_if(|now| now.renderer.is_broken())
         {
             (self.before, self.replay) = (Some(turns), None);
         }
@@ -245,11 +245,11 @@ impl Stream {
     fn make(&mut self, header: Header) -> Result<(), StreamError> {
         let is_same = self.header.as_ref() == Some(&header);
         let (asked, now) = (self.replay.take().map(|replay| replay.kept.volume), self.now.as_ref());
-        let shown = asked.or_else(|| now.and_then(Now::seen));
+        let shown = asked.or_else(|| now.and_then(Session::seen));
         let shown = shown.or_else(|| self.cine.kept().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
         // Gone before the new one comes: both may not fit the device.
-        if let Some(Now { turns, .. }) = self.now.take() {
+        if let Some(Session { turns, .. }) = self.now.take() {
             self.before = Some(turns);
         }
         let views = Views::new(&header, &self.settings, self.options.update)?;
@@ -258,7 +258,7 @@ impl Stream {
             self.cine = Cine::new(self.options.cine, slices);
         }
         self.cine.cut();
-        let mut turns = Turns::new(self.options.update, self.options.images, slices);
+        let mut turns = VolumePool::new(self.options.update, self.options.images, slices);
         let options = gpu::Options {
             volume_images: turns.images(),
             queues: self.options.queues,
@@ -270,7 +270,7 @@ impl Stream {
         if let Some(before) = self.before.take() {
             turns.go_on_from(before);
         }
-        self.now = Some(Now {
+        self.now = Some(Session {
             arrived: vec![(0, Vec::new()); turns.images() as usize],
             backward: vec![false; slices],
             views,

@@ -1,7 +1,7 @@
 //! The scenes of a stream: one for each way that a volume may have been swept, and where slices of both lie side by side a mixture.
 //! All of them look at the same texels, so that frames need not wait for the scene that they will be seen in.
 
-use super::turns::Update;
+use super::volume_pool::Update;
 use crate::probe::Geometry;
 use crate::scene::{Input, Scene, SceneError, Settings};
 use crate::source::recorder::Header;

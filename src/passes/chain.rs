@@ -3,7 +3,7 @@
 
 use super::filter::aos;
 use super::slots::Format;
-use super::{PASSES, Pass, RUN, Slot, Turn};
+use super::{DispatchArgs, PASSES, Pass, RUN, Slot};
 use crate::scene::{Estimator, Layout, Scene};
 use crate::source::StoredType;
 
@@ -70,11 +70,11 @@ impl Chain {
     }
 
     /// Links before the one that this pass's iteration works on, and links in all.
-    fn position(&self, scene: &Scene, name: &str, turn: &Turn) -> (u32, u32) {
+    fn position(&self, scene: &Scene, name: &str, args: &DispatchArgs) -> (u32, u32) {
         let (mut before, mut all) = (0, 0);
         for pass in self.needed().filter(|p| p.is_needed(scene)) {
             if pass.name == name {
-                before = all + turn.iteration / dispatches(pass.name);
+                before = all + args.iteration / dispatches(pass.name);
             }
             all += (pass.repeat)(scene) / dispatches(pass.name);
         }
@@ -88,14 +88,14 @@ impl Chain {
         }
     }
 
-    fn link(&self, scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
-        let (link, all) = self.position(scene, name, turn);
+    fn link(&self, scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
+        let (link, all) = self.position(scene, name, args);
         let from = if link == 0 { (self.first)(scene) } else { self.output(scene, link - 1, all) };
         (from, self.output(scene, link, all))
     }
 
     fn end(&self, scene: &Scene) -> Slot {
-        let (_, all) = self.position(scene, "", &Turn::default());
+        let (_, all) = self.position(scene, "", &DispatchArgs::default());
         if all == 0 { (self.first)(scene) } else { self.output(scene, all - 1, all) }
     }
 }
@@ -121,8 +121,8 @@ pub fn rendered(scene: &Scene) -> Slot {
 }
 
 /// What a pass of stage 1 reads and writes.
-pub fn slice_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
-    SLICES.link(scene, name, turn)
+pub fn slice_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
+    SLICES.link(scene, name, args)
 }
 
 /// Columns and rows of a slice that a pass makes.
@@ -141,7 +141,7 @@ const BEHIND: [&str; 2] = ["gaussian_elevation", "quads"];
 
 /// What a pass over slices has to make of each: what is seen, and as far around it as the filters behind it look. None for
 /// passes that are not cut: lines of a frame, and the rows and columns of AOS, each of which depends on all of its own.
-pub fn rectangle(scene: &Scene, pass: &str, turn: &Turn) -> Option<Rectangle> {
+pub fn rectangle(scene: &Scene, pass: &str, args: &DispatchArgs) -> Option<Rectangle> {
     let whole = Rectangle { first: [0; 2], size: scene.grid.size };
     match pass {
         "growth_slice" => return Some(whole),
@@ -150,7 +150,7 @@ pub fn rectangle(scene: &Scene, pass: &str, turn: &Turn) -> Option<Rectangle> {
         _ if !SLICES.passes.contains(&pass) => return None,
         _ => {}
     }
-    let (link, _) = SLICES.position(scene, pass, turn);
+    let (link, _) = SLICES.position(scene, pass, args);
     let mut around = [0, 0];
     let mut before = 0;
     for filter in SLICES.needed().filter(|p| p.is_needed(scene) && !BEHIND.contains(&pass)) {
@@ -193,12 +193,12 @@ fn reach(scene: &Scene, name: &str) -> Option<[u32; 2]> {
 }
 
 /// Whether a pass of stage 1 writes into the 3D texture itself.
-pub fn writes_volume(scene: &Scene, name: &str, turn: &Turn) -> bool {
-    matches!(SLICES.link(scene, name, turn).1, Slot::Volume | Slot::SharpVolume)
+pub fn writes_volume(scene: &Scene, name: &str, args: &DispatchArgs) -> bool {
+    matches!(SLICES.link(scene, name, args).1, Slot::Volume | Slot::SharpVolume)
 }
 
-pub fn distance_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
-    DISTANCES.link(scene, name, turn)
+pub fn distance_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
+    DISTANCES.link(scene, name, args)
 }
 
 /// The distance map after its filters.
@@ -206,8 +206,8 @@ pub fn distance_end(scene: &Scene) -> Slot {
     DISTANCES.end(scene)
 }
 
-pub fn picture_link(scene: &Scene, name: &str, turn: &Turn) -> (Slot, Slot) {
-    PICTURES.link(scene, name, turn)
+pub fn picture_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
+    PICTURES.link(scene, name, args)
 }
 
 /// The picture after its filters.

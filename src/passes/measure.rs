@@ -16,7 +16,7 @@ pub const MEASURES: &[Pass] = &[FILTERED, EIGHT_FETCHES, ONE_FETCH, COPY];
 pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
     stage: Stage::Raycast,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "measure/sampling.plain",
     needed: |_| Err("measures the device, not a scene"),
     reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],

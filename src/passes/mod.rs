@@ -2,19 +2,19 @@
 //! which they run, in [`PASSES`]. Everything else (bindings, barriers, time stamps, labels, tests) follows from these.
 
 pub mod chain;
-pub mod contract;
+pub mod fault_injection;
 mod format;
+pub mod interface_check;
+pub mod lookup_tables;
 pub mod measure;
 mod params;
-pub mod planted;
 pub mod slots;
-pub mod tables;
 pub mod texels;
 
 pub mod preprocess {
     pub mod condition;
     pub mod load_slice;
-    pub mod quads;
+    pub mod packed_neighbours;
     pub mod scan_convert;
 }
 pub mod filter {
@@ -39,8 +39,8 @@ pub mod raycast {
     pub mod surface;
     pub mod volume;
 }
+pub mod empty_space;
 pub mod shade;
-pub mod skip;
 pub mod postprocess {
     pub mod assemble;
     pub mod tone;
@@ -74,14 +74,14 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
-    preprocess::quads::PASS,
-    skip::tile_ranges::PASS,
-    skip::brick_ranges::PASS,
-    skip::classify::SURFACE,
-    skip::leap::SURFACE,
+    preprocess::packed_neighbours::PASS,
+    empty_space::tile_ranges::PASS,
+    empty_space::brick_ranges::PASS,
+    empty_space::classify::SURFACE,
+    empty_space::distance::SURFACE,
     raycast::surface::PASS,
-    skip::classify::VOLUME,
-    skip::leap::VOLUME,
+    empty_space::classify::VOLUME,
+    empty_space::distance::VOLUME,
     raycast::volume::PASS,
     raycast::projection::PASS,
     raycast::planes::PASS,
@@ -124,7 +124,7 @@ impl Stage {
 
 /// What makes a pass run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum When {
+pub enum Frequency {
     /// Each frame that arrives.
     Frame,
     /// A volume whose frames have all arrived.
@@ -135,7 +135,7 @@ pub enum When {
 
 /// The numbers that differ between two dispatches of the same pass and scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Turn {
+pub struct DispatchArgs {
     /// Layer of the frame array that holds the frame.
     pub layer: u32,
     /// Slice that the frame becomes; of a pass over the volume, the first that it makes anew.
@@ -204,23 +204,23 @@ pub struct Pass {
     /// Debug label, time stamp and test case; unique.
     pub name: &'static str,
     pub stage: Stage,
-    pub when: When,
+    pub frequency: Frequency,
     /// Path below glsl/ and variant.
-    pub shader: fn(&Scene, &Turn) -> &'static str,
+    pub shader: fn(&Scene, &DispatchArgs) -> &'static str,
     pub needed: fn(&Scene) -> Need,
-    pub reads: fn(&Scene, &Turn) -> Vec<Bind>,
-    pub writes: fn(&Scene, &Turn) -> Vec<Bind>,
+    pub reads: fn(&Scene, &DispatchArgs) -> Vec<Bind>,
+    pub writes: fn(&Scene, &DispatchArgs) -> Vec<Bind>,
     /// Invocations, not workgroups.
-    pub extent: fn(&Scene, &Turn) -> [u32; 3],
-    /// Dispatches in a row, with [`Turn::iteration`] counting.
+    pub extent: fn(&Scene, &DispatchArgs) -> [u32; 3],
+    /// Dispatches in a row, with [`DispatchArgs::iteration`] counting.
     pub repeat: fn(&Scene) -> u32,
     /// Numbers: they move while a picture lives.
-    pub params: fn(&Scene, &Turn) -> Params,
+    pub params: fn(&Scene, &DispatchArgs) -> Params,
     /// Structure: a change of it is another pipeline.
-    pub constants: fn(&Scene, &Turn) -> Vec<(&'static str, i32)>,
+    pub constants: fn(&Scene, &DispatchArgs) -> Vec<(&'static str, i32)>,
     pub tolerance: Tolerance,
     /// The same from the formula, in f64. Reads arrays by the shader's names; texels it leaves NaN stay untouched.
-    pub reference: fn(&Scene, &Turn, &Arrays, &mut Arrays),
+    pub reference: fn(&Scene, &DispatchArgs, &Arrays, &mut Arrays),
 }
 
 impl Pass {
@@ -229,28 +229,28 @@ impl Pass {
     }
 
     /// Invocations of a dispatch: of a slice only what can be seen.
-    pub fn invocations(&self, scene: &Scene, turn: &Turn) -> [u32; 3] {
-        let extent = (self.extent)(scene, turn);
-        let Some(seen) = chain::rectangle(scene, self.name, turn) else { return extent };
+    pub fn invocations(&self, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
+        let extent = (self.extent)(scene, args);
+        let Some(seen) = chain::rectangle(scene, self.name, args) else { return extent };
         // Some make a run of neighbours each.
         let run = |axis: usize| if extent[axis] < scene.grid.size[axis] { RUN } else { 1 };
         [seen.size[0].div_ceil(run(0)), seen.size[1].div_ceil(run(1)), extent[2]]
     }
 
     /// Numbers of a dispatch: of a slice, with the texel that its first invocation makes.
-    pub fn numbers(&self, scene: &Scene, turn: &Turn) -> Params {
-        let params = (self.params)(scene, turn);
-        match chain::rectangle(scene, self.name, turn) {
+    pub fn numbers(&self, scene: &Scene, args: &DispatchArgs) -> Params {
+        let params = (self.params)(scene, args);
+        match chain::rectangle(scene, self.name, args) {
             Some(r) => params.i32("first_column", r.first[0]).i32("first_row", r.first[1]),
             None => params,
         }
     }
 
     /// What a dispatch leaves: the reference, and around what it makes of a slice what was there.
-    pub fn expected(&self, scene: &Scene, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+    pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let before = writes.clone();
-        (self.reference)(scene, turn, reads, writes);
-        let Some(r) = chain::rectangle(scene, self.name, turn) else { return };
+        (self.reference)(scene, args, reads, writes);
+        let Some(r) = chain::rectangle(scene, self.name, args) else { return };
         for (name, kept) in before.iter() {
             let target = writes.get_mut(name);
             for (x, y) in (0..kept.size[1]).flat_map(|y| (0..kept.size[0]).map(move |x| (x, y))) {
@@ -294,20 +294,20 @@ pub fn once(_: &Scene) -> u32 {
     1
 }
 
-pub fn no_constants(_: &Scene, _: &Turn) -> Vec<(&'static str, i32)> {
+pub fn no_constants(_: &Scene, _: &DispatchArgs) -> Vec<(&'static str, i32)> {
     Vec::new()
 }
 
-pub fn slice_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
+pub fn slice_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.grid.size[0], scene.grid.size[1], 1]
 }
 
-pub fn picture_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
+pub fn picture_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.picture_size()[0], scene.picture_size()[1], 1]
 }
 
 /// Of stages 2 and 3.
-pub fn ray_extent(scene: &Scene, _: &Turn) -> [u32; 3] {
+pub fn ray_extent(scene: &Scene, _: &DispatchArgs) -> [u32; 3] {
     [scene.ray_size()[0], scene.ray_size()[1], 1]
 }
 

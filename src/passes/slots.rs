@@ -2,7 +2,7 @@
 //! of a plan names does not exist.
 
 pub use super::format::{Format, Shape};
-use super::{skip, tables};
+use super::{empty_space, lookup_tables};
 use crate::scene::planes::TILE_VECTORS;
 use crate::scene::{Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
@@ -92,7 +92,7 @@ pub enum Slot {
 
 /// Who writes a slot first.
 #[derive(Clone, Copy)]
-pub enum Filled {
+pub enum Initializer {
     ByPasses,
     ByFrames,
     /// Made from the scene by the CPU, in f64, stored as f32.
@@ -263,26 +263,26 @@ impl Slot {
         }
     }
 
-    pub fn filled(self) -> Filled {
+    pub fn filled(self) -> Initializer {
         match self {
-            Slot::Frames => Filled::ByFrames,
-            Slot::Tgc => Filled::ByScene(tables::tgc),
-            Slot::ScanLut => Filled::ByScene(tables::scan_lut),
-            Slot::BrickTable => Filled::ByScene(skip::table),
-            Slot::OpaqueBefore => Filled::ByScene(tables::opaque_before),
-            Slot::SweepLut => Filled::ByScene(tables::sweep_lut),
-            Slot::LineLut => Filled::ByScene(tables::line_lut),
-            Slot::SliceTable => Filled::ByScene(tables::slice_table),
-            Slot::Transfer => Filled::ByScene(tables::transfer_table),
-            Slot::PreIntegrated => Filled::ByScene(tables::pre_integrated_table),
-            Slot::Tiles => Filled::ByScene(tables::tile_table),
-            Slot::Block => Filled::ByScene(tables::block_table),
-            _ => Filled::ByPasses,
+            Slot::Frames => Initializer::ByFrames,
+            Slot::Tgc => Initializer::ByScene(lookup_tables::tgc),
+            Slot::ScanLut => Initializer::ByScene(lookup_tables::scan_lut),
+            Slot::BrickTable => Initializer::ByScene(empty_space::table),
+            Slot::OpaqueBefore => Initializer::ByScene(lookup_tables::opaque_before),
+            Slot::SweepLut => Initializer::ByScene(lookup_tables::sweep_lut),
+            Slot::LineLut => Initializer::ByScene(lookup_tables::line_lut),
+            Slot::SliceTable => Initializer::ByScene(lookup_tables::slice_table),
+            Slot::Transfer => Initializer::ByScene(lookup_tables::transfer_table),
+            Slot::PreIntegrated => Initializer::ByScene(lookup_tables::pre_integrated_table),
+            Slot::Tiles => Initializer::ByScene(lookup_tables::tile_table),
+            Slot::Block => Initializer::ByScene(lookup_tables::block_table),
+            _ => Initializer::ByPasses,
         }
     }
 
     /// Whether each of the volume images that take turns has its own.
-    pub fn takes_turns(self) -> bool {
+    pub fn is_multibuffered(self) -> bool {
         matches!(self, Slot::SharpVolume | Slot::Volume | Slot::Quads | Slot::TileRanges | Slot::BrickRanges)
     }
 

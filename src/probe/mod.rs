@@ -4,10 +4,10 @@
 pub mod axis;
 pub mod file;
 pub mod geometry;
+mod geometry_compare;
 pub mod grid;
 pub mod motor;
 pub mod volumes;
-mod ways;
 
 pub use axis::Axis;
 pub use file::ProbeFile;

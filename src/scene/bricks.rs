@@ -4,7 +4,7 @@
 
 use super::Scene;
 use super::region::insonified_box;
-use super::seen::reach;
+use super::visible_bounds::reach;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use glam::DVec3;
 

@@ -166,6 +166,11 @@ fn merge(under: &mut Table, over: Table) {
     }
 }
 
+/// `text` on one line of at most 400 characters, without control characters.
+pub(crate) fn single_line(text: &str) -> String {
+    plain(text).chars().take(400).collect()
+}
+
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let span = error.span().filter(|_| !text.is_empty());
     let place = span.map_or(String::new(), |span| format!("line {}: ", line_of(text, span.start)));

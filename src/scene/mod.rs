@@ -10,15 +10,15 @@ pub mod load;
 pub mod planes;
 mod region;
 mod sampling;
-pub mod seen;
 pub mod settings;
 pub mod transfer;
+pub mod visible_bounds;
 
 pub use bricks::{Bricks, Reach, Side, TILE};
 pub use camera::Rays;
 pub use region::insonified_box;
-pub use seen::Seen;
 pub use settings::*;
+pub use visible_bounds::VisibleBounds;
 
 use crate::probe::{Array, Geometry, Probe};
 use crate::source::StoredType;
@@ -88,7 +88,7 @@ pub struct Scene {
     /// Filters of the distance map, in pixels of rays.
     pub distance: Distance,
     /// The texels of the volume that stage 2 can look at: stage 1 makes these.
-    pub seen: seen::Seen,
+    pub seen: visible_bounds::VisibleBounds,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -159,7 +159,7 @@ impl Scene {
             sampling,
             apron: 0.0,
             distance,
-            seen: Seen::default(),
+            seen: VisibleBounds::default(),
         };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
@@ -172,7 +172,7 @@ impl Scene {
         }
         scene.apron = 2.0 + scene.filter_reach();
         check_planes::check_resolved(&scene)?;
-        scene.seen = seen::seen(&scene);
+        scene.seen = visible_bounds::seen(&scene);
         Ok(scene)
     }
 

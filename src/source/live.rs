@@ -35,7 +35,7 @@ pub trait Live: Send {
 
 /// When the frames of a file arrive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pace {
+pub enum Playback {
     /// As soon as they are asked for.
     Fast,
     /// So many volumes a second, their frames evenly spread.
@@ -48,7 +48,7 @@ pub enum Pace {
 /// A recording or the phantom as a live source. Between two frames it holds none.
 pub struct Paced {
     source: Box<dyn Source>,
-    pace: Pace,
+    pace: Playback,
     /// Times that the whole is played.
     rounds: u32,
     round: u32,
@@ -64,7 +64,7 @@ pub struct Paced {
 
 impl Paced {
     /// `rounds`: how often to play it; volumes go on being numbered.
-    pub fn new(source: Box<dyn Source>, pace: Pace, rounds: u32) -> Paced {
+    pub fn new(source: Box<dyn Source>, pace: Playback, rounds: u32) -> Paced {
         Paced {
             source,
             pace,
@@ -101,9 +101,9 @@ impl Paced {
         frame.volume = frame.volume.wrapping_add(self.base);
         self.highest = frame.volume;
         let stamp = match self.pace {
-            Pace::Fast => 0.0,
-            Pace::Volumes(rate) => self.frames as f64 / (rate * self.source.frames_per_volume().max(1) as f64),
-            Pace::Recorded => self.source.arrival().or(frame.time).unwrap_or(0.0),
+            Playback::Fast => 0.0,
+            Playback::Volumes(rate) => self.frames as f64 / (rate * self.source.frames_per_volume().max(1) as f64),
+            Playback::Recorded => self.source.arrival().or(frame.time).unwrap_or(0.0),
         };
         self.frames += 1;
         let (began, first) = *self.begun.get_or_insert_with(|| (Instant::now(), stamp));
@@ -142,7 +142,7 @@ impl Live for Paced {
     }
 
     fn can_wait(&self) -> bool {
-        self.pace == Pace::Fast
+        self.pace == Playback::Fast
     }
 }
 

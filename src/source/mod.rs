@@ -4,22 +4,22 @@
 
 mod contents;
 pub mod convert;
+mod describe;
 pub mod error;
 pub mod freehand;
 pub mod igtl;
 mod kretz;
 pub mod live;
 mod metaimage;
+pub mod motor_tracking;
 pub mod phantom;
+pub mod phantom_source;
 pub mod piped;
 mod pixels;
-pub mod played;
 pub mod recorder;
 pub mod recording;
 pub mod samples;
 pub mod sequence;
-pub mod swept;
-mod words;
 
 pub use crate::probe::{Geometry, Grid};
 pub use error::InputError;

@@ -3,7 +3,7 @@
 use super::contents::{Contents, Lines, Own};
 use super::pixels::PixelStream;
 use super::samples::{self, Replaced};
-use super::{Frame, InputError, SampleType, StoredType, words};
+use super::{Frame, InputError, SampleType, StoredType, describe};
 use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -201,20 +201,20 @@ impl Recording {
             Place::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
         }
         say("frames", self.contents.frames.to_string());
-        say("volumes", words::volumes(&self.volumes));
-        say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| words::path(p)));
+        say("volumes", describe::volumes(&self.volumes));
+        say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
         match &self.place {
-            Place::Sweep(probe) => facts.extend(words::probe(probe)),
-            Place::Cartesian(grid) => facts.extend(words::grid(grid)),
+            Place::Sweep(probe) => facts.extend(describe::probe(probe)),
+            Place::Cartesian(grid) => facts.extend(describe::grid(grid)),
         }
-        let [low, high] = self.range.map(|v| words::number(v - self.sample_type().shift()));
+        let [low, high] = self.range.map(|v| describe::number(v - self.sample_type().shift()));
         let how = if self.measured { " (measured)" } else { "" };
         facts.push(("value range".into(), format!("{low} .. {high}{how}")));
         if self.sample_type() == SampleType::F32 {
             let Replaced { not_finite, denormal } = self.replaced;
             facts.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
         }
-        facts.extend(words::times(&self.contents.times));
+        facts.extend(describe::times(&self.contents.times));
         facts.extend(self.contents.facts.iter().cloned());
         facts
     }
@@ -253,7 +253,7 @@ impl Recording {
         if index + 1 == self.contents.frames {
             let more = stream.finish().map_err(|e| self.broken(&e, bytes.len()))?;
             if more > 0 {
-                tracing::warn!(file = %words::path(&self.path), bytes = more, "more samples than frames; not read");
+                tracing::warn!(file = %describe::path(&self.path), bytes = more, "more samples than frames; not read");
             }
         }
         let replaced = samples::store(self.contents.sample, self.contents.big_endian, &mut bytes);
@@ -272,7 +272,7 @@ impl Recording {
         }
         self.counted = index + 1;
         if self.replaced == Replaced::default() && replaced != Replaced::default() {
-            tracing::warn!(file = %words::path(&self.path), frame = index, "samples that are not finite or are denormal read as 0");
+            tracing::warn!(file = %describe::path(&self.path), frame = index, "samples that are not finite or are denormal read as 0");
         }
         self.replaced += replaced;
     }
@@ -303,13 +303,13 @@ fn choose_probe_file(
     let Some(found) = found else { return Ok(None) };
     if let Lines::Pictures(word) = &contents.lines {
         let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
-        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", words::path(&found));
+        let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
         if !for_all {
             return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
         }
         contents
             .facts
-            .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", words::path(&found))));
+            .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", describe::path(&found))));
         return Ok(None);
     }
     ProbeFile::read(&found).map(Some)

@@ -2,7 +2,7 @@
 //! load from a storage buffer is a branch of its own, while texels are gathered. As in [`super::stored`] the words are rewritten
 //! when the pipeline is made, so that no shader says anything twice.
 
-use super::stored::instruction;
+use super::texture_to_storage::instruction;
 use super::{Instruction, SpirvError, error, instructions, text};
 use std::collections::HashMap;
 
@@ -52,7 +52,12 @@ pub fn as_texels(words: &[u32], wanted: impl Fn(&str) -> bool) -> Result<Vec<u32
     let mut out = words[..5].to_vec();
     let mut need = vec![IMAGE_BUFFER];
     need.extend(
-        rewriting.found.tables.values().any(|(_, e)| e.format() == RG32F).then_some(super::stored::EXTENDED_FORMATS),
+        rewriting
+            .found
+            .tables
+            .values()
+            .any(|(_, e)| e.format() == RG32F)
+            .then_some(super::texture_to_storage::EXTENDED_FORMATS),
     );
     for capability in need {
         if !whole.iter().any(|i| i.opcode == 17 && i.operands == [capability]) {
@@ -85,7 +90,7 @@ impl Found {
             let a = i.operands;
             match i.opcode {
                 5 => drop(names.insert(a[0], text(&a[1..]))),
-                71 if a[1] == super::stored::NON_WRITABLE => read_only.push(a[0]),
+                71 if a[1] == super::texture_to_storage::NON_WRITABLE => read_only.push(a[0]),
                 22 if a[1] == 32 => found.float = a[0],
                 23 if a[1] == found.float => {
                     vectors.insert(a[0], a[2]);

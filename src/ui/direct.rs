@@ -3,9 +3,9 @@
 use super::console::Console;
 use super::devices::{Devices, Told};
 use super::input::Input;
-use super::mending::{self, Due, Gone, Mending, Place};
+use super::recovery::{self, Due, Gone, Place, Recovery};
 use super::window::Make;
-use crate::gpu::window::{Pace, Screen, Target, display};
+use crate::gpu::window::{PresentMode, Screen, Target, display};
 use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ const SEEN: Duration = Duration::from_secs(3);
 pub struct Shape {
     /// Which monitor, and how.
     pub wanted: display::Wanted,
-    pub pace: Pace,
+    pub pace: PresentMode,
     /// Nobody else gets what keys and mice say, such as the text console behind.
     pub grab: bool,
     /// End after so long.
@@ -37,7 +37,7 @@ pub fn run(device: &ContextOptions, shape: Shape, mut make: Box<Make>) -> Result
     // How far away the monitor is nobody knows: letters are as large as on a desk.
     let mut console = make(&context, size, 1.0, devices.wake());
     console.set_screen(Some(screen));
-    let (mending, arrow, has_shown) = (Mending::default(), Arrow::default(), false);
+    let (mending, arrow, has_shown) = (Recovery::default(), Arrow::default(), false);
     let ends = shape.time.map(|time| Instant::now() + time);
     let wanted = shape.wanted;
     let mut running = Running { place, wanted, context, console, make, devices, size, mending, arrow, has_shown, ends };
@@ -57,7 +57,7 @@ struct Running<'a> {
     context: Arc<Context>,
     /// Of the monitor, pixels.
     size: [u32; 2],
-    mending: Mending,
+    mending: Recovery,
     arrow: Arrow,
     /// It has worked once.
     has_shown: bool,
@@ -100,7 +100,7 @@ impl Running<'_> {
             Due::At(at) => return Ok(Then::Wait(Some(at))),
             Due::Now(gone) => self.mend(gone),
         };
-        match mended.and_then(|()| self.console.tick(now).map_err(mending::gone)) {
+        match mended.and_then(|()| self.console.tick(now).map_err(recovery::gone)) {
             Ok(next) if next.exit => Ok(Then::Exit),
             Ok(next) => {
                 if next.renews {

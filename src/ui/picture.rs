@@ -1,6 +1,6 @@
 //! Where the picture lies in the window, and what of it is where.
 
-use super::eye::{Eye, on_tile};
+use super::picking::{Picker, on_tile};
 use crate::scene::{PlaneName, Scene};
 use glam::DVec3;
 use std::time::Duration;
@@ -77,7 +77,7 @@ impl<'a> Picture<'a> {
     pub(super) fn height(&self, spot: Spot) -> f64 {
         let scale = self.scale();
         let pixels = match (self.scene, spot) {
-            (Some(scene), Spot::Rendering) => Eye::of(scene).size()[1],
+            (Some(scene), Spot::Rendering) => Picker::of(scene).size()[1],
             (Some(scene), Spot::Plane(n)) => scene.sheet().tiles.get(n).map_or(1.0, |tile| f64::from(tile.size[1])),
             (None, _) => 1.0,
         };
@@ -86,7 +86,7 @@ impl<'a> Picture<'a> {
 
     /// The middle of the rendering in the window.
     pub(super) fn middle(&self) -> [f64; 2] {
-        let (scale, middle) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Eye::of(scene).middle()));
+        let (scale, middle) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Picker::of(scene).middle()));
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { middle[a] / scale } else { 0.0 })
     }
 

@@ -1,7 +1,7 @@
 //! The faces of the region that hands move.
 
 use super::command::Face;
-use super::eye::Eye;
+use super::picking::Picker;
 use super::view::{below_face, start_depth};
 use crate::scene::{Scene, Settings, insonified_box};
 use glam::DVec3;
@@ -62,7 +62,7 @@ const FORESHORTENED: f64 = 0.25;
 
 /// The face whose axis, from its middle outwards, is seen nearest to a place on the picture.
 pub(super) fn nearest(scene: &Scene, at: [f64; 2]) -> Option<Face> {
-    let eye = Eye::of(scene);
+    let eye = Picker::of(scene);
     let distance = |face: &Face| {
         let (middle, out) = axis(scene, *face);
         let (from, to) = (eye.seen(middle)?, eye.seen(middle + out)?);

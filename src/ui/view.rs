@@ -1,7 +1,7 @@
 //! What commands make of the camera, the light, the viewer's clip plane and the planes. Every function takes finite numbers of any
 //! size and leaves numbers that [`Scene::new`] accepts.
 
-use super::eye::Eye;
+use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, insonified_box};
 use glam::{DVec2, DVec3};
@@ -70,7 +70,7 @@ pub(super) fn zoomed(zoom: f64, times: f64) -> f64 {
 
 /// What the camera looks at, so that all that is at its distance moves by these shares of the picture's height.
 pub(super) fn pan(now: &Scene, shares: [f64; 2]) -> [f64; 3] {
-    let height = f64::from(now.picture_size()[1]) * Eye::of(now).pixel();
+    let height = f64::from(now.picture_size()[1]) * Picker::of(now).pixel();
     let [right, down] = shares.map(|s| s.clamp(-10.0, 10.0) * height);
     let rays = &now.rays;
     within(now, rays.target, rays.target - rays.right * right + rays.up * down)
@@ -153,7 +153,7 @@ pub(super) fn held(now: &Scene, mut settings: Settings) -> Option<Settings> {
         let (close, far) = (a / (distance(now) - half), a / distance(now));
         if close >= 1.0 { close } else { far }
     } else {
-        zoom * Eye::of(&fitted).pixel() / Eye::of(now).pixel()
+        zoom * Picker::of(&fitted).pixel() / Picker::of(now).pixel()
     };
     if held.is_finite() {
         settings.camera.zoom = held.clamp(1e-3, 1e3);

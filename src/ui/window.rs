@@ -2,8 +2,8 @@
 
 use super::console::{Console, Next};
 use super::input::{Button, Input, Key, Modifiers, Phase};
-use super::mending::{self, Due, Gone, Mending, Place};
-use crate::gpu::window::{Pace, Screen, Target};
+use super::recovery::{self, Due, Gone, Place, Recovery};
+use crate::gpu::window::{PresentMode, Screen, Target};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,7 +23,7 @@ pub struct Shape {
     pub full_screen: bool,
     /// A part of the name of the monitor to fill; the one that the window is on unless given.
     pub monitor: Option<String>,
-    pub pace: Pace,
+    pub pace: PresentMode,
     /// Closing the window does not end it.
     pub stays: bool,
     /// End after so long.
@@ -66,7 +66,7 @@ pub fn run(device: &ContextOptions, shape: Shape, make: Box<Make>) -> Result<(Co
         context: None,
         console: None,
         failed: None,
-        mending: Mending::default(),
+        mending: Recovery::default(),
         ends: None,
     };
     events.run_app(&mut running).map_err(|e| no_window(&e))?;
@@ -89,7 +89,7 @@ struct Running<'a> {
     context: Option<Arc<Context>>,
     window: Option<Arc<Window>>,
     failed: Option<GpuError>,
-    mending: Mending,
+    mending: Recovery,
     ends: Option<Instant>,
 }
 
@@ -145,7 +145,7 @@ impl Running<'_> {
             Due::Now(gone) => self.mend(events, gone),
         };
         let Some(console) = &mut self.console else { return };
-        match mended.and_then(|()| console.tick(now).map_err(mending::gone)) {
+        match mended.and_then(|()| console.tick(now).map_err(recovery::gone)) {
             Ok(next) => self.follow(events, next, now),
             Err((gone, fault)) => self.try_again(events, now, gone, fault),
         }

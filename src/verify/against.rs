@@ -2,7 +2,7 @@
 
 use super::{Check, Found, drawn, modes, shown};
 use crate::gpu::Context;
-use crate::report::verify::{Fault, Level, Shown};
+use crate::verify::report::{Fault, Level, Shown};
 use std::sync::Arc;
 
 /// Every picture of the modes, on the bench's device and on `other`.

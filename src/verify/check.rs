@@ -2,7 +2,7 @@
 
 use super::Bench;
 use crate::gpu::GpuError;
-use crate::report::verify::{Fault, Figure, Outcome, Shown, Verdict};
+use crate::verify::report::{Fault, Figure, Outcome, Shown, Verdict};
 use std::time::Instant;
 
 /// What a check found.

@@ -1,9 +1,9 @@
 //! The outputs of a pass against those of its reference.
 
 use crate::passes::slots::Format;
-use crate::passes::{Arrays, Bind, Pass, Slot, Texels, Turn, is_hit};
-use crate::report::verify::Worst;
+use crate::passes::{Arrays, Bind, DispatchArgs, Pass, Slot, Texels, is_hit};
 use crate::scene::Scene;
+use crate::verify::report::Worst;
 
 /// How far the outputs of one dispatch are off.
 #[derive(Clone, Debug, Default)]
@@ -45,8 +45,8 @@ pub struct Slack {
 impl Slack {
     /// Of a pass whose samples the device's own filter takes: its weights have so many bits and may be cut off, along three axes, of
     /// neighbours that differ by 1. A threshold is met a step earlier or later then, and here and there by another voxel.
-    pub fn of(pass: &Pass, scene: &Scene, turn: &Turn, bits: u32) -> Slack {
-        match (pass.reads)(scene, turn).iter().any(|bind| bind.filtered) {
+    pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> Slack {
+        match (pass.reads)(scene, args).iter().any(|bind| bind.filtered) {
             true => Slack { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers: 0.02 },
             false => Slack::default(),
         }

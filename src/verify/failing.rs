@@ -1,8 +1,8 @@
 //! What happens when the device refuses or is lost: an error that says what was being done, nothing left behind, and pictures that are
 //! right afterwards. Failures are made in front of the driver, on contexts of their own.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, scene, wall, wobbler};
+use super::isolated_context::IsolatedContext;
 use super::repeats::same;
 use super::{Bench, Check, Found, drawn};
 use crate::gpu::faults::{Failure, Seam};
@@ -11,8 +11,8 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::Geometry;
 use crate::queues::MOST;
-use crate::report::verify::{Figure, Level, Unit};
 use crate::scene::Scene;
+use crate::verify::report::{Figure, Level, Unit};
 use std::sync::Arc;
 
 pub fn checks(_: Level) -> Vec<Check> {
@@ -57,7 +57,7 @@ pub fn returned(found: &mut Found, context: &Context, before: u64, after_what: &
 
 /// Wherever memory runs out while a renderer is made, the error names what was to be made, and nothing is left behind.
 fn every_allocation(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
+    let (mut found, aside) = (Found::default(), IsolatedContext::new(bench)?);
     let context = &aside.context;
     let sound = sound(context, SMALL)?;
     let before = context.allocated();
@@ -88,7 +88,7 @@ fn every_allocation(bench: &mut Bench) -> Result<Found, GpuError> {
 
 /// Wherever memory runs out while a scene changes, the renderer says so, draws nothing wrong, and the next change heals it.
 fn a_change(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
+    let (mut found, aside) = (Found::default(), IsolatedContext::new(bench)?);
     let context = &aside.context;
     let (small, larger) = (sound(context, SMALL)?, sound(context, LARGER)?);
     let step = if bench.level == Level::Quick { 4 } else { 1 };
@@ -128,7 +128,7 @@ fn submissions(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
     let mut all = 0;
     for queues in 1..=MOST {
-        let aside = Aside::of_queues(bench, queues)?;
+        let aside = IsolatedContext::of_queues(bench, queues)?;
         let sound = sound(&aside.context, SMALL)?;
         let mut after = 0;
         while failed_once(&mut found, &aside.context, &sound, queues, after)? {
@@ -178,7 +178,7 @@ fn failed_once(
 /// A device that is lost or does not come back says what it was doing; another context on it draws as before.
 fn lost(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
-    let aside = Aside::new(bench)?;
+    let aside = IsolatedContext::new(bench)?;
     let context = &aside.context;
     let sound = sound(context, SMALL)?;
     let before = context.allocated();
@@ -208,7 +208,7 @@ fn lost(bench: &mut Bench) -> Result<Found, GpuError> {
         returned(&mut found, context, before, what);
     }
     aside.tell(&mut found);
-    let other = Aside::new(bench)?;
+    let other = IsolatedContext::new(bench)?;
     let picture = drawn::picture(&other.context, &sound.scene, &sound.frames)?;
     same(&mut found, "another context after that", &sound.picture, &picture);
     other.tell(&mut found);
@@ -221,7 +221,7 @@ fn lost(bench: &mut Bench) -> Result<Found, GpuError> {
 
 /// Frames of another size, slice or volume image, and lines that do not follow, are refused by name; what is drawn stays as it is.
 fn frames(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
+    let (mut found, aside) = (Found::default(), IsolatedContext::new(bench)?);
     let context = &aside.context;
     let sound = sound(context, SMALL)?;
     let mut renderer = drawn::sent(context, &sound.scene, &sound.frames, &Options::default())?;

@@ -1,9 +1,9 @@
 //! What the device does with every format, what that makes fall back to what, and that everything which may fall back still gives
 //! the picture of the f64 reference.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, scene, wall, wobbler};
 use super::failing::count;
+use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Found, drawn, modes, shown};
 use crate::gpu::{Context, Fetch, GpuError, Options, formats};
 use crate::passes::slots::Format;
@@ -11,9 +11,9 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::probe::Geometry;
-use crate::report::verify::{Fault, Figure, Level, Shown, Unit};
-use crate::report::whole;
+use crate::reference;
 use crate::scene::{Sampling, Scene};
+use crate::verify::report::{Fault, Figure, Level, Shown, Unit};
 use std::sync::Arc;
 
 /// Volume formats, and how far a picture may be off: levels on average and at most. The largest of a ray is off by half a step of the
@@ -73,7 +73,7 @@ fn small(mode: &str, format: &str, ray: &str) -> Result<Scene, GpuError> {
 pub fn reference(scene: &Scene, frames: &[Texels]) -> Picture {
     let format = Slot::Frames.format(scene);
     let stored: Vec<_> = frames.iter().map(|f| Texels::decode(f.size, format, &f.encode(format))).collect();
-    let screen = whole::render(scene, &stored).remove(&Slot::Screen);
+    let screen = reference::render(scene, &stored).remove(&Slot::Screen);
     let screen = screen.unwrap_or_else(|| Texels::untouched([0; 3], 4));
     Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
 }
@@ -184,7 +184,7 @@ fn fallbacks(bench: &mut Bench) -> Result<Found, GpuError> {
         scenes.push((scene, frames, expected));
     }
     for lack in lacks() {
-        let aside = Aside::lacking(bench, lack.change)?;
+        let aside = IsolatedContext::lacking(bench, lack.change)?;
         let context: &Arc<Context> = &aside.context;
         let mut took = String::new();
         for (scene, frames, expected) in &scenes {

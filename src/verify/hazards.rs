@@ -1,8 +1,8 @@
 //! Frames that arrive while pictures are drawn, on one queue and as if there were three: every picture is the one that is drawn when
 //! everything is waited for, to the byte. Passes are slowed down, so that what may overlap does.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, Noise, scene, wall, wobbler};
+use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::{Context, GpuError, Options, Renderer};
@@ -10,12 +10,12 @@ use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
 use crate::queues::MOST;
-use crate::report::verify::{Fault, Level, Shown};
 use crate::scene::Scene;
+use crate::verify::report::{Fault, Level, Shown};
 use std::sync::Arc;
 
 /// On so many queues: how many pictures were compared, and how many differ.
-type Story = fn(&mut Found, &Aside, usize, Level) -> Result<[usize; 2], GpuError>;
+type Story = fn(&mut Found, &IsolatedContext, usize, Level) -> Result<[usize; 2], GpuError>;
 
 pub fn checks(_: Level) -> Vec<Check> {
     let of = |name: &str, story: Story| Check::new("hazards", name, move |bench: &mut Bench| on_queues(bench, story));
@@ -34,7 +34,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     let (mut found, mut sums) = (Found::default(), [0, 0]);
     for queues in 1..=MOST {
-        let aside = Aside::of_queues(bench, queues)?;
+        let aside = IsolatedContext::of_queues(bench, queues)?;
         let [compared, wrong] = story(&mut found, &aside, queues, bench.level)?;
         sums = [sums[0] + compared, sums[1] + wrong];
         aside.tell(&mut found);
@@ -122,7 +122,7 @@ pub fn taking_turns(
 }
 
 /// Slices of the one volume image are sent anew while it is drawn: they wait for the picture, and the next shows them.
-fn replaced(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+fn replaced(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
     let context = &aside.context;
     let (scene, mut noise) = (made(PLAIN)?, Noise(5));
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
@@ -153,7 +153,7 @@ fn replaced(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Re
 
 /// Frames of two volumes in any order, whole or line by line, torn and begun again, into two volume images, while pictures are begun
 /// and ended in between.
-fn any_order(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
     let (context, mut noise, mut sums) = (&aside.context, Noise(17), [0, 0]);
     for toml in [PLAIN, SMOOTH] {
         let scene = made(toml)?;
@@ -214,7 +214,7 @@ fn any_order(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> R
 }
 
 /// The scene changes while a picture and frames are on their way: another view, other filters of frames, another size.
-fn changes(found: &mut Found, aside: &Aside, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
+fn changes(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
     let context = &aside.context;
     let scenes = [
         made(PLAIN)?,

@@ -2,9 +2,9 @@
 
 use super::built_in::Noise;
 use crate::gpu::renderer::size_of;
-use crate::passes::preprocess::quads;
-use crate::passes::slots::Filled;
-use crate::passes::{Arrays, Bind, MISS, Part, Pass, Slot, Texels, Turn};
+use crate::passes::preprocess::packed_neighbours;
+use crate::passes::slots::Initializer;
+use crate::passes::{Arrays, Bind, DispatchArgs, MISS, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
 use crate::scene::Scene;
 
@@ -19,7 +19,7 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
         size[2] = 1;
     }
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
-    if let Filled::ByScene(make) = bind.slot.filled() {
+    if let Initializer::ByScene(make) = bind.slot.filled() {
         texels.values = make(scene).into_iter().map(f64::from).collect();
         return texels;
     }
@@ -73,18 +73,18 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
     let made = |name: &str| ["tile_ranges", "brick_ranges", "classify", "leap"].iter().any(|p| name.starts_with(p));
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
-        let turn = Turn { slices: scene.slices(), ..step.turn() };
+        let args = DispatchArgs { slices: scene.slices(), ..step.args() };
         let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
-        for bind in (step.pass.reads)(scene, &turn) {
+        for bind in (step.pass.reads)(scene, &args) {
             let there = slots.get(&bind.slot).cloned();
             inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
         }
-        for bind in (step.pass.writes)(scene, &turn) {
+        for bind in (step.pass.writes)(scene, &args) {
             let channels = bind.slot.format(scene).channels();
             outputs.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
         }
-        (step.pass.reference)(scene, &turn, &inputs, &mut outputs);
-        for bind in (step.pass.writes)(scene, &turn) {
+        (step.pass.reference)(scene, &args, &inputs, &mut outputs);
+        for bind in (step.pass.writes)(scene, &args) {
             slots.insert(bind.slot, outputs.get(bind.name).clone());
         }
         if slots.contains_key(&slot) {
@@ -96,15 +96,15 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
 }
 
 /// A turn that is not the first of anything.
-pub fn turn_of(scene: &Scene, iteration: u32) -> Turn {
-    Turn { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 }
+pub fn turn_of(scene: &Scene, iteration: u32) -> DispatchArgs {
+    DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 }
 }
 
 /// What a pass reads, of one of [`KINDS`]: every array that some pass must have made before it follows from the others.
-pub fn inputs_of(scene: &Scene, pass: &Pass, turn: &Turn, kind: &str, seed: u64) -> Arrays {
+pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
-    let reads = (pass.reads)(scene, turn);
+    let reads = (pass.reads)(scene, args);
     for (n, bind) in reads.iter().enumerate() {
         // One image bound under two names has one content.
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
@@ -119,8 +119,8 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, turn: &Turn, kind: &str, seed: u64)
         let mut quads = Arrays::default();
         let channels = Slot::Quads.format(scene).channels();
         quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
-        let all = Turn { slices: scene.slices(), ..Turn::default() };
-        (quads::PASS.reference)(scene, &all, &inputs, &mut quads);
+        let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
+        (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
         inputs.insert("quads", quads.get("quads").clone());
     }
     inputs

@@ -1,14 +1,14 @@
 //! The largest pictures and volumes: beyond what the device holds they are refused by name before anything is made, and at its limits
 //! they are drawn right.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, FLOATS, frames, scene};
 use super::failing::count;
+use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Found, drawn};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::probe::{Geometry, Grid};
-use crate::report::verify::{Fault, Figure, Level, Unit, Worst};
 use crate::scene::{MAX_PICTURE, Scene};
+use crate::verify::report::{Fault, Figure, Level, Unit, Worst};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -68,7 +68,7 @@ fn beyond(bench: &mut Bench) -> Result<Found, GpuError> {
         format!("a picture of {} pixels: expected picture.size and its limit, the error says: {said}", MAX_PICTURE + 1)
     });
     // As if the device had less.
-    let lesser = Aside::lacking(bench, |context| {
+    let lesser = IsolatedContext::lacking(bench, |context| {
         context.limits.max_image_dimension2_d = 64;
         context.candidate.max_bytes = 1 << 20;
     })?;
@@ -92,7 +92,7 @@ fn beyond_memory(bench: &mut Bench) -> Result<Found, GpuError> {
             "a device in the machine's memory is handed out more than there is, and killed for it",
         ));
     }
-    let (mut found, aside) = (Found::default(), Aside::new(bench)?);
+    let (mut found, aside) = (Found::default(), IsolatedContext::new(bench)?);
     let context = &aside.context;
     let edge = (context.limits.max_image_dimension3_d as usize).min(1024);
     let toml = "mode = 'mip'\npicture = { size = [4, 4] }\nslices = { format = 'r8' }\nray = { sampling = 'exact' }";

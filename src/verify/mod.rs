@@ -1,11 +1,10 @@
 //! Whether a device and its driver still do what they should: every pass, every mode and every way to fail, on inputs that are part of
-//! the program. Needs no source tree. What came of it is a [`Run`]; [`crate::report::verify`] makes reports of that.
+//! the program. Needs no source tree. What came of it is a [`Run`]; [`crate::verify::report`] makes reports of that.
 //!
 //! A check says what it measured and what is wrong; [`Bench`] is what it works on. The groups are the files of this folder; the
 //! self-test plants faults and looks which check notices each.
 
 pub mod against;
-mod aside;
 pub mod built_in;
 mod check;
 mod compared;
@@ -14,12 +13,14 @@ pub mod failing;
 pub mod formats;
 pub mod hazards;
 pub mod inputs;
+mod isolated_context;
 mod known_answers;
 pub mod limits;
 pub mod modes;
 pub mod passes;
 pub mod poison;
 pub mod repeats;
+pub mod report;
 pub mod self_test;
 mod shown;
 mod speed;
@@ -27,12 +28,12 @@ pub mod stamps;
 pub mod stress;
 pub mod threads;
 
-use crate::gpu::single::Single;
+use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::{Context, ContextOptions, GpuError};
-use crate::measuring::machine;
-use crate::passes::planted::Change;
-use crate::report::verify::{FORMAT, Level, Outcome, Run};
+use crate::passes::fault_injection::Change;
+use crate::profile::machine;
 use crate::scene::Scene;
+use crate::verify::report::{FORMAT, Level, Outcome, Run};
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -47,14 +48,14 @@ pub struct Bench {
     pub context: Arc<Context>,
     pub level: Level,
     options: ContextOptions,
-    single: Option<Single>,
+    single: Option<PassRunner>,
     scenes: Rc<Vec<(String, Scene)>>,
     /// Done to every context that is made.
     prepare: Option<fn(&Context)>,
     /// The program that checks start again beside themselves: this one, unless it is only a part of one.
     pub program: Option<PathBuf>,
     modes: Option<Rc<Vec<Drawn>>>,
-    /// Planted in every context that is made.
+    /// InjectedFault in every context that is made.
     planted: Option<Change>,
     /// Messages of validation that were told.
     told: usize,
@@ -132,9 +133,9 @@ impl Bench {
     ///
     /// # Errors
     /// A device that fails.
-    pub fn single(&mut self) -> Result<&mut Single, GpuError> {
+    pub fn single(&mut self) -> Result<&mut PassRunner, GpuError> {
         if self.single.is_none() {
-            self.single = Some(Single::new(&self.context)?);
+            self.single = Some(PassRunner::new(&self.context)?);
         }
         // Just made, where there was none.
         self.single.as_mut().ok_or(GpuError::Broken("no pass can be run alone".into()))
@@ -185,7 +186,7 @@ impl Bench {
         let messages = self.context.messages();
         let new = messages[self.told.min(messages.len())..].to_vec();
         self.told = messages.len();
-        aside::told(&self.context, new, true)
+        isolated_context::told(&self.context, new, true)
     }
 }
 

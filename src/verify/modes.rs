@@ -1,17 +1,17 @@
 //! Whole pictures in every mode, of bodies that are known, against the four stages in f64.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, FLOATS, body_frames, cartesian, linear, scene, still, uneven, wobbler};
+use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::GpuError;
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
-use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
-use crate::report::whole;
+use crate::reference;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{Options, Phantom};
+use crate::verify::report::{Fault, Figure, Level, Shown, Unit, Worst};
 use glam::DVec3;
 
 /// Mean difference of a picture from its reference where it is near, levels of 255. Rounding costs some tenths of a level where it
@@ -191,7 +191,7 @@ fn mode(bench: &mut Bench, name: &str) -> Result<Found, GpuError> {
 
 /// The picture by the f64 references.
 pub fn reference(scene: &Scene, frames: &[Texels]) -> Picture {
-    let mut slots = whole::render(scene, frames);
+    let mut slots = reference::render(scene, frames);
     let screen = slots.remove(&Slot::Screen).unwrap_or_else(|| Texels::untouched([0; 3], 4));
     Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
 }
@@ -276,7 +276,7 @@ fn every_scene(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut drawn_ones, mut mean, mut far) = (Found::default(), 0, 0.0f64, 0.0f64);
     let (scenes, step) = (bench.scenes(), if bench.level == Level::Full { 1 } else { 11 });
     // One renderer after the other on one device.
-    let aside = Aside::of_changes(bench)?;
+    let aside = IsolatedContext::of_changes(bench)?;
     for (name, scene) in scenes.iter().step_by(step) {
         let frames = body_frames(scene, ball);
         let expected = reference(scene, &frames);

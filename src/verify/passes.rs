@@ -6,12 +6,12 @@ use super::inputs::{KINDS, inputs_of, turn_of};
 use super::shown::shown;
 use super::{Bench, Check, Comparison, Found, compare};
 use crate::gpu::GpuError;
+use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::renderer::size_of;
-use crate::gpu::single::Single;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, Bind, PASSES, Pass, Texels};
-use crate::report::verify::{Fault, Figure, Level, Unit};
 use crate::scene::Scene;
+use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::collections::HashSet;
 
 /// What outputs hold before a pass: no pass computes it by chance, and every format stores it (nearly).
@@ -37,7 +37,7 @@ pub struct Beside {
 /// # Errors
 /// A device that fails.
 pub fn beside(
-    single: &mut Single,
+    single: &mut PassRunner,
     scene: &Scene,
     pass: &'static Pass,
     iteration: u32,

@@ -1,16 +1,16 @@
 //! Everything that is read was written before: with new memory full of what nobody computes, pictures and slots are the same, and every
 //! texel of every slot is some pass's.
 
-use super::aside::Aside;
+use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::faults::Poison;
 use crate::gpu::{Context, GpuError, Options};
-use crate::passes::slots::Filled;
+use crate::passes::slots::Initializer;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
-use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::scene::Scene;
+use crate::verify::report::{Fault, Figure, Level, Shown, Unit, Worst};
 use std::sync::Arc;
 
 pub fn checks(_: Level) -> Vec<Check> {
@@ -38,7 +38,7 @@ fn draw(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Held
     let picture = renderer.picture()?;
     let mut slots = Vec::new();
     for slot in renderer.plan().slots.clone() {
-        if let (Filled::ByPasses, Some(texels)) = (slot.filled(), renderer.read(slot)?) {
+        if let (Initializer::ByPasses, Some(texels)) = (slot.filled(), renderer.read(slot)?) {
             slots.push((slot, texels));
         }
     }
@@ -133,7 +133,7 @@ fn tell(found: &mut Found, sums: &Sums) {
 
 fn modes(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut sums, modes) = (Found::default(), Sums::default(), bench.modes()?);
-    let aside = Aside::of_changes(bench)?;
+    let aside = IsolatedContext::of_changes(bench)?;
     for of in modes.iter() {
         look(&mut found, &mut sums, &aside.context, (&of.name, &of.scene, &of.frames))?;
     }
@@ -145,7 +145,7 @@ fn modes(bench: &mut Bench) -> Result<Found, GpuError> {
 /// Of the scenes that need every pass a few: passes alone are poisoned in all of them.
 fn variants(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, mut sums, scenes) = (Found::default(), Sums::default(), bench.scenes());
-    let aside = Aside::of_changes(bench)?;
+    let aside = IsolatedContext::of_changes(bench)?;
     let step = if bench.level == Level::Quick { 40 } else { 4 };
     for (name, scene) in scenes.iter().step_by(step) {
         let frames = super::built_in::wall(scene, 0);

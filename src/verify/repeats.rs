@@ -1,14 +1,14 @@
 //! The same bits whenever the same is drawn: again, by another renderer, in another context, on any number of queues, with frames in
 //! any order, and by any number of threads of a software device.
 
-use super::aside::Aside;
 use super::built_in::Noise;
+use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Drawn, Found, drawn, modes, shown, threads};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::Slot;
 use crate::picture::Picture;
-use crate::report::verify::{Fault, Figure, Level, Shown, Unit, Worst};
 use crate::source::igtl::crc64;
+use crate::verify::report::{Fault, Figure, Level, Shown, Unit, Worst};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
@@ -131,7 +131,7 @@ pub fn counted(found: &mut Found, compared: usize, differ: usize) {
 
 fn in_a_way(bench: &mut Bench, own: bool, way: Way) -> Result<Found, GpuError> {
     let (mut found, modes) = (Found::default(), bench.modes()?);
-    let aside = own.then(|| Aside::of_queues(bench, way.queues.unwrap_or(1))).transpose()?;
+    let aside = own.then(|| IsolatedContext::of_queues(bench, way.queues.unwrap_or(1))).transpose()?;
     let context = aside.as_ref().map_or(&bench.context, |aside| &aside.context);
     let got = draw(context, &modes, way)?;
     let same = modes.iter().zip(&got).filter(|(of, got)| same(&mut found, &of.name, &of.picture, got)).count();

@@ -2,7 +2,7 @@
 
 use crate::passes::{Texels, is_hit};
 use crate::picture::Picture;
-use crate::report::verify::Shown;
+use crate::verify::report::Shown;
 
 /// Two arrays, at one slice of them, in the same grey: the least and the largest expected value are black and white. Of four channels
 /// the first three are red, green and blue; of two the first is shown. What was not hit or not written is black.

@@ -2,11 +2,11 @@
 
 use super::built_in::{ALL_FILTERS, BYTES, cartesian, scene, wobbler};
 use super::{Bench, Check, Found};
-use crate::gpu::{Context, ContextOptions, GpuError, single};
+use crate::gpu::{Context, ContextOptions, GpuError, pass_runner};
 use crate::passes::{PASSES, Pass};
 use crate::probe::{Axis, Geometry, Probe};
-use crate::report::verify::{Figure, Level};
 use crate::scene::{Sampling, Scene};
+use crate::verify::report::{Figure, Level};
 
 /// Scenes of pictures as large as a small display's tile, that among them need every pass: the first that needs a pass is what it is
 /// timed in.
@@ -67,7 +67,7 @@ fn time(bench: &mut Bench, pass: &'static Pass) -> Result<Found, GpuError> {
     // Validation looks at every command and at every submission: times are taken without it.
     let own = bench.watched().then(|| Context::new(&ContextOptions { validation: false, ..bench.options().clone() }));
     let context = own.transpose()?.unwrap_or_else(|| bench.context.clone());
-    let samples = single::time(&context, scene, pass, repeats)?;
+    let samples = pass_runner::time(&context, scene, pass, repeats)?;
     let mut found = Found::default();
     if samples.is_empty() {
         return Ok(Found::left_out("the device has no time stamps"));

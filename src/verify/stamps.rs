@@ -1,18 +1,18 @@
 //! Time stamps: what the device says of them, that they run forwards and lie where the host waited, and that what takes longer takes
 //! longer by them. No time is a pass mark: of several runs the least disturbed counts, so that a busy machine fails nothing.
 
-use super::aside::Aside;
 use super::built_in::{BYTES, scene, wall, wobbler};
 use super::failing::count;
+use super::isolated_context::IsolatedContext;
 use super::repeats::same;
 use super::{Bench, Check, Found, drawn};
 use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{PassTime, Span};
 use crate::picture::Picture;
 use crate::probe::Geometry;
-use crate::report::times;
-use crate::report::verify::{Fault, Figure, Level, Unit};
+use crate::profile::pass_times;
 use crate::scene::Scene;
+use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::sync::Arc;
 
 /// Most runs of one thing until one of them was not disturbed.
@@ -157,7 +157,7 @@ fn time_of(renderer: &mut Renderer, name: &str) -> Result<f64, GpuError> {
 
 /// The least time of each counts: whatever else the machine does only adds to it.
 fn slowed(bench: &mut Bench) -> Result<Found, GpuError> {
-    let aside = Aside::new(bench)?;
+    let aside = IsolatedContext::new(bench)?;
     let context = &aside.context;
     if !has_stamps(context) {
         return Ok(Found::left_out(NONE));
@@ -192,7 +192,7 @@ fn as_if(
     found: &mut Found,
     change: fn(&mut Context),
 ) -> Result<(String, Vec<PassTime>, Picture), GpuError> {
-    let aside = Aside::lacking(bench, change)?;
+    let aside = IsolatedContext::lacking(bench, change)?;
     let context: &Arc<Context> = &aside.context;
     let scene = picture_scene("mode = 'vr'\npicture = { size = [96, 96] }")?;
     let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &Options::default())?;
@@ -200,7 +200,7 @@ fn as_if(
     let times = renderer.take_times()?;
     drop(renderer);
     aside.tell(found);
-    Ok((times::table(&times, &scene), times, picture))
+    Ok((pass_times::table(&times, &scene), times, picture))
 }
 
 /// A device without time stamps says so and draws the same; one of 36 bits, or with another period, has its times all the same.

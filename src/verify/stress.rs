@@ -1,9 +1,9 @@
 //! Minutes of everything at once on one device: scenes, sizes and modes change, frames arrive, renderers are made and dropped. Pictures
 //! are held against a fresh renderer's now and then, and at the end nothing is left.
 
-use super::aside::Aside;
 use super::built_in::{self, Noise};
 use super::failing::{count, returned};
+use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn};
 use crate::files::signals;
@@ -11,8 +11,8 @@ use crate::gpu::{Context, Fetch, GpuError, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::{Plan, Rerun};
-use crate::report::verify::{Figure, Level};
 use crate::scene::Scene;
+use crate::verify::report::{Figure, Level};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -90,7 +90,7 @@ struct Stress<'a> {
 /// # Errors
 /// A device that fails.
 pub fn stress(bench: &mut Bench, seconds: f64, spoil: &Spoil) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), Aside::of_changes(bench)?);
+    let (mut found, aside) = (Found::default(), IsolatedContext::of_changes(bench)?);
     let context = &aside.context;
     let (held, pipelines) = (context.allocated(), || context.counts.pipelines.load(Ordering::Relaxed));
     let (before, begun) = (pipelines(), Instant::now());

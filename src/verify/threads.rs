@@ -4,7 +4,7 @@
 use super::repeats::digest_of;
 use super::{Bench, Found};
 use crate::gpu::{Context, GpuError};
-use crate::report::verify::{Fault, Figure, Level, Unit};
+use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

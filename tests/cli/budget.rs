@@ -1,6 +1,6 @@
 //! Settings chosen by what a report measured.
 
-use crate::common::*;
+use crate::common::program::*;
 use std::fs;
 
 /// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.

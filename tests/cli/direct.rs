@@ -1,6 +1,6 @@
 //! A monitor that is not there. Only names that no monitor has: a machine that has one would show things on it.
 
-use super::common::*;
+use crate::common::program::*;
 use std::process::Command;
 
 const DIRECT: [&str; 5] = ["view", "--source", "phantom", "--direct", "--monitor"];
@@ -13,8 +13,7 @@ fn without_such_a_monitor_one_line_says_so() {
     // A driver may know monitors and have none, or know none.
     let why = ["no monitor is connected", "no monitor is called", "VK_KHR_display", "VK_KHR_surface"];
     assert!(why.iter().any(|why| ran.2.contains(why)), "{ran:?}");
-    let hidden = [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
-    let blind = finish(Command::new(PROGRAM).args(&nowhere).envs(hidden).env_remove("VK_ADD_DRIVER_FILES"));
+    let blind = finish(without_device(Command::new(PROGRAM).args(&nowhere)));
     refuses(&nowhere, &blind, 1, &["no window", "VK_KHR_"]);
 }
 

@@ -1,6 +1,6 @@
 //! Files of frames: what is in them, and the way back.
 
-use crate::common::*;
+use crate::common::program::*;
 use std::fs;
 
 /// Samples behind a MetaImage's header.

@@ -1,7 +1,7 @@
 //! Inputs without an end, or longer than any can be: each is refused in one line, soon, and without taking the machine with it.
 #![cfg(target_os = "linux")]
 
-use super::common::*;
+use crate::common::program::*;
 use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::process::Command;

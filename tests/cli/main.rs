@@ -1,8 +1,10 @@
 //! The program as a user meets it: what it answers to right and wrong commands, and what it leaves behind.
 
 mod budget;
+#[path = "../common/mod.rs"]
 mod common;
 mod direct;
+mod filter;
 mod frames;
 mod inputs;
 mod outputs;
@@ -13,7 +15,7 @@ mod support_bundle;
 mod verify;
 mod view;
 
-use common::*;
+use common::program::*;
 use std::collections::BTreeSet;
 use std::fs;
 use std::process::{Command, Stdio};
@@ -133,11 +135,8 @@ fn later_layers_are_not_overridden_by_earlier_ones() {
 #[test]
 fn without_a_device_the_plan_is_still_explained_and_the_rest_says_what_is_missing() {
     let folder = Folder::new("blind");
-    let blind = |arguments: &[&str]| {
-        let hidden = [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
-        let mut command = Command::new(PROGRAM);
-        finish(command.args(arguments).envs(hidden).env_remove("VK_ADD_DRIVER_FILES").current_dir(&folder.0))
-    };
+    let blind =
+        |arguments: &[&str]| finish(without_device(Command::new(PROGRAM).args(arguments).current_dir(&folder.0)));
     for arguments in [&["devices"][..], &["render", BONE]] {
         refuses(arguments, &blind(arguments), 1, &["no Vulkan device", "install"]);
     }

@@ -2,7 +2,7 @@
 //! and nothing left beside it.
 #![cfg(unix)]
 
-use super::common::*;
+use crate::common::program::*;
 use std::fs;
 use std::process::Command;
 
@@ -77,7 +77,7 @@ fn rows(folder: &Folder) -> Vec<Row> {
             File,
             true,
             &["probe", "sweep", "--port", "/dev/null", "--angle", "20", "--rate", "1", "--probe"],
-            &[concat!(env!("CARGO_MANIFEST_DIR"), "/tests/motor/probe.toml"), "--positions", "@"],
+            &[MOTOR_PROBE, "--positions", "@"],
         ),
         row("tar.gz", New, false, &["support-bundle", "-o", "@"], &[]),
         row("log", File, true, &["info", BONE, "--log-file", "@"], &[]),
@@ -144,7 +144,7 @@ fn a_full_disk_costs_no_old_file_and_leaves_nothing() {
 fn what_is_read_is_not_written_over_nor_one_file_twice() {
     let folder = Folder::new("inputs");
     let copy = |from: &str, name: &str| folder.write(name, fs::read(from).expect("read"));
-    let probe = copy(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/motor/probe.toml"), "p.toml");
+    let probe = copy(MOTOR_PROBE, "p.toml");
     let report = folder.write("error.json", crate::budget::error_report("[160, 216, 33]"));
     let scene = folder.write("scene.toml", "mode = 'mip'\n");
     let picture = folder.write("in.pgm", b"P5 4 4 255\n0123456789abcdef");

@@ -1,6 +1,6 @@
 //! `tools/kiosk/echolume.service`: what it starts is what the program takes.
 
-use super::common::*;
+use crate::common::program::*;
 use std::process::Command;
 
 const UNIT: &str = include_str!("../../tools/kiosk/echolume.service");

@@ -1,8 +1,9 @@
 //! A signal in the middle of what takes long: what was there stays, nothing half-made is left, and a stream ends as it always does.
 #![cfg(unix)]
 
-use super::common::*;
-use echolume::report::verify::{Verdict, json};
+use crate::common::program::*;
+use crate::common::wait::eventually;
+use echolume::verify::report::{Verdict, json};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -12,30 +13,12 @@ use std::time::{Duration, Instant};
 
 const SIGNALS: [Signal; 3] = [Signal::INT, Signal::TERM, Signal::HUP];
 
-/// The program, with the signals as they are by default: whoever runs the tests may have had one ignored, as `nohup` does.
-fn program() -> Command {
-    let mut program = Command::new("env");
-    program.args(["--default-signal=INT,TERM,HUP", PROGRAM]);
-    program
-}
-
 fn start(program: &mut Command) -> Child {
     program.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("start the program")
 }
 
 fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).expect("send a signal");
-}
-
-fn eventually(mut is: impl FnMut() -> bool) -> bool {
-    let began = Instant::now();
-    while began.elapsed() < Duration::from_secs(30) {
-        if is() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    false
 }
 
 #[test]
@@ -53,7 +36,7 @@ fn a_signal_leaves_no_half_written_file() {
         (&["convert", &sweep, &mha, "--sequence"], Signal::INT),
         (&["convert", &sweep, &frames], Signal::TERM),
     ] {
-        let mut child = start(program().args(row));
+        let mut child = start(with_default_signals().args(row));
         let half = || folder.names().difference(&before).next().is_some();
         assert!(eventually(half), "{row:?} has begun nothing");
         signal(&child, sent);
@@ -83,7 +66,7 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     .into_iter()
     .enumerate()
     {
-        let mut child = start(program().args(row));
+        let mut child = start(with_default_signals().args(row));
         // It says which device it has taken, and works.
         let mut line = String::new();
         BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
@@ -101,7 +84,8 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
 fn a_signal_ends_verify_with_what_it_found() {
     let folder = Folder::new("verify-stopped");
     let [json, junit] = ["run.json", "run.xml"].map(|name| folder.path(name));
-    let mut child = start(program().args(["verify", "--only", "passes", "--json", &json, "--junit", &junit]));
+    let mut child =
+        start(with_default_signals().args(["verify", "--only", "passes", "--json", &json, "--junit", &junit]));
     let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
     assert!(lines.next().expect("a line").starts_with("device: "));
     signal(&child, Signal::INT);
@@ -128,7 +112,7 @@ fn a_signal_ends_a_stream_with_its_summary_and_a_finished_recording() {
     let started = SIGNALS.map(|sent| {
         let tape = folder.path(&format!("{}.frames", sent.as_raw()));
         let stream = ["stream", "--null", "--rate", "3", "--size", "24x24", "--mode", "mip", "--record", &tape];
-        (sent, start(program().args(stream)), tape)
+        (sent, start(with_default_signals().args(stream)), tape)
     });
     for (sent, mut child, tape) in started {
         let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);

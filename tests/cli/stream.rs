@@ -1,6 +1,6 @@
 //! `echolume stream`: sources that come, go, and lie.
 
-use crate::common::*;
+use crate::common::program::*;
 use std::fs;
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -16,7 +16,7 @@ fn piped(frames: usize, cut: usize) -> Vec<u8> {
     bytes
 }
 
-fn fed(arguments: &[&str], input: &[u8]) -> (Option<i32>, String, String) {
+fn fed(arguments: &[&str], input: &[u8]) -> Ran {
     let mut command = Command::new(PROGRAM);
     let child = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = child.expect("start the program");
@@ -122,19 +122,15 @@ fn the_phantom_streams_until_it_is_told_to_end() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
-    use echolume::probe::motor::simulate::{Options, Simulator};
-    use echolume::probe::motor::tmcl::command;
+    use crate::common::motor::{simulated, stopped_at_last};
     use rustix::process::{Pid, Signal, kill_process};
     use std::io::{BufRead, BufReader};
 
     let folder = Folder::new("motor");
     let tape = folder.path("exam.frames");
-    let simulator = Simulator::start(Options::default()).expect("a pseudo-terminal");
-    let probe = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/motor/probe.toml");
-    // What a shell starts in the background has SIGINT ignored, and so have the tests then.
-    let mut child = Command::new("env")
-        .args(["--default-signal=INT", PROGRAM])
-        .args(["stream", "--null", "--probe", probe, "--sweeps", "1", "--timeout", "2000", "--record", &tape])
+    let simulator = simulated(None);
+    let mut child = with_default_signals()
+        .args(["stream", "--null", "--probe", MOTOR_PROBE, "--sweeps", "1", "--timeout", "2000", "--record", &tape])
         .args(SMALL)
         .arg("--motor")
         .arg(simulator.path())
@@ -151,9 +147,7 @@ fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
     assert!(last.contains("volumes shown"), "{last}");
     let output = child.wait_with_output().expect("the program ends");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let received = simulator.received();
-    let at = |wanted: u8| received.iter().rposition(|r| r.command == wanted);
-    assert!(at(command::STOP) > at(command::MOVE_TO), "the motor was told to stop last");
+    assert!(stopped_at_last(&simulator.received()), "the motor was told to stop last");
     let said = done(&["info", &tape]);
     assert!(said.contains("index") && said.contains("as it was written"), "{said}");
 }

@@ -1,6 +1,6 @@
 //! `echolume support-bundle`: everything of the machine, nothing of a patient.
 
-use super::common::*;
+use crate::common::program::*;
 use flate2::read::GzDecoder;
 use std::collections::BTreeMap;
 use std::fs;
@@ -151,10 +151,8 @@ fn a_full_disk_leaves_no_half_an_archive() {
 #[test]
 fn without_a_device_a_configuration_and_a_log_it_says_so_inside() {
     let folder = Folder::new("bundle-blind");
-    let hidden = [("VK_DRIVER_FILES", "/nonexistent"), ("VK_ICD_FILENAMES", "/nonexistent")];
     let mut command = Command::new(PROGRAM);
-    command.arg("support-bundle").envs(hidden).env_remove("VK_ADD_DRIVER_FILES").current_dir(&folder.0);
-    let (code, out, err) = finish(&mut command);
+    let (code, out, err) = finish(without_device(command.arg("support-bundle").current_dir(&folder.0)));
     assert_eq!((code, err.as_str()), (Some(0), ""), "{out}");
     let names = folder.names();
     let name = names.first().expect("an archive");

@@ -1,7 +1,7 @@
 //! `echolume verify` as CI and a cart call it: its exit codes, its files, and what it says of an earlier run.
 
-use crate::common::*;
-use echolume::report::verify::{Run, Unit, Verdict, json};
+use crate::common::program::*;
+use echolume::verify::report::{Run, Unit, Verdict, json};
 use echolume::verify::self_test;
 use std::fs;
 use std::process::Command;
@@ -50,7 +50,7 @@ fn every_planted_fault_and_every_dropped_barrier_is_caught() {
     let folder = Folder::new("verify-self-test");
     let (_, run) = kept(&folder, "run.json", &["--self-test"]);
     let planted = self_test::faults().count();
-    // Beside them barriers by the oracle, by the layer, and nothing.
+    // AsyncPipelineCompiler them barriers by the oracle, by the layer, and nothing.
     assert!(planted >= 24 && run.outcomes.len() == planted + 3, "{planted} of {}", run.outcomes.len());
     let caught: Vec<String> = run.outcomes.iter().map(|o| format!("{}: {}", o.name, o.notes.join("; "))).collect();
     println!("{}", caught.join("\n"));
@@ -113,9 +113,8 @@ fn what_cannot_be_verified_is_said_in_one_line_with_its_own_exit_code() {
     let (code, _, err) = verify(&["--quick", "--full"]);
     assert!(code == Some(2) && err.contains("cannot be used with"), "{err}");
     refuses(&["--device"], &verify(&["--device", "no such card"]), 3, &["no such card", "there are"]);
-    let mut without = Command::new(PROGRAM);
-    without.arg("verify").env("VK_DRIVER_FILES", "/nowhere.json").env("VK_ICD_FILENAMES", "/nowhere.json");
-    refuses(&["no driver"], &finish(&mut without), 3, &["no Vulkan device"]);
+    let without = finish(without_device(Command::new(PROGRAM).arg("verify")));
+    refuses(&["no driver"], &without, 3, &["no Vulkan device"]);
     assert_eq!(folder.names().len(), 2, "{:?}", folder.names());
 }
 

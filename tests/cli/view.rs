@@ -1,6 +1,6 @@
 //! `echolume view` where there is nothing to show on, or nothing to show: one line that says so. Windows are in tests/window.
 
-use super::common::*;
+use crate::common::program::*;
 use std::process::Command;
 
 /// Without a windowing system.

@@ -174,7 +174,7 @@ fn what_is_planted_is_found() {
         String::new()
     }
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
-    let also = &["tests/motor/probe.toml", "tests/data/openigtlink"];
+    let also = &["tests/data/motor/probe.toml", "tests/data/openigtlink"];
     let planted = |name, run, text, memory| Target { name, run, text, memory, rounds: 60_000, also };
     let running = Running::default();
     let hook = std::panic::take_hook();

@@ -1,6 +1,6 @@
 //! Scenes that nobody would ask for: each is refused in one line or drawn, and validation has nothing to say.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::probe::{Advance, Geometry};
 use echolume::scene::Scene;

@@ -1,7 +1,7 @@
 //! Line conditioning on lines whose answer is a formula: the gain curve, straight lines of exponential decays, ramps and wires
 //! that decimation leaves where they are.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels};
 use echolume::plan::{Plan, Rerun};

@@ -1,6 +1,6 @@
 //! The volume as a solid block: what rays show where they enter it.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::planes::picture;
 use echolume::probe::{Geometry, Grid};
 use glam::DVec3;

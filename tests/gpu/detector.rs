@@ -1,6 +1,6 @@
 //! The surface detector on walls and spheres that are formulas: where the surface is put.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;

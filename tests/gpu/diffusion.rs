@@ -1,8 +1,8 @@
 //! Perona-Malik: against another implementation's numbers, against dense solves, at and beyond its limits.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::filters::{by_reference, largest_difference, noise, on_device, plane, texels};
-use echolume::gpu::single::Single;
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Texels, by_name};
 use echolume::scene::Scene;
 
@@ -16,7 +16,7 @@ fn csv(name: &str) -> Texels {
 #[test]
 fn explicit_steps_are_those_of_another_implementation() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let input = csv("input");
     for conductance in ["quotient", "exponential"] {
         for steps in [1, 20] {
@@ -81,7 +81,7 @@ fn aos_step(u: &Texels, tau: f64, conductance: impl Fn(f64) -> f64) -> Texels {
 #[test]
 fn aos_is_what_dense_solves_give() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let quotient = |k: f64| move |g: f64| 1.0 / (1.0 + (g / k).powi(2));
     for (size, seed) in [([13, 17], 1), ([1, 9], 2), ([8, 1], 3), ([1, 1], 4)] {
         let source = noise(size, seed);
@@ -144,7 +144,7 @@ fn rmse(a: &Texels, b: &Texels) -> f64 {
 #[test]
 fn aos_converges_to_the_equation_with_first_order() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let source = discs();
     // T = 2; explicit steps of 1/2000 are sixty times finer than the finest compared, and first order themselves.
     let truth = explicit(&source, 0.1, 0.0005, 4000);
@@ -164,10 +164,10 @@ fn aos_converges_to_the_equation_with_first_order() {
 #[test]
 fn errors_of_large_aos_steps_over_a_time_of_100() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let source = discs();
     let truth = explicit(&source, 0.1, 0.02, 5000);
-    let error = |single: &mut Single, filter: &str, pass| {
+    let error = |single: &mut PassRunner, filter: &str, pass| {
         rmse(&on_device(single, &plane([64, 64], filter), pass, &source), &truth)
     };
     let fifth = error(&mut single, "perona_malik = { repeat = 500 }", "perona_malik_slice");
@@ -189,7 +189,7 @@ fn checkerboard(size: [usize; 2]) -> Texels {
 #[test]
 fn a_checkerboard_flips_at_a_quarter_and_would_grow_above() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let board = checkerboard([24, 20]);
     // With no edges the border's pixels, of two or three neighbours, are all that damps; they reach a pixel inwards a step.
     for steps in [1usize, 2, 5] {
@@ -215,7 +215,7 @@ fn a_checkerboard_flips_at_a_quarter_and_would_grow_above() {
 #[test]
 fn aos_keeps_the_range_at_any_step() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let size = [61, 47];
     let hot = texels(size, |x, y| f64::from((x, y) == (30, 20)));
     let sources = [("noise", noise(size, 6)), ("checkerboard", checkerboard(size)), ("hot", hot)];
@@ -261,7 +261,7 @@ fn diffusions(edge: &str) -> Vec<(Scene, &'static str, String)> {
 #[test]
 fn edges_of_0_and_infinity_and_flat_and_hot_pictures() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let size = [19, 23];
     let source = noise(size, 9);
     for (scene, pass, filter) in diffusions("0.0") {

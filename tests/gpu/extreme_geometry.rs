@@ -1,12 +1,12 @@
 //! Extreme geometries, cameras and pictures (a test a case): drawn as the f64 reference draws them, or refused in one line that
 //! names what is wrong.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::plan::Plan;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
-use echolume::report::whole;
+use echolume::reference;
 use echolume::scene::{Scene, Settings};
 use std::f64::consts::PI;
 
@@ -29,7 +29,7 @@ fn drawn_as_the_reference(device: &Device, name: &str, scene: Scene) -> f64 {
     let mut renderer = rendered(device, scene.clone(), &frames);
     renderer.picture().expect("picture");
     let picture = renderer.read(Slot::Picture).expect("read").expect("there");
-    let expected = &whole::render(&scene, &quantised(&scene, &frames))[&Slot::Picture];
+    let expected = &reference::render(&scene, &quantised(&scene, &frames))[&Slot::Picture];
     let off = |i: usize| (picture.values[i] - expected.values[i]).abs() > 0.02;
     let wrong = (0..picture.values.len()).filter(|i| off(*i)).count() as f64 / picture.values.len() as f64;
     assert!(picture.values.iter().all(|v| (0.0..=1.0).contains(v)), "{name}: a pixel leaves 0..1");

@@ -2,7 +2,8 @@
 //! in `extreme_geometry`. Rows of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot pixels, windows wider
 //! than the picture) are in `filters` and, against every reference, in `passes`.
 
-use crate::common::*;
+use crate::common::gpu::*;
+use crate::common::program;
 use crate::shading::{map, plate, run};
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{MISS, Slot, Texels, is_hit};
@@ -117,8 +118,7 @@ fn more_absorption_is_never_less_opaque() {
 fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
     let device = Device::new();
     let hostile = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, -1e-42, -3.0, f32::MIN_POSITIVE / 2.0];
-    let folder = std::env::temp_dir().join(format!("echolume-extremes-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = Folder::new("extremes");
     let header = "ObjectType = Image\nNDims = 3\nDimSize = 20 22 18\nElementSpacing = 0.5 0.5 0.5\n\
                   ElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
     let values = |bad: &dyn Fn(f32) -> f32| -> Vec<u8> {
@@ -161,13 +161,9 @@ fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
     assert_eq!(counted, (0, 0));
     assert!(dirty == clean, "a replaced sample is not a sample of 0");
     // Reported once, however many frames have them, and counted in what is said of the file.
-    let told =
-        std::process::Command::new(env!("CARGO_BIN_EXE_echolume")).arg("info").arg(folder.join("dirty.mha")).output();
-    let told = told.expect("start the program");
-    let [said, warned] = [told.stdout, told.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    let (_, said, warned) = program::run(&["info", &folder.path("dirty.mha")]);
     assert_eq!(warned.matches("read as 0").count(), 1, "{warned}");
     assert!(said.contains(&format!("{replaced} not finite, {flushed} denormal")), "{said}");
-    let _ = std::fs::remove_dir_all(&folder);
 }
 
 const LIGHTS: [&str; 9] = [

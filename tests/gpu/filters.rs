@@ -1,9 +1,9 @@
 //! The sigma filters: known answers, extremes, misses, what is refused; plans of every filter in a row.
 
-use crate::common::*;
+use crate::common::gpu::*;
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
-use echolume::gpu::single::Single;
-use echolume::passes::{Arrays, MISS, Pass, Slot, Texels, Turn, When, by_name, is_hit};
+use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
 use echolume::plan::Plan;
 use echolume::scene::{Scene, Settings};
 use std::collections::BTreeMap;
@@ -31,16 +31,16 @@ fn filtered(
     scene: &Scene,
     name: &str,
     source: &Texels,
-    mut run: impl FnMut(&'static Pass, &Turn, &Arrays) -> Arrays,
+    mut run: impl FnMut(&'static Pass, &DispatchArgs, &Arrays) -> Arrays,
 ) -> Texels {
     let pass = by_name(name).expect("pass");
     assert!(pass.is_needed(scene), "{name}: {:?}", (pass.needed)(scene));
     let mut held = Arrays::default();
     held.insert("source", source.clone());
     for iteration in 0..(pass.repeat)(scene) {
-        let turn = Turn { iteration, ..Turn::default() };
-        let written = run(pass, &turn, &held);
-        for bind in (pass.writes)(scene, &turn) {
+        let args = DispatchArgs { iteration, ..DispatchArgs::default() };
+        let written = run(pass, &args, &held);
+        for bind in (pass.writes)(scene, &args) {
             let name = match (bind.name, bind.slot) {
                 (_, Slot::SliceRows | Slot::PictureRows) => "rows",
                 ("target", _) => "source",
@@ -52,21 +52,21 @@ fn filtered(
     held.get("source").clone()
 }
 
-pub fn on_device(single: &mut Single, scene: &Scene, name: &str, source: &Texels) -> Texels {
-    filtered(scene, name, source, |pass, turn, held| single.run(scene, pass, turn, held, 0.654).expect("dispatch"))
+pub fn on_device(single: &mut PassRunner, scene: &Scene, name: &str, source: &Texels) -> Texels {
+    filtered(scene, name, source, |pass, args, held| single.run(scene, pass, args, held, 0.654).expect("dispatch"))
 }
 
 pub fn by_reference(scene: &Scene, name: &str, source: &Texels) -> Texels {
-    filtered(scene, name, source, |pass, turn, held| reference(scene, pass, turn, held))
+    filtered(scene, name, source, |pass, args, held| reference(scene, pass, args, held))
 }
 
-fn reference(scene: &Scene, pass: &Pass, turn: &Turn, inputs: &Arrays) -> Arrays {
+fn reference(scene: &Scene, pass: &Pass, args: &DispatchArgs, inputs: &Arrays) -> Arrays {
     let mut written = Arrays::default();
-    for bind in (pass.writes)(scene, turn) {
+    for bind in (pass.writes)(scene, args) {
         let size = size_of(bind.slot.shape(scene));
         written.insert(bind.name, Texels::untouched(size, bind.slot.format(scene).channels()));
     }
-    (pass.reference)(scene, turn, inputs, &mut written);
+    (pass.reference)(scene, args, inputs, &mut written);
     written
 }
 
@@ -89,7 +89,7 @@ fn sigma_filters(window: u32, largest: u32, sigma: &str) -> Vec<(String, &'stati
 #[test]
 fn a_constant_stays_and_a_hot_pixel_goes() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let size = [21, 15];
     for (filter, pass) in sigma_filters(5, 11, "0.1") {
         let scene = plane(size, &filter);
@@ -108,7 +108,7 @@ fn a_constant_stays_and_a_hot_pixel_goes() {
 #[test]
 fn an_infinite_sigma_is_the_box_mean_and_a_sigma_of_0_is_no_pass() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     // The second window is larger than the picture.
     for (size, window) in [([23, 17], 5u32), ([5, 4], 63), ([1, 1], 3)] {
         let source = noise(size, 3);
@@ -136,7 +136,7 @@ fn an_infinite_sigma_is_the_box_mean_and_a_sigma_of_0_is_no_pass() {
 #[test]
 fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let size = [33, 27];
     for (filter, pass) in sigma_filters(7, 19, "0.05") {
         let got = on_device(&mut single, &plane(size, &filter), pass, &noise(size, 8));
@@ -152,7 +152,7 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
         let squares: Vec<f64> = off.map(|d| d * d).collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     };
-    let run = |single: &mut Single, settings: &str| {
+    let run = |single: &mut PassRunner, settings: &str| {
         let scene = plane(size, &format!("sigma = {{ window = 7, {settings} }}"));
         on_device(single, &scene, "sigma_slice", &source)
     };
@@ -169,7 +169,7 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
 #[test]
 fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let mut random = Noise(2);
     let rough: Vec<f64> = (0..80 * 80).map(|_| random.range(-0.3, 0.3)).collect();
     // Two plates 15 mm apart, nothing below, a hole in one and a lone hit where nothing is.
@@ -237,16 +237,16 @@ fn what_no_filter_can_do_is_refused_by_name_and_limit() {
 }
 
 /// Every step of a plan that runs at `when`, by its references, from what the slots hold.
-pub fn run_by_references(scene: &Scene, when: When, slots: &mut BTreeMap<Slot, Texels>) {
-    for (_, step) in Plan::new(scene).steps_of(when) {
-        let turn = Turn { iteration: step.iteration, ..Turn::default() };
+pub fn run_by_references(scene: &Scene, frequency: Frequency, slots: &mut BTreeMap<Slot, Texels>) {
+    for (_, step) in Plan::new(scene).steps_of(frequency) {
+        let args = DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() };
         let mut inputs = Arrays::default();
-        for bind in (step.pass.reads)(scene, &turn) {
+        for bind in (step.pass.reads)(scene, &args) {
             inputs
                 .insert(bind.name, slots.get(&bind.slot).unwrap_or_else(|| panic!("{:?} is empty", bind.slot)).clone());
         }
-        let written = reference(scene, step.pass, &turn, &inputs);
-        for bind in (step.pass.writes)(scene, &turn) {
+        let written = reference(scene, step.pass, &args, &inputs);
+        for bind in (step.pass.writes)(scene, &args) {
             slots.insert(bind.slot, written.get(bind.name).clone());
         }
     }
@@ -273,7 +273,7 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
         renderer.picture().expect("picture");
         let mut read = |slot| renderer.read(slot).expect("read").expect("there");
         let mut slots = BTreeMap::from([(Slot::Frames, source.clone())]);
-        run_by_references(&scene, When::Frame, &mut slots);
+        run_by_references(&scene, Frequency::Frame, &mut slots);
         let error = largest_difference(&read(Slot::Volume), &slots[&Slot::Volume]);
         // Rounding before a sigma filter may move a pixel across its range's edge: none does here.
         assert!(error < 5e-6, "{after}: slices are {error} off");
@@ -282,11 +282,11 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
         let end = echolume::passes::chain::picture_end(&scene);
         for pass in ["sigma_picture", "perona_malik_picture", "aos_picture"].map(|n| by_name(n).expect("pass")) {
             for iteration in 0..if pass.is_needed(&scene) { (pass.repeat)(&scene) } else { 0 } {
-                let turn = Turn { iteration, ..Turn::default() };
+                let args = DispatchArgs { iteration, ..DispatchArgs::default() };
                 let mut inputs = Arrays::default();
-                (pass.reads)(&scene, &turn).iter().for_each(|b| inputs.insert(b.name, slots[&b.slot].clone()));
-                let written = reference(&scene, pass, &turn, &inputs);
-                (pass.writes)(&scene, &turn).iter().for_each(|b| {
+                (pass.reads)(&scene, &args).iter().for_each(|b| inputs.insert(b.name, slots[&b.slot].clone()));
+                let written = reference(&scene, pass, &args, &inputs);
+                (pass.writes)(&scene, &args).iter().for_each(|b| {
                     slots.insert(b.slot, written.get(b.name).clone());
                 });
             }

@@ -1,10 +1,10 @@
 //! Few stored pictures, made by the f64 reference, so that no driver is the truth. `tools/goldens` makes them anew.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels};
 use echolume::picture::Picture;
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::report::whole;
+use echolume::reference;
 use echolume::scene::Scene;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -54,14 +54,14 @@ fn goldens() -> Vec<(&'static str, Scene, Vec<Texels>)> {
 }
 
 fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens").join(format!("{name}.png"))
+    repository("tests/goldens").join(format!("{name}.png"))
 }
 
 #[test]
 fn pictures_match_the_stored_ones_that_the_reference_made() {
     let device = Device::new();
     for (name, scene, frames) in goldens() {
-        let expected = as_picture(&whole::render(&scene, &frames)[&Slot::Screen]);
+        let expected = as_picture(&reference::render(&scene, &frames)[&Slot::Screen]);
         if std::env::var_os("ECHOLUME_MAKE_GOLDENS").is_some() {
             std::fs::create_dir_all(file(name).parent().expect("folder")).expect("folder");
             expected.save(&file(name)).expect("saved");

@@ -1,8 +1,8 @@
 //! The estimators of the enhanced sigma filter by hand, and the growth of its windows against a count by brute force.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
-use echolume::gpu::single::Single;
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::filter::growth;
 use echolume::passes::{Slot, Texels};
@@ -14,7 +14,7 @@ use echolume::source::Recording;
 #[test]
 fn estimators_by_hand() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let mut run = |filter: &str, size, source: &Texels, at: [usize; 2]| {
         let scene = plane(size, filter);
         let got = on_device(&mut single, &scene, "estimator_slice", source).one(at[0], at[1], 0);

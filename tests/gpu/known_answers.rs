@@ -1,6 +1,6 @@
 //! Normals by formula. What a device draws of scenes whose answer is one is `verify`'s to say.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::shade::normal;
 use echolume::passes::{MISS, Texels};
 use echolume::probe::{Geometry, Grid};

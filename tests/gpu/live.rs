@@ -1,6 +1,6 @@
 //! Frames that arrive while pictures are drawn: what is shown is what was sent, whole, on one, two and three queues.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
 use echolume::passes::{Slot, Texels};

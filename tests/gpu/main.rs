@@ -2,24 +2,25 @@
 //! every test, and any message fails the test that caused it.
 
 mod any_scene;
+#[path = "../common/mod.rs"]
 mod common;
 mod conditioning;
 mod console;
 mod cube;
 mod detector;
+mod detector_false_positives;
 mod diffusion;
+mod empty_space;
 mod extreme_geometry;
 mod extremes;
 mod filters;
 mod goldens;
 mod growth;
-mod half;
+mod half_resolution;
 mod known_answers;
-mod leaping;
-mod led_astray;
 mod live;
-mod live_amiss;
-mod live_kept;
+mod live_control;
+mod live_failures;
 mod modes;
 mod motion;
 mod passes;
@@ -29,12 +30,12 @@ mod rays;
 mod recordings;
 mod reruns;
 mod sector;
-mod seen;
 mod self_test;
 mod shading;
 mod sliding;
-mod stored;
 mod tiles;
 mod timing;
 mod truth;
-mod verified;
+mod verify_groups;
+mod visible_bounds;
+mod volume_storage;

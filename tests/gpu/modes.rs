@@ -1,7 +1,7 @@
 //! For every mode which passes and slots it has, what a change makes run again (counted from recorded dispatches), and the
 //! volume kept up to date slice by slice.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, in_runs};
 use echolume::plan::{Plan, affected};
 use echolume::probe::Geometry;

@@ -1,6 +1,6 @@
 //! The motor moves while a frame is acquired: what stands still must not move between sweeps forth and back.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::probe::{Advance, Axis, Geometry, Indices, Probe};

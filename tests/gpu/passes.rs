@@ -1,17 +1,17 @@
 //! Every pass alone against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
 //! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
 
-use crate::common::*;
+use crate::common::gpu::*;
+use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::renderer::size_of;
-use echolume::gpu::single::Single;
 use echolume::gpu::{ContextOptions, Fetch, Options, Renderer};
 use echolume::passes::slots::Shape;
-use echolume::passes::{Arrays, PASSES, Slot, Texels, Turn, measure};
+use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
 use echolume::probe::Geometry;
-use echolume::report::verify::Level;
 use echolume::scene::{Sampling, Scene};
 use echolume::verify::inputs::{inputs_of, turn_of};
 use echolume::verify::passes::{POISON, beside};
+use echolume::verify::report::Level;
 use echolume::verify::{self, Bench, Slack};
 use std::collections::HashSet;
 
@@ -38,7 +38,7 @@ fn every_pass_matches_its_reference() {
 fn texels_loaded_are_the_texels_fetched() {
     let device = Device::new();
     let ways = [Fetch::Textures, Fetch::Storage];
-    let mut singles = ways.map(|fetch| Single::fetching(&device, fetch).expect("single"));
+    let mut singles = ways.map(|fetch| PassRunner::fetching(&device, fetch).expect("single"));
     let (mut seen, mut loaded) = (HashSet::new(), 0);
     for (name, mut scene) in scenes() {
         // Automatic sampling would be another for each way.
@@ -46,15 +46,16 @@ fn texels_loaded_are_the_texels_fetched() {
             (scene.settings.ray.sampling, scene.sampling) = (Sampling::Exact, Sampling::Exact);
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
-            let reads: Vec<_> = (pass.reads)(&scene, &Turn::default()).iter().map(|b| b.slot.format(&scene)).collect();
+            let reads: Vec<_> =
+                (pass.reads)(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
             // Once with each shader and the formats of what it reads: that is what is rewritten.
-            if !seen.insert(((pass.shader)(&scene, &Turn::default()), reads)) {
+            if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
-            let turn = turn_of(&scene, 0);
-            let inputs = inputs_of(&scene, pass, &turn, "noise", 3);
+            let args = turn_of(&scene, 0);
+            let inputs = inputs_of(&scene, pass, &args, "noise", 3);
             let [fetched, stored] =
-                singles.each_mut().map(|s| s.run(&scene, pass, &turn, &inputs, POISON).expect("dispatch"));
+                singles.each_mut().map(|s| s.run(&scene, pass, &args, &inputs, POISON).expect("dispatch"));
             for ((name_of, fetched), (_, stored)) in fetched.iter().zip(stored.iter()) {
                 let differ = fetched.values.iter().zip(&stored.values).filter(|(a, b)| a.to_bits() != b.to_bits());
                 assert_eq!(differ.count(), 0, "texels of '{name_of}' by {} in '{name}'", pass.name);
@@ -95,7 +96,7 @@ fn what_measures_the_device_computes_what_it_says() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
     for fetch in [Fetch::Textures, Fetch::Storage] {
-        let mut single = Single::fetching(&device, fetch).expect("single");
+        let mut single = PassRunner::fetching(&device, fetch).expect("single");
         for pass in measure::MEASURES {
             let worst = beside(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
             assert!(worst.is_none(), "{}: {worst:?}", pass.name);
@@ -106,7 +107,7 @@ fn what_measures_the_device_computes_what_it_says() {
 #[test]
 fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let base = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\n{ALL_FILTERS}"));
     let lit = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'sr'\n{ALL_FILTERS}"));
     // What the reference is told differs from what the device is told, by one small thing.
@@ -134,13 +135,13 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         let pass = echolume::passes::by_name(name).expect("pass");
         let right = beside(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
         assert!(right.comparison.worst.is_none(), "{name}, unperturbed: {:?}", right.comparison);
-        let turn = Turn { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
+        let args = DispatchArgs { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
         for bind in &right.writes {
             let channels = bind.slot.format(told).channels();
             expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
         }
-        (pass.reference)(wrong, &turn, &right.inputs, &mut expected);
+        (pass.reference)(wrong, &args, &right.inputs, &mut expected);
         let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
@@ -154,7 +155,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     inputs.insert("source", source);
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(size_of(right.writes[0].slot.shape(&base)), 1));
-    (pass.reference)(&base, &Turn::default(), &inputs, &mut expected);
+    (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
     let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
 }
@@ -162,7 +163,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
 #[test]
 fn what_is_outside_the_sector_is_not_touched() {
     let device = Device::new();
-    let mut single = Single::new(&device).expect("single");
+    let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
     let result = beside(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");

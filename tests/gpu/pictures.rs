@@ -1,6 +1,6 @@
 //! The presets' pictures of the recordings: not black, not holed, and what they show is where it is.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::scene::load::Layers;

@@ -1,6 +1,6 @@
 //! Planes and slabs: what they show is where it is.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Grid, Probe};

@@ -1,7 +1,7 @@
 //! What is done along rays, against formulas: clip planes, growing steps, the sliding filter, pre-integration, hits, veils, and
 //! several rays a pixel.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::probe::{Axis, Geometry, Grid};
 use echolume::scene::Scene;

@@ -1,8 +1,8 @@
 //! Real and simulated recordings against what is known of them.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
-use echolume::passes::tables::scan_index;
+use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Probe};
 use echolume::scene::{Input, Scene, Settings, SliceGrid};

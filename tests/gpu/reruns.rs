@@ -1,6 +1,6 @@
 //! What runs again after a change, counted from recorded dispatches; and barriers left out, seen by validation.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::Renderer;
 use echolume::passes::{PASSES, Stage};
 use echolume::plan::{Plan, Rerun};

@@ -1,6 +1,6 @@
 //! Filters of slices on a sweep's sector: its rim, and what the pixel lattice leaves on a tilted wall.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::passes::{Slot, is_hit};
 use echolume::probe::Geometry;
 

@@ -1,9 +1,9 @@
 //! Whether the self-test of `echolume verify` can fail. That what it plants is caught is `cli`'s to say.
 
-use crate::common::chosen;
+use crate::common::gpu::chosen;
 use echolume::gpu::ContextOptions;
-use echolume::passes::planted::{Change, Planted};
-use echolume::report::verify::Verdict;
+use echolume::passes::fault_injection::{Change, InjectedFault};
+use echolume::verify::report::Verdict;
 use echolume::verify::self_test::{self, Caught};
 
 fn options() -> ContextOptions {
@@ -19,12 +19,12 @@ fn told(caught: &Caught) {
 #[test]
 fn a_fault_without_effect_is_reported_as_uncaught() {
     let faults = [
-        Planted {
+        InjectedFault {
             name: "nowhere",
             what: "a pass that is not there",
             change: Change::Extent { pass: "no such pass", by: |extent| extent[0] = 0 },
         },
-        Planted {
+        InjectedFault {
             name: "unseen",
             what: "a colour that nothing is drawn in",
             change: Change::Constant { pass: "light", name: "SKIN", by: |skin| skin },

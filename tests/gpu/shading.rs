@@ -1,9 +1,9 @@
 //! Stage 3 on distance maps whose look is known: shadows where geometry puts them, one colour on a plane whatever its holes,
 //! filters that invent no edges; and which surface of several is taken.
 
-use crate::common::*;
-use echolume::gpu::single::Single;
-use echolume::passes::{Arrays, MISS, Slot, Texels, Turn, by_name, is_hit};
+use crate::common::gpu::*;
+use echolume::gpu::pass_runner::PassRunner;
+use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 
@@ -23,16 +23,16 @@ pub fn map(scene: &Scene, f: impl Fn(usize, usize) -> f64) -> Texels {
 /// One output of one pass on a distance map; everything else it reads says "found, bright, lit, open".
 pub fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Texels {
     let pass = by_name(pass).expect("pass");
-    let turn = Turn::default();
+    let args = DispatchArgs::default();
     let mut inputs = Arrays::default();
-    for bind in (pass.reads)(scene, &turn) {
+    for bind in (pass.reads)(scene, &args) {
         let channels = bind.slot.format(scene).channels();
         let ones = Texels::from_fn(distances.size, channels, |_, _| 1.0);
         let is_map = matches!(bind.slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB);
         inputs.insert(bind.name, if is_map { distances.clone() } else { ones });
     }
-    let outputs = Single::new(device).expect("single").run(scene, pass, &turn, &inputs, 0.5).expect("dispatch");
-    outputs.get((pass.writes)(scene, &turn)[0].name).clone()
+    let outputs = PassRunner::new(device).expect("single").run(scene, pass, &args, &inputs, 0.5).expect("dispatch");
+    outputs.get((pass.writes)(scene, &args)[0].name).clone()
 }
 
 /// A step of 10 mm on a plane, light from the left at 45 deg: its shadow reaches as far as it is high, less the bias.

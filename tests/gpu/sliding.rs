@@ -1,8 +1,8 @@
 //! The filter that slides along the ray keeps sums of slices from sample to sample. Rays side by side on one unit enter the
 //! sector one after the other, and each sums anew what it lacks while the others wait.
 
-use crate::common::*;
-use echolume::passes::{Arrays, Slot, Texels, Turn, by_name, is_hit};
+use crate::common::gpu::*;
+use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name, is_hit};
 use echolume::probe::Geometry;
 use glam::DVec3;
 
@@ -29,14 +29,14 @@ fn surfaces_are_where_the_reference_has_them_on_every_ray() {
             let mut renderer = rendered(&device, scene.clone(), &body_frames(&scene, body));
             renderer.picture().expect("picture");
             let mut read = |slot| renderer.read(slot).expect("read").expect("there");
-            let (got, turn) = (read(Slot::Distance), Turn::default());
+            let (got, args) = (read(Slot::Distance), DispatchArgs::default());
             let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
             reads.insert("volume", read(Slot::Volume));
             let pass = by_name("raycast_surface").expect("pass");
-            for bind in (pass.writes)(&scene, &turn) {
+            for bind in (pass.writes)(&scene, &args) {
                 writes.insert(bind.name, Texels::untouched(got.size, bind.slot.format(&scene).channels()));
             }
-            pass.expected(&scene, &turn, &reads, &mut writes);
+            pass.expected(&scene, &args, &reads, &mut writes);
             let expected = &writes.get("distance_map").values;
             let hits = expected.iter().filter(|d| is_hit(**d)).count();
             let off = got.values.iter().zip(expected).filter(|(a, b)| (*a - *b).abs() > 5e-3).count();

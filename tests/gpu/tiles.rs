@@ -1,6 +1,6 @@
 //! Pictures of several planes: lines, tiles, what runs for them and runs again, and what is refused.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::planes::picture;
 use echolume::plan::Plan;
 use echolume::probe::Geometry;

@@ -1,8 +1,8 @@
 //! Passes that are timed alone. Time stamps of whole pictures are looked at by `echolume verify`.
 
-use crate::common::*;
-use echolume::gpu::single::{Single, Timed};
-use echolume::passes::{Arrays, Slot, Texels, Turn, by_name};
+use crate::common::gpu::*;
+use echolume::gpu::pass_runner::{PassRunner, Timed};
+use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name};
 use echolume::probe::Geometry;
 
 /// What is timed is the work that was meant: every iteration, on the contents given, the same each time.
@@ -11,7 +11,7 @@ fn a_timed_pass_works_on_the_contents_given() {
     // A device for each: synchronization validation does not see that the host waits for a timeline, so memory that one has
     // read back from and another then takes anew would look like a hazard.
     let devices: [Device; 5] = std::array::from_fn(|_| Device::new());
-    let mut single = Single::new(&devices[0]).expect("single");
+    let mut single = PassRunner::new(&devices[0]).expect("single");
     let toml = "mode = 'mip'\npicture = { size = [37, 29] }\nslices = { pixels = 24 }\n\
                 post = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 }, brightness = 0.1 }";
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml);
@@ -20,7 +20,8 @@ fn a_timed_pass_works_on_the_contents_given() {
     picture.values.fill_with(|| noise.next());
     for (name, devices) in [("aos_picture", &devices[1..3]), ("tone", &devices[3..])] {
         let pass = by_name(name).expect("pass");
-        let (first, last) = (Turn::default(), Turn { iteration: (pass.repeat)(&scene) - 1, ..Turn::default() });
+        let (first, last) =
+            (DispatchArgs::default(), DispatchArgs { iteration: (pass.repeat)(&scene) - 1, ..DispatchArgs::default() });
         let (from, to) = ((pass.reads)(&scene, &first)[0], (pass.writes)(&scene, &last)[0]);
         let mut timed = Timed::new(&devices[0], &scene, pass, &[(from.slot, picture.clone())]).expect("timed");
         assert!(timed.run().expect("run").expect("time stamps") > 0.0, "{name}");
@@ -29,14 +30,14 @@ fn a_timed_pass_works_on_the_contents_given() {
         // One dispatch after the other, each fed what those before it wrote.
         let mut slots: Vec<(Slot, Texels)> = vec![(from.slot, picture.clone())];
         for iteration in 0..=last.iteration {
-            let turn = Turn { iteration, ..first };
+            let args = DispatchArgs { iteration, ..first };
             let mut inputs = Arrays::default();
-            for bind in (pass.reads)(&scene, &turn) {
+            for bind in (pass.reads)(&scene, &args) {
                 let (_, texels) = slots.iter().find(|(s, _)| *s == bind.slot).expect("written before");
                 inputs.insert(bind.name, texels.clone());
             }
-            let outputs = single.run(&scene, pass, &turn, &inputs, 0.0).expect("dispatch");
-            for bind in (pass.writes)(&scene, &turn) {
+            let outputs = single.run(&scene, pass, &args, &inputs, 0.0).expect("dispatch");
+            for bind in (pass.writes)(&scene, &args) {
                 slots.retain(|(s, _)| *s != bind.slot);
                 slots.push((bind.slot, outputs.get(bind.name).clone()));
             }

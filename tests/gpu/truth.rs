@@ -1,6 +1,6 @@
 //! The surface detector on the simulated sweep, against the head that was simulated.
 
-use crate::common::*;
+use crate::common::gpu::*;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::chain::distance_end;
 use echolume::passes::{Slot, Texels, is_hit};

@@ -1,6 +1,6 @@
 //! A kiosk that something is missing from says what, goes on trying, and needs nobody when it is there.
 
-use crate::common::*;
+use crate::desktop::*;
 use std::fs;
 
 /// Whether there is a banner of a fault: its red frame.

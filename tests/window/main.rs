@@ -1,7 +1,9 @@
 //! The program in a window of a server without a monitor (Xvfb): driven by keys and hands as a person would, and looked at. Every view
 //! runs with validation, and any message fails its test. No server is a failure, never a skip.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod desktop;
 mod kiosk;
 mod panels;
 mod pictures;

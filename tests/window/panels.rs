@@ -1,6 +1,6 @@
 //! Panels and hands: what is pressed acts on the picture, which stays the headless one where nothing is drawn over it.
 
-use crate::common::*;
+use crate::desktop::*;
 use echolume::picture::Picture;
 
 /// The window of these tests, and the picture that the panels leave room for: what `ui::panels::place` says.

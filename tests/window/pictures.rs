@@ -1,6 +1,6 @@
 //! What a window shows is what `echolume render` writes, byte for byte.
 
-use crate::common::*;
+use crate::desktop::*;
 
 #[test]
 fn every_mode_in_a_window_is_the_headless_picture_byte_for_byte() {

@@ -1,6 +1,6 @@
 //! What a window manager does to a window.
 
-use crate::common::*;
+use crate::desktop::*;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask};
 

@@ -17,8 +17,8 @@ enum Listed {
 
 impl Recorder {
     pub(super) fn bind(&mut self, work: &Work, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
-        let Work { slots, pipeline, scene, pass, turn } = *work;
-        let binds = [(pass.reads)(scene, turn), (pass.writes)(scene, turn)].concat();
+        let Work { slots, pipeline, scene, pass, args } = *work;
+        let binds = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
         let mut images = Vec::with_capacity(binds.len());
         let mut buffers = Vec::with_capacity(binds.len());
         let mut texels = Vec::with_capacity(binds.len());
@@ -26,7 +26,7 @@ impl Recorder {
         let mut places = Vec::with_capacity(binds.len());
         for binding in &pipeline.module.bindings {
             let bound = binds.iter().find(|b| b.name == binding.name);
-            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, turn.image)))) {
+            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, args.image)))) {
                 (Kind::Params, _) => {
                     places.push((binding, Listed::Buffer(buffers.len())));
                     buffers.push([vk::DescriptorBufferInfo {
@@ -49,7 +49,7 @@ impl Recorder {
                 }
                 (_, Some((bind, Resource::Image(image)))) => {
                     let view = match bind.part {
-                        Part::Layer => image.layers[turn.layer as usize],
+                        Part::Layer => image.layers[args.layer as usize],
                         _ => image.view,
                     };
                     places.push((binding, Listed::Image(images.len())));

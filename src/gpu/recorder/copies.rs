@@ -2,8 +2,8 @@
 
 use super::{Place, Recorder};
 use crate::barriers::{self, Access, Worker};
+use crate::gpu::barrier_recorder::BarrierRecorder;
 use crate::gpu::formats;
-use crate::gpu::order::Order;
 use crate::gpu::resources::{Buffer, Image, WHOLE};
 use crate::gpu::slots::Slots;
 use crate::passes::Slot;
@@ -11,7 +11,7 @@ use ash::vk;
 
 impl Recorder {
     /// New images from UNDEFINED to GENERAL, and all their bits to zero: pixels outside the sector are never written again.
-    pub fn clear_new(&mut self, order: &mut Order, slots: &Slots, new: &[(Slot, u32)]) {
+    pub fn clear_new(&mut self, order: &mut BarrierRecorder, slots: &Slots, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
         let transitions: Vec<_> = images
@@ -52,7 +52,7 @@ impl Recorder {
     }
 
     /// Bytes of a staging buffer into parts of an image: layers of an array, slices of a 3D image.
-    pub fn copy_in(&mut self, order: &mut Order, from: &Buffer, image: &Image, to: Place) {
+    pub fn copy_in(&mut self, order: &mut BarrierRecorder, from: &Buffer, image: &Image, to: Place) {
         let parts = to.parts.clone();
         self.barrier(order, &[Access::of_slot(to.slot, to.copy, to.parts, true, Worker::Copy)]);
         // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
@@ -68,7 +68,7 @@ impl Recorder {
     }
 
     /// A whole image into the readback buffer, made visible to the host.
-    pub fn copy_out(&mut self, order: &mut Order, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
+    pub fn copy_out(&mut self, order: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
         let parts = image.shape.parts();
         let read = Access::of_slot(slot, copy, 0..parts, false, Worker::Copy);
         let resource = barriers::Resource::Readback;

@@ -25,7 +25,7 @@ impl Renderer {
         super::super::formats::check(&self.context, &plan, &scene)?;
         let beside = match &mut self.beside {
             Some(beside) => beside,
-            None => self.beside.insert(Beside::new(&self.pipelines, self.wake.clone())?),
+            None => self.beside.insert(AsyncPipelineCompiler::new(&self.pipelines, self.wake.clone())?),
         };
         beside.prepare(&self.pipelines, &plan, &scene)
     }
@@ -45,8 +45,9 @@ impl Renderer {
         super::super::formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
         // Frames that are on their way use nothing that a change of pictures alone touches: only the picture is waited for.
-        let touched =
-            |slots: &[Slot]| plan.steps_of(When::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)));
+        let touched = |slots: &[Slot]| {
+            plan.steps_of(Frequency::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)))
+        };
         self.wait_presented()?;
         match &rerun {
             Rerun::Steps { slots, .. } if !touched(slots) => self.wait_drawn()?,
@@ -72,7 +73,7 @@ impl Renderer {
         let refilled = match rerun {
             Rerun::Steps { steps, slots } => {
                 steps.iter().for_each(|i| self.stale[*i] = true);
-                if steps.iter().any(|i| self.plan.steps[*i].pass.when == When::Volume) {
+                if steps.iter().any(|i| self.plan.steps[*i].pass.frequency == Frequency::Volume) {
                     self.forget_volumes();
                 }
                 slots.clone()

@@ -85,24 +85,24 @@ impl Renderer {
         self.picture.collect(&self.timelines, &mut self.measured)?;
         self.picture.begin(&mut self.order, &self.timelines)?;
         let unseen = &self.unseen[self.shown as usize];
-        let steps = self.plan.steps_of(When::Volume).chain(self.plan.steps_of(When::Picture));
+        let steps = self.plan.steps_of(Frequency::Volume).chain(self.plan.steps_of(Frequency::Picture));
         for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            let runs: Vec<_> = match step.pass.when {
-                When::Volume => {
+            let runs: Vec<_> = match step.pass.frequency {
+                Frequency::Volume => {
                     let (low, high) = (scene.seen.low[2], scene.seen.high[2]);
                     let runs = affected(unseen, step.reach(scene)).into_iter();
                     runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
                 }
                 _ => std::iter::once(0..0).collect(),
             };
-            if step.pass.when == When::Volume && !runs.is_empty() {
+            if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
                 self.filtered = scene.seen;
             }
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
-                let turn = Turn { image: self.shown, slice, slices, ..step.turn() };
-                let work = Work { slots, pipeline, scene, pass: step.pass, turn: &turn };
+                let args = DispatchArgs { image: self.shown, slice, slices, ..step.args() };
+                let work = Work { slots, pipeline, scene, pass: step.pass, args: &args };
                 self.picture.dispatch(&mut self.order, &work)?;
             }
             // Taken as written from here on: if the submission fails, all of it is stale still.
@@ -116,7 +116,7 @@ impl Renderer {
         self.measured.host("submit", || picture.submit(order, timelines))?;
         (self.drawing, self.drawn) = (true, true);
         // A frame that arrives from here on is seen the next time, and so is one whose volume was not shown.
-        if self.plan.steps_of(When::Volume).all(|(i, _)| self.stale[i]) {
+        if self.plan.steps_of(Frequency::Volume).all(|(i, _)| self.stale[i]) {
             self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);
         }
         self.stale.iter_mut().for_each(|stale| *stale = false);

@@ -35,7 +35,7 @@ impl Lane {
     /// frame is open afterwards.
     pub(super) fn copy(
         &mut self,
-        order: &mut Order,
+        order: &mut BarrierRecorder,
         timelines: &mut Timelines,
         slots: &Slots,
         place: Place,
@@ -142,10 +142,10 @@ impl Renderer {
         lane.first().begin(&mut self.order, &self.timelines)?;
         let place = Place { slot: Slot::Frames, copy: 0, parts: layer..layer + 1 };
         lane.copy(&mut self.order, &mut self.timelines, &self.slots, place)?;
-        for (i, step) in self.plan.steps_of(When::Frame) {
-            let turn = Turn { layer, slice, slices: 1, iteration: step.iteration, image };
+        for (i, step) in self.plan.steps_of(Frequency::Frame) {
+            let args = DispatchArgs { layer, slice, slices: 1, iteration: step.iteration, image };
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
-            lane.recorder.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, turn: &turn })?;
+            lane.recorder.dispatch(&mut self.order, &Work { slots, pipeline, scene, pass: step.pass, args: &args })?;
         }
         let (recorder, order, timelines) = (&mut lane.recorder, &mut self.order, &mut self.timelines);
         self.measured.host("submit", || recorder.submit(order, timelines))

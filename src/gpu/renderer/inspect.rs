@@ -16,7 +16,7 @@ impl Renderer {
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
         let (format, size) = (image.format, size_of(image.shape));
-        let copy = if slot.takes_turns() { self.shown } else { 0 };
+        let copy = if slot.is_multibuffered() { self.shown } else { 0 };
         self.picture.collect(&self.timelines, &mut self.measured)?;
         self.picture.begin(&mut self.order, &self.timelines)?;
         self.picture.copy_out(&mut self.order, image, slot, copy, &buffer);

@@ -1,7 +1,7 @@
 //! From pictures to a window, without the host in between.
 
 use super::*;
-use crate::gpu::window::{Panels, Screen, Seen};
+use crate::gpu::window::{Panels, PresentOutcome, Screen};
 
 impl Renderer {
     /// Shows the last picture with its upper left corner `at` a pixel of the window, and panels over it. A picture that is on its way
@@ -9,7 +9,12 @@ impl Renderer {
     ///
     /// # Errors
     /// A device that fails, a surface that cannot be had anew.
-    pub fn present(&mut self, screen: &mut Screen, at: [u32; 2], panels: Option<Panels>) -> Result<Seen, GpuError> {
+    pub fn present(
+        &mut self,
+        screen: &mut Screen,
+        at: [u32; 2],
+        panels: Option<Panels>,
+    ) -> Result<PresentOutcome, GpuError> {
         self.check(self.shown)?;
         let drawn = self.slots.image(Slot::Screen, 0).map(|image| crate::gpu::window::Drawn {
             image,

@@ -71,7 +71,7 @@ impl Lane {
     /// Copies what lies in the staging buffer to its place: all there is to do.
     fn send(
         &mut self,
-        order: &mut Order,
+        order: &mut BarrierRecorder,
         timelines: &mut Timelines,
         slots: &Slots,
         place: Place,

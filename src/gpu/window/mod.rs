@@ -10,6 +10,6 @@ mod target;
 
 pub use overlay::Panels;
 pub(super) use screen::Drawn;
-pub use screen::{Screen, Seen};
-pub use swapchain::Pace;
+pub use screen::{PresentOutcome, Screen};
+pub use swapchain::PresentMode;
 pub use target::{Handles, Target};

@@ -3,11 +3,11 @@
 
 use super::overlay::{Overlay, Panels};
 use super::stages::{Stage, barrier, region};
-use super::swapchain::{Pace, Swapchain};
+use super::swapchain::{PresentMode, Swapchain};
 use super::target::Target;
 use crate::barriers::{Access, Worker};
+use crate::gpu::barrier_recorder::BarrierRecorder;
 use crate::gpu::error::Doing;
-use crate::gpu::order::Order;
 use crate::gpu::resources::{Image, WHOLE};
 use crate::gpu::timeline::Timelines;
 use crate::gpu::{Context, GpuError};
@@ -22,7 +22,7 @@ const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
 
 /// What became of showing something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
+pub enum PresentOutcome {
     Shown,
     /// There is nothing to show it on now: the window is minimised, covered, or its monitor is gone.
     Nowhere,
@@ -31,7 +31,7 @@ pub enum Seen {
 /// The picture that a renderer holds, and what orders it before and after what that renderer does.
 pub(in crate::gpu) struct Drawn<'a> {
     pub image: &'a Image,
-    pub order: &'a mut Order,
+    pub order: &'a mut BarrierRecorder,
     pub timelines: &'a mut Timelines,
     /// Its upper left corner on the window, pixels.
     pub at: [u32; 2],
@@ -64,7 +64,7 @@ impl Screen {
     ///
     /// # Errors
     /// A target that the device cannot show anything on.
-    pub fn new(context: &Arc<Context>, target: Target, size: [u32; 2], pace: Pace) -> Result<Screen, GpuError> {
+    pub fn new(context: &Arc<Context>, target: Target, size: [u32; 2], pace: PresentMode) -> Result<Screen, GpuError> {
         let chain = Swapchain::new(context, target, pace)?;
         let device = &context.device;
         let mut screen = Screen {
@@ -115,7 +115,7 @@ impl Screen {
     ///
     /// # Errors
     /// A device that fails; a surface that is lost and cannot be had anew.
-    pub fn show(&mut self, panels: Option<Panels>) -> Result<Seen, GpuError> {
+    pub fn show(&mut self, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(None, panels)
     }
 
@@ -123,7 +123,7 @@ impl Screen {
         &mut self,
         mut drawn: Option<Drawn>,
         mut panels: Option<Panels>,
-    ) -> Result<Seen, GpuError> {
+    ) -> Result<PresentOutcome, GpuError> {
         self.wait()?;
         if let Some(panels) = &mut panels {
             if self.overlay.is_none() {
@@ -137,7 +137,7 @@ impl Screen {
         // Once more where the first image says that it does not fit.
         for _ in 0..2 {
             if !self.fit()? {
-                return Ok(Seen::Nowhere);
+                return Ok(PresentOutcome::Nowhere);
             }
             match self.chain.acquire(PATIENCE, self.free) {
                 Ok(image) => {
@@ -146,11 +146,11 @@ impl Screen {
                     self.spoilt = false;
                     return self.present(image);
                 }
-                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Seen::Nowhere),
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::Nowhere),
                 Err(result) => self.note(result)?,
             }
         }
-        Ok(Seen::Nowhere)
+        Ok(PresentOutcome::Nowhere)
     }
 
     /// What a call about the surface said: what can be mended is mended before the next one.
@@ -165,16 +165,16 @@ impl Screen {
         Ok(())
     }
 
-    fn present(&mut self, image: u32) -> Result<Seen, GpuError> {
+    fn present(&mut self, image: u32) -> Result<PresentOutcome, GpuError> {
         match self.chain.present(image) {
             Ok(unfit) => self.stale |= unfit,
             Err(result) => {
                 self.note(result)?;
-                return Ok(Seen::Nowhere);
+                return Ok(PresentOutcome::Nowhere);
             }
         }
         self.shown += 1;
-        Ok(Seen::Shown)
+        Ok(PresentOutcome::Shown)
     }
 
     /// Waits for the last drawing.
@@ -292,7 +292,11 @@ impl Screen {
         self.submit(after, queued)
     }
 
-    fn submit(&self, drawn: vk::Semaphore, queued: Option<(&mut Order, &mut Timelines)>) -> Result<(), GpuError> {
+    fn submit(
+        &self,
+        drawn: vk::Semaphore,
+        queued: Option<(&mut BarrierRecorder, &mut Timelines)>,
+    ) -> Result<(), GpuError> {
         let everything = vk::PipelineStageFlags2::ALL_COMMANDS;
         let semaphore = |handle| vk::SemaphoreSubmitInfo::default().semaphore(handle);
         let mut waits = vec![semaphore(self.free).stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)];

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// When a picture is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
+pub enum PresentMode {
     /// With the next refresh of the monitor, each one: nothing is torn.
     #[default]
     Fifo,
@@ -16,13 +16,13 @@ pub enum Pace {
     Mailbox,
 }
 
-impl std::str::FromStr for Pace {
+impl std::str::FromStr for PresentMode {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Pace, String> {
+    fn from_str(text: &str) -> Result<PresentMode, String> {
         match text {
-            "fifo" => Ok(Pace::Fifo),
-            "mailbox" => Ok(Pace::Mailbox),
+            "fifo" => Ok(PresentMode::Fifo),
+            "mailbox" => Ok(PresentMode::Mailbox),
             _ => Err("must be fifo or mailbox".into()),
         }
     }
@@ -38,7 +38,7 @@ pub struct Swapchain {
     pub images: Vec<Shown>,
     pub format: vk::Format,
     pub size: [u32; 2],
-    pace: Pace,
+    pace: PresentMode,
 }
 
 /// One of its images.
@@ -54,7 +54,7 @@ const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8
 
 impl Swapchain {
     /// No images yet: [`Swapchain::fit`] makes them.
-    pub fn new(context: &Arc<Context>, target: Target, pace: Pace) -> Result<Swapchain, GpuError> {
+    pub fn new(context: &Arc<Context>, target: Target, pace: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
         let mut made =
@@ -122,7 +122,7 @@ impl Swapchain {
             return Err(GpuError::Window("the surface's images cannot be copied into and drawn on".into()));
         }
         let pace = match self.pace {
-            Pace::Mailbox if paces.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
+            PresentMode::Mailbox if paces.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
             _ => vk::PresentModeKHR::FIFO,
         };
         let alphas = [

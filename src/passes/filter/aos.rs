@@ -23,7 +23,7 @@ const TOLERANCE: Tolerance = Tolerance {
 pub const SLICE: Pass = Pass {
     name: "aos_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.plane",
         (0, Sweep::Backward) => "filter/aos_backward.rows",
@@ -44,7 +44,7 @@ pub const SLICE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "aos_picture",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.picture",
         (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
@@ -79,23 +79,23 @@ enum Sweep {
 }
 
 /// The axis (0 along rows, 1 along columns) and the direction of a dispatch.
-fn turn_of(turn: &Turn) -> (usize, Sweep) {
-    let sweep = if turn.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
-    ((turn.iteration % DISPATCHES / 2) as usize, sweep)
+fn turn_of(args: &DispatchArgs) -> (usize, Sweep) {
+    let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
+    ((args.iteration % DISPATCHES / 2) as usize, sweep)
 }
 
 impl Between {
-    fn reads(&self, source: Slot, turn: &Turn) -> Vec<Bind> {
+    fn reads(&self, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
         let swept = || vec![whole("shares", self.shares), whole("forward", self.forward)];
-        match turn_of(turn) {
+        match turn_of(args) {
             (_, Sweep::Forward) => vec![whole("source", source)],
             (0, Sweep::Backward) => swept(),
             _ => [swept(), vec![whole("rows", self.rows)]].concat(),
         }
     }
 
-    fn writes(&self, target: Bind, turn: &Turn) -> Vec<Bind> {
-        match turn_of(turn) {
+    fn writes(&self, target: Bind, args: &DispatchArgs) -> Vec<Bind> {
+        match turn_of(args) {
             (_, Sweep::Forward) => vec![whole("shares", self.shares), whole("forward", self.forward)],
             (0, Sweep::Backward) => vec![whole("target", self.rows)],
             _ => vec![target],
@@ -103,28 +103,28 @@ impl Between {
     }
 }
 
-fn lines(size: [u32; 2], turn: &Turn) -> [u32; 3] {
-    [size[1 - turn_of(turn).0], 1, 1]
+fn lines(size: [u32; 2], args: &DispatchArgs) -> [u32; 3] {
+    [size[1 - turn_of(args).0], 1, 1]
 }
 
-fn params(settings: Option<PeronaMalik>, turn: &Turn) -> Params {
+fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
     let p = settings.unwrap_or_default();
-    match turn_of(turn).1 {
+    match turn_of(args).1 {
         Sweep::Forward => Params::default().f32("edge", storable_edge(p.edge)).f32("tau", p.step),
-        Sweep::Backward => Params::default().i32("slice", turn.slice),
+        Sweep::Backward => Params::default().i32("slice", args.slice),
     }
 }
 
-fn constants(settings: Option<PeronaMalik>, turn: &Turn) -> Vec<(&'static str, i32)> {
-    let (axis, sweep) = turn_of(turn);
+fn constants(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+    let (axis, sweep) = turn_of(args);
     let mut constants = vec![("AXIS", axis as i32)];
     constants.extend((sweep == Sweep::Forward).then(|| constant(settings)));
     constants
 }
 
-fn reference(settings: Option<PeronaMalik>, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let p = settings.unwrap_or_default();
-    let (axis, sweep) = turn_of(turn);
+    let (axis, sweep) = turn_of(args);
     let size = reads.get(if sweep == Sweep::Forward { "source" } else { "shares" }).size;
     for line in 0..size[1 - axis] {
         let texel = |i: usize| if axis == 0 { [i, line, 0] } else { [line, i, 0] };
@@ -154,7 +154,7 @@ fn reference(settings: Option<PeronaMalik>, turn: &Turn, reads: &Arrays, writes:
                         u.iter_mut().zip(reads.get("rows").get(texel(i))).for_each(|(u, r)| *u = 0.5 * (*u + r));
                     }
                     let [x, y, _] = texel(i);
-                    target.set([x, y, if target.size[2] > 1 { turn.slice as usize } else { 0 }], &u);
+                    target.set([x, y, if target.size[2] > 1 { args.slice as usize } else { 0 }], &u);
                 }
             }
         }

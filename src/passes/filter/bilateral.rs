@@ -9,7 +9,7 @@ const NAME: &str = "bilateral_distance";
 pub const DISTANCE: Pass = Pass {
     name: NAME,
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/bilateral.distance",
     needed: |s| match (s.has_distance(), s.distance.bilateral) {
         (false, _) => Err("no distance map in this mode"),

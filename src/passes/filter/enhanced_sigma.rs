@@ -13,7 +13,7 @@ const WHY: &str = "a mean of at most 63^2 values in f32; a pixel at exactly 2 si
 pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| match writes_volume(s, "enhanced_sigma_slice", t) {
         true => "filter/enhanced_sigma.slice",
         false => "filter/enhanced_sigma.plane",
@@ -35,7 +35,7 @@ pub const SLICE: Pass = Pass {
 pub const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
         true => asked(s.distance.enhanced_sigma),
@@ -58,7 +58,7 @@ pub const DISTANCE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "enhanced_sigma_picture",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/enhanced_sigma.picture",
     needed: |s| asked(s.settings.post.enhanced_sigma),
     reads: |s, t| vec![whole("source", picture_link(s, "enhanced_sigma_picture", t).0)],
@@ -83,10 +83,10 @@ pub(super) fn asked(enhanced: Option<EnhancedSigma>) -> Need {
     }
 }
 
-pub(super) fn params(enhanced: Option<EnhancedSigma>, least: f64, turn: &Turn) -> Params {
+pub(super) fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> Params {
     let e = enhanced.unwrap_or_default();
     let params = Params::default().f32("range", range(e.sigma)).f32("few", f64::from(few(e.window)));
-    estimator::params(params, e.edge, least).i32("slice", turn.slice)
+    estimator::params(params, e.edge, least).i32("slice", args.slice)
 }
 
 pub(super) fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(&'static str, i32)> {
@@ -125,10 +125,10 @@ impl Enhanced {
         Enhanced { settings, centre: scene.centre(settings), least, valid }
     }
 
-    pub fn filter(&self, turn: &Turn, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
+    pub fn filter(&self, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
         let source = reads.get("source");
         let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
         for y in 0..source.size[1] {
             for x in 0..source.size[0] {
                 target.set([x, y, z], &value(self.at(source, x as i64, y as i64)));

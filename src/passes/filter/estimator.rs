@@ -10,7 +10,7 @@ const NAME: &str = "estimator_slice";
 pub const SLICE: Pass = Pass {
     name: NAME,
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| if writes_volume(s, NAME, t) { "filter/estimator.slice" } else { "filter/estimator.plane" },
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
     reads: |s, t| vec![whole("source", slice_link(s, NAME, t).0)],
@@ -25,11 +25,11 @@ pub const SLICE: Pass = Pass {
         outliers: 1e-3,
         why: "at most 25 values in f32; of two masks that vary alike to f32's rounding either may win; R16F stores 1 to 4.9e-4",
     },
-    reference: |scene, turn, reads, writes| {
+    reference: |scene, args, reads, writes| {
         let slices = &scene.settings.slices;
         let source = reads.get("source");
         let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
         for y in 0..source.size[1] {
             for x in 0..source.size[0] {
                 let around = |dx: i64, dy: i64| source.clamped(x as i64 + dx, y as i64 + dy, 0);

@@ -10,7 +10,7 @@ const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers
 pub const LATERAL: Pass = Pass {
     name: "gaussian_lateral",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| {
         if writes_volume(s, "gaussian_lateral", t) { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
@@ -43,7 +43,7 @@ pub const DEPTH: Pass = Pass {
 pub const ELEVATION: Pass = Pass {
     name: "gaussian_elevation",
     stage: Stage::Preprocess,
-    when: When::Volume,
+    frequency: Frequency::Volume,
     shader: |_, _| "filter/gaussian.volume",
     needed: |s| asked(s, 2),
     reads: |s, _| {
@@ -63,21 +63,21 @@ fn asked(scene: &Scene, axis: usize) -> Need {
     if scene.smoothing()[axis] > 0.0 { Ok("asked for") } else { Err("not asked for") }
 }
 
-fn params(scene: &Scene, axis: usize, turn: &Turn) -> Params {
+fn params(scene: &Scene, axis: usize, args: &DispatchArgs) -> Params {
     let deviation = scene.smoothing()[axis];
-    Params::default().f32("narrowness", 0.5 / (deviation * deviation)).i32("slice", turn.slice)
+    Params::default().f32("narrowness", 0.5 / (deviation * deviation)).i32("slice", args.slice)
 }
 
 fn constants(scene: &Scene, axis: usize) -> Vec<(&'static str, i32)> {
     vec![("RADIUS", scene.smoothing_radius()[axis] as i32), ("AXIS", axis as i32)]
 }
 
-fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &mut Arrays) {
+fn reference(scene: &Scene, axis: usize, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
     let deviation = scene.smoothing()[axis];
     let radius = i64::from(scene.smoothing_radius()[axis]);
-    let slices = if axis < 2 { 0..1 } else { turn.slice as usize..(turn.slice + turn.slices) as usize };
+    let slices = if axis < 2 { 0..1 } else { args.slice as usize..(args.slice + args.slices) as usize };
     for z in slices {
         for y in 0..source.size[1] {
             for x in 0..source.size[0] {
@@ -94,7 +94,7 @@ fn reference(scene: &Scene, axis: usize, turn: &Turn, reads: &Arrays, writes: &m
                     sum += w * source.one(tap[0], tap[1], tap[2]);
                     weight += w;
                 }
-                let z = if axis < 2 && target.size[2] > 1 { turn.slice as usize } else { z };
+                let z = if axis < 2 && target.size[2] > 1 { args.slice as usize } else { z };
                 target.set([x, y, z], &[sum / weight]);
             }
         }

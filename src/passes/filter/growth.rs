@@ -10,7 +10,7 @@ use crate::scene::Scene;
 pub const SLICE: Pass = Pass {
     name: "growth_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |_, _| "filter/enhanced_sigma.growth",
     needed: |s| match s.settings.slices.enhanced_sigma {
         Some(e) if e.growth && e.sigma > 0.0 => Ok("the windows' growth is asked for"),

@@ -6,7 +6,7 @@ use crate::passes::*;
 pub const SLICE: Pass = Pass {
     name: "median_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| if writes_volume(s, "median_slice", t) { "filter/median.slice" } else { "filter/median.plane" },
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
     reads: |s, t| vec![whole("source", slice_link(s, "median_slice", t).0)],
@@ -21,13 +21,13 @@ pub const SLICE: Pass = Pass {
         outliers: 0.0,
         why: "a value that is there, chosen exactly; only storing in R16F rounds",
     },
-    reference: |_, turn, reads, writes| reference(1, turn, reads, writes, |_| true),
+    reference: |_, args, reads, writes| reference(1, args, reads, writes, |_| true),
 };
 
 pub const DISTANCE: Pass = Pass {
     name: "median_distance",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/median.distance",
     needed: |s| match (s.has_distance(), s.distance.median) {
         (false, _) => Err("no distance map in this mode"),
@@ -41,14 +41,14 @@ pub const DISTANCE: Pass = Pass {
     params: |_, t| Params::default().i32("slice", t.slice),
     constants: |s, _| vec![("RADIUS", (s.distance.median / 2) as i32)],
     tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "a value that is there, chosen exactly" },
-    reference: |s, turn, reads, writes| reference(s.distance.median / 2, turn, reads, writes, is_hit),
+    reference: |s, args, reads, writes| reference(s.distance.median / 2, args, reads, writes, is_hit),
 };
 
 /// The middle of the sorted window; of an even number, the lower. Hits and misses vote first: a tie is a miss.
-fn reference(radius: u32, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
+fn reference(radius: u32, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
     let source = reads.get("source");
     let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
     let radius = i64::from(radius);
     for y in 0..source.size[1] {
         for x in 0..source.size[0] {

@@ -11,7 +11,7 @@ const WHY: &str = "five values in f32, exp to 3 ulp of an exponent of at most 87
 pub const SLICE: Pass = Pass {
     name: "perona_malik_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| match writes_volume(s, "perona_malik_slice", t) {
         true => "filter/perona_malik.slice",
         false => "filter/perona_malik.plane",
@@ -30,7 +30,7 @@ pub const SLICE: Pass = Pass {
 pub const DISTANCE: Pass = Pass {
     name: "perona_malik_distance",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/perona_malik.distance",
     needed: |s| match s.has_distance() {
         true => asked(s.distance.perona_malik, Scheme::Explicit),
@@ -49,7 +49,7 @@ pub const DISTANCE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "perona_malik_picture",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/perona_malik.picture",
     needed: |s| asked(s.settings.post.perona_malik, Scheme::Explicit),
     reads: |s, t| vec![whole("source", picture_link(s, "perona_malik_picture", t).0)],
@@ -80,9 +80,9 @@ pub(super) fn constant(settings: Option<PeronaMalik>) -> (&'static str, i32) {
     ("CONDUCTANCE", i32::from(settings.unwrap_or_default().conductance == Conductance::Exponential))
 }
 
-fn params(settings: Option<PeronaMalik>, turn: &Turn) -> Params {
+fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
     let p = settings.unwrap_or_default();
-    Params::default().f32("edge", storable_edge(p.edge)).f32("lambda", p.step).i32("slice", turn.slice)
+    Params::default().f32("edge", storable_edge(p.edge)).f32("lambda", p.step).i32("slice", args.slice)
 }
 
 /// How well two texels conduct. Colours go by the root mean square of their differences (Gerig et al. 1992).
@@ -97,11 +97,11 @@ pub(super) fn conductance(p: &PeronaMalik, a: &[f64], b: &[f64]) -> f64 {
     }
 }
 
-fn reference(p: Option<PeronaMalik>, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
+fn reference(p: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
     let p = p.unwrap_or_default();
     let source = reads.get("source");
     let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
     let [width, height, _] = source.size;
     let mut next = source.clone();
     // What flows between two neighbours leaves the one and enters the other.

@@ -12,7 +12,7 @@ const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel at exactly 
 pub const SLICE: Pass = Pass {
     name: "sigma_slice",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| if writes_volume(s, "sigma_slice", t) { "filter/sigma.slice" } else { "filter/sigma.plane" },
     needed: |s| asked(s.settings.slices.sigma),
     reads: |s, t| vec![whole("source", slice_link(s, "sigma_slice", t).0)],
@@ -28,7 +28,7 @@ pub const SLICE: Pass = Pass {
 pub const DISTANCE: Pass = Pass {
     name: "sigma_distance",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/sigma.distance",
     needed: |s| if s.has_distance() { asked(s.distance.sigma) } else { Err("no distance map in this mode") },
     reads: |s, t| vec![whole("source", distance_link(s, "sigma_distance", t).0)],
@@ -44,7 +44,7 @@ pub const DISTANCE: Pass = Pass {
 pub const PICTURE: Pass = Pass {
     name: "sigma_picture",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "filter/sigma.picture",
     needed: |s| asked(s.settings.post.sigma),
     reads: |s, t| vec![whole("source", picture_link(s, "sigma_picture", t).0)],
@@ -77,9 +77,9 @@ pub(super) fn range(sigma: f64) -> f64 {
     f64::from((2.0 * sigma).min(1e30) as f32)
 }
 
-fn params(sigma: Option<scene::Sigma>, turn: &Turn) -> Params {
+fn params(sigma: Option<scene::Sigma>, args: &DispatchArgs) -> Params {
     let sigma = sigma.unwrap_or_default();
-    Params::default().f32("range", range(sigma.sigma)).f32("few", f64::from(few(sigma.window))).i32("slice", turn.slice)
+    Params::default().f32("range", range(sigma.sigma)).f32("few", f64::from(few(sigma.window))).i32("slice", args.slice)
 }
 
 fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
@@ -90,12 +90,18 @@ fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
     ]
 }
 
-fn reference(sigma: Option<scene::Sigma>, turn: &Turn, reads: &Arrays, writes: &mut Arrays, valid: fn(f64) -> bool) {
+fn reference(
+    sigma: Option<scene::Sigma>,
+    args: &DispatchArgs,
+    reads: &Arrays,
+    writes: &mut Arrays,
+    valid: fn(f64) -> bool,
+) {
     let sigma = sigma.unwrap_or_default();
     let radius = i64::from(sigma.window / 2);
     let source = reads.get("source");
     let target = writes.get_mut("target");
-    let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+    let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
     let [width, height, _] = source.size;
     let inside = |x: i64, y: i64| x >= 0 && y >= 0 && x < width as i64 && y < height as i64;
     for y in 0..height as i64 {

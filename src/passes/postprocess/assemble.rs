@@ -7,7 +7,7 @@ use crate::scene::Layout;
 pub const PASS: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| match s.settings.layout {
         Layout::Single => "postprocess/assemble.alone",
         Layout::Four => "postprocess/assemble.four",

@@ -13,7 +13,7 @@ pub const LINE_STRENGTH: f64 = 0.7;
 pub const PASS: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| if s.draws_lines() { "postprocess/tone.lines" } else { "postprocess/tone.plain" },
     needed: |s| match s.tones_planes() {
         true => Err("planes are cut straight to 8 bits"),

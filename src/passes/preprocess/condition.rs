@@ -8,7 +8,7 @@ use crate::scene::{Conditioning, gaussian_radius};
 pub const PASS: Pass = Pass {
     name: "condition",
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, _| {
         if s.settings.conditioning.tgc.is_empty() {
             "preprocess/condition.plain"

@@ -9,7 +9,7 @@ const NAME: &str = "load_slice";
 pub const PASS: Pass = Pass {
     name: NAME,
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| {
         if writes_volume(s, NAME, t) { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
@@ -30,10 +30,10 @@ pub const PASS: Pass = Pass {
         outliers: 0.0,
         why: "one multiplication and addition in f32; R16F stores 1 to 4.9e-4",
     },
-    reference: |scene, turn, reads, writes| {
+    reference: |scene, args, reads, writes| {
         let frames = reads.get("frames");
         let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
         let (gain, offset) = normalisation(scene);
         for y in 0..frames.size[1] {
             for x in 0..frames.size[0] {

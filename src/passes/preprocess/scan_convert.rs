@@ -1,7 +1,7 @@
 //! Scan conversion of one polar frame into one slice, through the look-up table (thesis 4.3, Fig. 31).
 
 use crate::passes::chain::{slice_link, writes_volume};
-use crate::passes::tables::scan_index;
+use crate::passes::lookup_tables::scan_index;
 use crate::passes::*;
 use crate::source::StoredType;
 
@@ -10,7 +10,7 @@ const NAME: &str = "scan_convert";
 pub const PASS: Pass = Pass {
     name: NAME,
     stage: Stage::Preprocess,
-    when: When::Frame,
+    frequency: Frequency::Frame,
     shader: |s, t| {
         if writes_volume(s, NAME, t) { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" }
     },
@@ -37,18 +37,18 @@ pub const PASS: Pass = Pass {
         why: "a table entry near 3640 has 2.4e-4 samples of rounding in f32, times a step of at most 1 between samples, \
               twice over two interpolations; R16F stores 1 to 4.9e-4",
     },
-    reference: |scene, turn, reads, writes| {
+    reference: |scene, args, reads, writes| {
         let Some(probe) = scene.probe() else { return };
         let frames = reads.get("frames");
         let target = writes.get_mut("target");
-        let z = if target.size[2] > 1 { turn.slice as usize } else { 0 };
+        let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
         let (gain, offset) = scale(scene);
         for row in 0..scene.grid.size[1] {
             for column in 0..scene.grid.size[0] {
                 let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
                 let Some((sample, line)) = scan_index(scene, probe, x, y) else {
                     // The volume's own texels there are never written; filters must not see what an earlier frame left.
-                    if !writes_volume(scene, NAME, turn) {
+                    if !writes_volume(scene, NAME, args) {
                         target.set([column as usize, row as usize, z], &[0.0]);
                     }
                     continue;
@@ -84,7 +84,7 @@ pub(super) fn normalisation(scene: &Scene) -> (f64, f64) {
     (full / (high - low), -low / (high - low))
 }
 
-pub(super) fn load_params(scene: &Scene, turn: &Turn) -> Params {
+pub(super) fn load_params(scene: &Scene, args: &DispatchArgs) -> Params {
     let (gain, offset) = normalisation(scene);
-    Params::default().f32("gain", gain).f32("offset", offset).i32("slice", turn.slice)
+    Params::default().f32("gain", gain).f32("offset", offset).i32("slice", args.slice)
 }

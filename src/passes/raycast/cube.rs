@@ -15,7 +15,7 @@ const EDGE_WIDTH: f64 = 1.5;
 pub const PASS: Pass = Pass {
     name: "raycast_cube",
     stage: Stage::Raycast,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| ray::variant!(s, "raycast/cube"),
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),

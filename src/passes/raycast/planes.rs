@@ -11,7 +11,7 @@ use glam::DVec3;
 pub const PASS: Pass = Pass {
     name: "raycast_planes",
     stage: Stage::Raycast,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| ray::variant!(s, "raycast/planes"),
     needed: |s| match (s.is_flat(), s.cuts_planes()) {
         (true, _) if s.tones_planes() => Err("planes are cut straight to 8 bits"),

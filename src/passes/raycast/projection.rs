@@ -8,19 +8,19 @@ use crate::scene::{Mode, Scene};
 pub const PASS: Pass = Pass {
     name: "raycast_projection",
     stage: Stage::Raycast,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| ray::variant!(s, "raycast/projection"),
     needed: |s| match s.settings.mode {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
         _ => Err("the mode is no projection"),
     },
-    reads: |s, _| ray::marching_reads(s, skip::volume_leaps(s)),
+    reads: |s, _| ray::marching_reads(s, empty_space::volume_leaps(s)),
     writes: |s, _| vec![whole("picture", chain::rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| ray::params(s, s.projection_view()),
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, skip::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
         constants.push(("KEPT", kept(s)));
         constants
     },

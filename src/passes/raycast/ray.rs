@@ -1,8 +1,8 @@
 //! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
 
-use crate::passes::preprocess::quads;
-use crate::passes::skip::Leaps;
-use crate::passes::tables::{is_uneven, line_parameter, sweep_span};
+use crate::passes::empty_space::Leaps;
+use crate::passes::lookup_tables::{is_uneven, line_parameter, sweep_span};
+use crate::passes::preprocess::packed_neighbours;
 use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
@@ -87,7 +87,7 @@ pub(super) fn marching_constants(scene: &Scene, leaps: Leaps) -> Vec<(&'static s
     let mut constants = constants(scene);
     if scene.packs() {
         constants.retain(|(name, _)| *name != "SAMPLING");
-        constants.push(("SAMPLING", quads::sampling(scene)));
+        constants.push(("SAMPLING", packed_neighbours::sampling(scene)));
     }
     constants.push(leaps.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));

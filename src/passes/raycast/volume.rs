@@ -9,7 +9,7 @@ use glam::DVec3;
 pub const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| match kind(s) {
         Kind::Alone => ray::variant!(s, "raycast/volume", ""),
         Kind::Veil => ray::variant!(s, "raycast/volume", "veil_"),
@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
     },
     needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
-        let mut reads = ray::marching_reads(s, skip::volume_leaps(s));
+        let mut reads = ray::marching_reads(s, empty_space::volume_leaps(s));
         reads.push(match s.settings.volume.compositing {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
             _ => whole("transfer", Slot::Transfer),
@@ -45,7 +45,7 @@ pub const PASS: Pass = Pass {
             .f32("depth_near", near)
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, skip::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
         let compositing = match s.settings.volume.compositing {
             Compositing::Riemann => 0,
             Compositing::Corrected => 1,

@@ -9,7 +9,7 @@ use glam::DVec3;
 pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |s, _| {
         let arrives = (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s));
         match (lit_thing(s), arrives) {

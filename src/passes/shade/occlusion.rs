@@ -16,7 +16,7 @@ const ROUGHNESS: f64 = 0.1;
 pub const PASS: Pass = Pass {
     name: "occlusion",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "shade/occlusion",
     needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
         (false, _) => Err("no surface in this mode"),

@@ -13,7 +13,7 @@ const STEPS: u32 = 96;
 pub const PASS: Pass = Pass {
     name: "shadow",
     stage: Stage::Shade,
-    when: When::Picture,
+    frequency: Frequency::Picture,
     shader: |_, _| "shade/shadow",
     needed: |s| match (s.has_distance(), s.settings.light.shadow) {
         (false, _) => Err("no surface in this mode"),

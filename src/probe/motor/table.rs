@@ -48,7 +48,7 @@ pub enum Units {
     Tmc429,
 }
 
-/// The `[motor]` table of a probe file. `tests/motor/probe.toml` is a commented example.
+/// The `[motor]` table of a probe file. `tests/data/motor/probe.toml` is a commented example.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorTable {

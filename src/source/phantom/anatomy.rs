@@ -101,7 +101,7 @@ pub(super) fn brain(p: Vec3) -> f32 {
 /// A hand beside the cheek, its back to the probe, fingers up; in the head's axes, but it does not turn with it.
 /// `curl` bends the fingers, 0..1.
 pub(super) fn hand(p: Vec3, curl: f32) -> f32 {
-    // Beside the cheek, clear of it.
+    // AsyncPipelineCompiler the cheek, clear of it.
     let p = p - vec3(4.0, -3.0, -2.0);
     let bound = ball(p, vec3(40.0, -38.0, -10.0), 48.0);
     if bound > 6.0 {

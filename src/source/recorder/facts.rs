@@ -2,7 +2,7 @@
 
 use super::Replay;
 use crate::probe::Geometry;
-use crate::source::words::{self, number};
+use crate::source::describe::{self, number};
 use crate::source::{InputError, SampleType, Source};
 
 impl Replay {
@@ -26,8 +26,8 @@ impl Replay {
         let backward = if found.backward > 0 { format!(", {} swept backwards", found.backward) } else { String::new() };
         say("volumes", format!("{} of {each} frames, {} whole{backward}", found.volumes, found.whole));
         match &header.forward {
-            Geometry::Sweep(probe) => facts.extend(words::probe(probe)),
-            Geometry::Cartesian(grid) => facts.extend(words::grid(grid)),
+            Geometry::Sweep(probe) => facts.extend(describe::probe(probe)),
+            Geometry::Cartesian(grid) => facts.extend(describe::grid(grid)),
         }
         let mut say = |title: &str, value: String| facts.push((title.into(), value));
         let [low, high] = self.header().range.map(number);

@@ -2,9 +2,9 @@
 
 use super::tick::SILENCE;
 use super::{Console, ConsoleError};
-use crate::gpu::window::Seen;
+use crate::gpu::window::PresentOutcome;
 use crate::ui::panels::{Banner, Facts};
-use crate::ui::supply::Condition;
+use crate::ui::source_supervisor::Condition;
 use std::time::{Duration, Instant};
 
 /// So long what was seen stays, while what is shown is made anew: less disturbing than a black moment.
@@ -43,12 +43,12 @@ impl Console {
             None => screen.show(panels),
         };
         match seen {
-            Ok(Seen::Shown) => {
+            Ok(PresentOutcome::Shown) => {
                 (self.fresh, self.stale, self.nowhere) = (false, self.panels.is_waiting(), None);
                 self.answered();
             }
             // Asked again when the window says so, or in a moment.
-            Ok(Seen::Nowhere) => self.nowhere = Some(now + NOWHERE),
+            Ok(PresentOutcome::Nowhere) => self.nowhere = Some(now + NOWHERE),
             Err(lost) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
             Err(fault) => return Err(ConsoleError::Screen(fault)),
         }

@@ -148,7 +148,7 @@ impl Console {
             return Some(now);
         }
         let notes = self.notes.iter().map(|(until, _)| *until);
-        let listens = matches!(self.supply.condition(), super::super::supply::Condition::Open);
+        let listens = matches!(self.supply.condition(), super::super::source_supervisor::Condition::Open);
         let silence = Some(self.heard + SILENCE).filter(|at| listens && !self.stream.is_frozen() && *at > now);
         let counts = self.hud.then_some(self.counted + SECOND).filter(|_| self.times.pictures.newest().is_some());
         let looks = self.amiss.as_ref().map(|(_, at)| *at);

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::scene::Layout;
-use crate::ui::eye::Eye;
 use crate::ui::input::Phase;
+use crate::ui::picking::Picker;
 use glam::DVec3;
 
 /// A finger at a place of the picture.
@@ -14,12 +14,12 @@ fn touch(desk: &mut Desk, finger: u64, phase: Phase, at: [f64; 2]) -> Vec<Comman
 /// The place in the plane of the target that is seen there.
 fn under(desk: &Desk, at: [f64; 2]) -> DVec3 {
     let scene = desk.scene();
-    let (origin, direction) = Eye::of(&scene).ray(at);
+    let (origin, direction) = Picker::of(&scene).ray(at);
     origin + direction * ((scene.rays.target - origin).dot(scene.rays.forward) / direction.dot(scene.rays.forward))
 }
 
 fn shown(desk: &Desk, place: DVec3) -> [f64; 2] {
-    Eye::of(&desk.scene()).seen(place).unwrap()
+    Picker::of(&desk.scene()).seen(place).unwrap()
 }
 
 fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -32,7 +32,7 @@ fn what_is_under_two_fingers_stays_under_them() {
         ["", "camera.azimuth=40\ncamera.elevation=-30\ncamera.roll=20\nray.half=true", "layout='four'", "ray.rays=2"]
     {
         let mut desk = Desk::new(toml);
-        let [x, y] = Eye::of(&desk.scene()).middle();
+        let [x, y] = Picker::of(&desk.scene()).middle();
         let from = [[x + 10.0, y - 40.0], [x + 60.0, y + 30.0]];
         let to = [[x - 25.0, y - 50.0], [x + 70.0, y + 62.0]];
         let held = from.map(|at| under(&desk, at));

@@ -7,7 +7,7 @@ mod sequences;
 
 use super::command::{Command, Tool};
 use super::controls::Controls;
-use super::hand::Hand;
+use super::gestures::Gestures;
 use super::input::{Button, Input, Modifiers};
 use super::picture::Picture;
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
@@ -77,7 +77,7 @@ fn scene(geometry: &Geometry, settings: &Settings) -> Scene {
 struct Desk {
     geometry: Geometry,
     controls: Controls,
-    hand: Hand,
+    hand: Gestures,
     corner: [f64; 2],
     /// Pixels of the window for one of the picture.
     enlarged: f64,
@@ -90,7 +90,7 @@ impl Desk {
         Desk {
             geometry: Geometry::Sweep(wobbler()),
             controls: Controls::new(settings("", toml)),
-            hand: Hand::default(),
+            hand: Gestures::default(),
             corner: [100.0, 30.0],
             enlarged: 2.0,
             held: Modifiers::default(),

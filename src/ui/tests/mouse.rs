@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::scene::{Layout, Mode, PlaneName};
-use crate::ui::eye::Eye;
-use crate::ui::grip::TURN;
+use crate::ui::drag::TURN;
+use crate::ui::picking::Picker;
 use crate::ui::region::{axis, nearest};
 use glam::DVec3;
 
 fn seen(desk: &Desk, place: DVec3) -> [f64; 2] {
-    Eye::of(&desk.scene()).seen(place).unwrap()
+    Picker::of(&desk.scene()).seen(place).unwrap()
 }
 
 fn near(a: f64, b: f64, off: f64) {
@@ -24,7 +24,7 @@ fn a_drag_to_the_right_turns_by_what_is_documented_and_the_front_follows() {
                 "camera.azimuth={turned}\ncamera.elevation=20\ncamera.roll={roll}\nlayout='{layout}'"
             ));
             let before = desk.scene();
-            let eye = Eye::of(&before);
+            let eye = Picker::of(&before);
             let (middle, height) = (eye.middle(), eye.size()[1]);
             let front = before.rays.target - before.rays.forward * 20.0;
             let from = seen(&desk, front);
@@ -76,7 +76,7 @@ fn dragged_up_the_clip_plane_and_the_plane_go_deeper_as_far_as_the_hand_goes() {
     desk.tool(Tool::Clip);
     let near = desk.scene().low.y - 40.0;
     desk.drag(Button::Left, [200.0, 300.0], [200.0, 197.0]);
-    near_mm(desk.controls.settings().clip[0].at[1] - near, Eye::of(&desk.scene()).pixel());
+    near_mm(desk.controls.settings().clip[0].at[1] - near, Picker::of(&desk.scene()).pixel());
     let mut desk = Desk::new("mode='plane'\nplanes.plane='c'");
     desk.tool(Tool::Plane);
     let before = desk.scene().plane(PlaneName::C).at.y;
@@ -97,7 +97,7 @@ fn what_is_panned_stays_under_the_pointer() {
         for (button, shift) in [(Button::Right, false), (Button::Middle, false), (Button::Left, true)] {
             let mut desk = Desk::new(camera);
             desk.held.shift = shift;
-            let (eye_middle, target) = (Eye::of(&desk.scene()).middle(), desk.scene().rays.target);
+            let (eye_middle, target) = (Picker::of(&desk.scene()).middle(), desk.scene().rays.target);
             let place = target + desk.scene().rays.right * 7.0;
             let from = seen(&desk, place);
             desk.drag(button, eye_middle, [eye_middle[0] - 31.0, eye_middle[1] + 17.0]);

@@ -131,7 +131,7 @@ proptest! {
             for preset in ["", "fetal", "bone"] {
                 let mut controls = Controls::new(settings(preset, ""));
                 let Ok(mut shown) = Scene::new(geometry.clone(), BYTES, controls.settings().clone()) else { continue };
-                let (mut hand, mut keys, mut now) = (Hand::default(), Keys::default(), Duration::ZERO);
+                let (mut hand, mut keys, mut now) = (Gestures::default(), Keys::default(), Duration::ZERO);
                 for (input, tool, follows) in &inputs {
                     now += Duration::from_millis(30);
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);

@@ -3,8 +3,8 @@
 use super::{block, fault, show};
 use crate::gpu::GpuError;
 use crate::passes::{MISS, Slot, is_hit};
-use crate::report::verify::{Figure, Unit};
 use crate::verify::built_in::{FLOATS, frames, scene};
+use crate::verify::report::{Figure, Unit};
 use crate::verify::{Bench, Found, drawn};
 
 /// mm between voxels.

@@ -5,8 +5,8 @@ use crate::gpu::GpuError;
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
 use crate::probe::Geometry;
-use crate::report::verify::{Figure, Unit};
 use crate::verify::built_in::{FLOATS, body_frames, scene};
+use crate::verify::report::{Figure, Unit};
 use crate::verify::{Bench, Found, drawn};
 use glam::DVec3;
 

@@ -3,10 +3,10 @@
 use crate::gpu::GpuError;
 use crate::gpu::renderer::size_of;
 use crate::passes::shade::shadow;
-use crate::passes::{Arrays, Slot, Texels, Turn};
-use crate::report::verify::{Fault, Figure, Shown, Unit};
+use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
 use crate::verify::built_in::{BYTES, scene, wobbler};
 use crate::verify::passes::POISON;
+use crate::verify::report::{Fault, Figure, Shown, Unit};
 use crate::verify::shown::shown;
 use crate::verify::{Bench, Found, Slack, compare};
 
@@ -20,16 +20,16 @@ pub(super) fn of_a_hill(bench: &mut Bench) -> Result<Found, GpuError> {
     let hill = |x: usize, y: usize| ((x as f64 - 40.0).powi(2) + (y as f64 - 24.0).powi(2)) / 40.0;
     let distances =
         Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| f64::from((60.0 - 12.0 * (-hill(x, y)).exp()) as f32));
-    let (turn, mut inputs, mut expected) = (Turn::default(), Arrays::default(), Arrays::default());
-    for bind in (shadow::PASS.reads)(&scene, &turn) {
+    let (args, mut inputs, mut expected) = (DispatchArgs::default(), Arrays::default(), Arrays::default());
+    for bind in (shadow::PASS.reads)(&scene, &args) {
         inputs.insert(bind.name, distances.clone());
     }
-    let writes = (shadow::PASS.writes)(&scene, &turn);
+    let writes = (shadow::PASS.writes)(&scene, &args);
     for bind in &writes {
         expected.insert(bind.name, Texels::untouched(size_of(Slot::Shadow.shape(&scene)), 1));
     }
-    shadow::PASS.expected(&scene, &turn, &inputs, &mut expected);
-    let got = bench.single()?.run(&scene, &shadow::PASS, &turn, &inputs, POISON)?;
+    shadow::PASS.expected(&scene, &args, &inputs, &mut expected);
+    let got = bench.single()?.run(&scene, &shadow::PASS, &args, &inputs, POISON)?;
     let compared = compare(&shadow::PASS, &scene, Slack::default(), POISON, &expected, &got, &writes);
     let edge = expected.get("shadow").values.iter().filter(|v| (0.02..0.98).contains(*v)).count();
     found.expect(edge > 150, || format!("only {edge} texels are an edge of the shadow"));

@@ -8,7 +8,7 @@ use crate::passes::Texels;
 use crate::probe::Geometry;
 use crate::scene::Scene;
 use crate::verify::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
-use crate::verify::{aside, drawn};
+use crate::verify::{drawn, isolated_context};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -130,7 +130,7 @@ fn by_layer(options: &ContextOptions) -> Result<Caught, GpuError> {
         renderer.picture()?;
         let barriers = renderer.barriers();
         drop(renderer);
-        Ok((barriers, aside::told(&context, context.messages(), true)))
+        Ok((barriers, isolated_context::told(&context, context.messages(), true)))
     };
     if !options.validation {
         let why = "the validation layer does not watch".to_string();

@@ -1,9 +1,9 @@
 //! Faults of frames on their way in, of slices, of what is stored, and of the screen.
 
-use crate::passes::planted::{Change, Planted};
-use crate::passes::{Params, Slot, Turn, Value};
+use crate::passes::fault_injection::{Change, InjectedFault};
+use crate::passes::{DispatchArgs, Params, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::bent::{FMAX, FMIN, added, in_halves, replaced};
+use crate::spirv::mutate::{FMAX, FMIN, added, in_halves, replaced};
 
 const LSB: f32 = 1.0 / 255.0;
 
@@ -35,30 +35,33 @@ pub(super) fn swap(params: &mut Params, a: &str, b: &str) {
 }
 
 /// One slice of a volume, and not the one that a pass alone works on.
-fn one_of_many(scene: &Scene, turn: &Turn) -> bool {
-    scene.slices() > 3 && turn.slice == scene.slices() / 3
+fn one_of_many(scene: &Scene, args: &DispatchArgs) -> bool {
+    scene.slices() > 3 && args.slice == scene.slices() / 3
 }
 
-pub(super) const FAULTS: &[Planted] = &[
-    Planted {
+pub(super) const FAULTS: &[InjectedFault] = &[
+    InjectedFault {
         name: "stale slice",
         what: "one frame of a volume is dropped on its way, and its slice shows the one before",
         change: Change::LeftOut { pass: "scan_convert", which: one_of_many },
     },
-    Planted {
+    InjectedFault {
         name: "layer of the ring reused too early",
         what: "one frame of a volume is overwritten by its successor before it is read",
-        change: Change::Turn {
+        change: Change::DispatchArgs {
             pass: "scan_convert",
-            by: |scene, turn| turn.layer = (turn.layer + u32::from(one_of_many(scene, turn))) % 4,
+            by: |scene, args| args.layer = (args.layer + u32::from(one_of_many(scene, args))) % 4,
         },
     },
-    Planted {
+    InjectedFault {
         name: "reversed sweep",
         what: "the motor's way back is taken for its way there",
-        change: Change::Turn { pass: "scan_convert", by: |scene, turn| turn.slice = scene.slices() - 1 - turn.slice },
+        change: Change::DispatchArgs {
+            pass: "scan_convert",
+            by: |scene, args| args.slice = scene.slices() - 1 - args.slice,
+        },
     },
-    Planted {
+    InjectedFault {
         name: "wrong row pitch",
         what: "each line of an upload begins a sample late",
         change: Change::Frame(|[texel, width, height], bytes| {
@@ -69,7 +72,7 @@ pub(super) const FAULTS: &[Planted] = &[
             }
         }),
     },
-    Planted {
+    InjectedFault {
         name: "mirrored lateral",
         what: "the probe's marker is on the other side",
         change: Change::Frame(|[texel, width, height], bytes| {
@@ -80,7 +83,7 @@ pub(super) const FAULTS: &[Planted] = &[
             }
         }),
     },
-    Planted {
+    InjectedFault {
         name: "swapped axes",
         what: "samples and lines of the scan conversion table change places",
         change: Change::Table {
@@ -88,17 +91,17 @@ pub(super) const FAULTS: &[Planted] = &[
             by: |_, values| values.chunks_exact_mut(2).filter(|pair| pair[0] >= 0.0).for_each(|pair| pair.swap(0, 1)),
         },
     },
-    Planted {
+    InjectedFault {
         name: "gain of the next sample",
         what: "the gain over depth is a sample early",
         change: Change::Table { slot: Slot::Tgc, by: |_, values| values.rotate_left(1) },
     },
-    Planted {
+    InjectedFault {
         name: "1 LSB bias",
         what: "what is stored in the volume is one of 255 steps too bright",
         change: Change::Shader { pass: "scan_convert", by: |words| added(words, "target", [LSB; 4]) },
     },
-    Planted {
+    InjectedFault {
         name: "wrong rounding",
         what: "the screen's 8 bits are cut off instead of rounded",
         change: Change::Shader {
@@ -106,43 +109,43 @@ pub(super) const FAULTS: &[Planted] = &[
             by: |words| added(words, "screen", [-0.5 * LSB, -0.5 * LSB, -0.5 * LSB, 0.0]),
         },
     },
-    Planted {
+    InjectedFault {
         name: "median of the wrong rank",
         what: "the compiler takes a smaller for a larger value, once",
         change: Change::Shader { pass: "median_slice", by: |words| replaced(words, FMAX, FMIN) },
     },
-    Planted {
+    InjectedFault {
         name: "half precision",
         what: "a filter computes with 11 bits instead of 24",
         change: Change::Shader { pass: "perona_malik_slice", by: in_halves },
     },
-    Planted {
+    InjectedFault {
         name: "window of one texel less",
         what: "a sigma filter's window ends a texel early on each side",
         change: Change::Constant { pass: "sigma_slice", name: "RADIUS", by: |radius| radius - 1 },
     },
-    Planted {
+    InjectedFault {
         name: "lost last iteration",
         what: "a diffusion ends a step early",
         change: Change::LeftOut {
             pass: "perona_malik_slice",
-            which: |scene, turn| {
-                turn.iteration > 0
-                    && turn.iteration + 1 == scene.settings.slices.perona_malik.as_ref().map_or(0, |p| p.repeat)
+            which: |scene, args| {
+                args.iteration > 0
+                    && args.iteration + 1 == scene.settings.slices.perona_malik.as_ref().map_or(0, |p| p.repeat)
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "NaN from a division",
         what: "a Gaussian of width 0 divides by it",
         change: Change::Numbers { pass: "gaussian_lateral", by: |_, params| set(params, "narrowness", f32::INFINITY) },
     },
-    Planted {
+    InjectedFault {
         name: "last workgroup lost",
         what: "extents are divided by the workgroup's, rounded down",
         change: Change::Extent { pass: "tone", by: |extent| extent[0] = (extent[0] / 8).max(1) * 8 },
     },
-    Planted {
+    InjectedFault {
         name: "gamma left out",
         what: "a switch that is not set",
         change: Change::Constant { pass: "tone", name: "GAMMA", by: |_| 0 },

@@ -7,9 +7,9 @@ mod rays;
 
 use super::{Bench, Check, Found, known_answers, passes};
 use crate::gpu::{ContextOptions, GpuError};
-use crate::passes::planted::Planted;
+use crate::passes::fault_injection::InjectedFault;
 use crate::passes::{PASSES, is_hit};
-use crate::report::verify::{Fault, Level, Outcome, Verdict};
+use crate::verify::report::{Fault, Level, Outcome, Verdict};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -54,7 +54,7 @@ impl Caught {
 }
 
 /// Every fault that is planted, in running order; barriers are dropped besides.
-pub fn faults() -> impl Iterator<Item = &'static Planted> {
+pub fn faults() -> impl Iterator<Item = &'static InjectedFault> {
     list::FAULTS.iter().chain(rays::FAULTS)
 }
 
@@ -79,7 +79,7 @@ pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Caught)) -> Result<Ve
 /// As of [`run`].
 pub fn planted<'a>(
     options: &ContextOptions,
-    faults: impl Iterator<Item = &'a Planted>,
+    faults: impl Iterator<Item = &'a InjectedFault>,
     mut tell: impl FnMut(&Caught),
 ) -> Result<Vec<Caught>, GpuError> {
     // A layer that watches has nothing to do with what is computed, and takes most of the time.
@@ -107,7 +107,7 @@ struct Search {
 }
 
 impl Search {
-    fn caught(&mut self, planted: &Planted) -> Result<Caught, GpuError> {
+    fn caught(&mut self, planted: &InjectedFault) -> Result<Caught, GpuError> {
         let (begun, mut bench) = (Instant::now(), self.sound.planted(planted.change)?);
         let looked = self.look(planted, &mut bench);
         let struck = bench.context.faults.struck();
@@ -123,7 +123,7 @@ impl Search {
 
     /// The first check that notices, and does not without the fault; else what the device said, if it did not do as it was told: that is
     /// no comparison, and notices nothing.
-    fn look(&mut self, planted: &Planted, bench: &mut Bench) -> Result<(String, String), Option<String>> {
+    fn look(&mut self, planted: &InjectedFault, bench: &mut Bench) -> Result<(String, String), Option<String>> {
         let (scenes, mut refused) = (bench.scenes(), None);
         for (n, pass) in PASSES.iter().enumerate() {
             let concerned = (0..scenes.len()).filter(|s| planted.change.concerns(pass, &scenes[*s].1));

@@ -1,10 +1,10 @@
 //! Faults of rays, of what they leap over, and of light.
 
 use super::list::{number, set, swap, times};
-use crate::passes::planted::{Change, Planted};
+use crate::passes::fault_injection::{Change, InjectedFault};
 use crate::passes::{Params, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::bent::added;
+use crate::spirv::mutate::added;
 use half::f16;
 
 /// Rays of pixels half a pixel to the right.
@@ -36,13 +36,13 @@ fn rounded_to_half(values: &mut [f32]) {
     values.iter_mut().for_each(|v| *v = f16::from_f32(*v).to_f32());
 }
 
-pub(super) const FAULTS: &[Planted] = &[
-    Planted {
+pub(super) const FAULTS: &[InjectedFault] = &[
+    InjectedFault {
         name: "shifted half pixel",
         what: "rays start at the corners of pixels",
         change: Change::Numbers { pass: "raycast_", by: shifted },
     },
-    Planted {
+    InjectedFault {
         name: "picture transposed",
         what: "columns and rows of rays change places",
         change: Change::Numbers {
@@ -53,7 +53,7 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "off-by-one LUT",
         what: "every entry of the sweep's table is the one after it",
         change: Change::Table {
@@ -64,27 +64,27 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "table in half precision",
         what: "the sweep's table is stored with 11 bits",
         change: Change::Table { slot: Slot::SweepLut, by: |_, values| rounded_to_half(values) },
     },
-    Planted {
+    InjectedFault {
         name: "absorption in half precision",
         what: "small absorption is lost with its digits",
         change: Change::Table { slot: Slot::Transfer, by: |_, values| rounded_to_half(values) },
     },
-    Planted {
+    InjectedFault {
         name: "wrong opacity correction",
         what: "opacities hold for a length 1 % off",
         change: Change::Numbers { pass: "raycast_volume", by: |_, params| times(params, "absorption_scale", 1.01) },
     },
-    Planted {
+    InjectedFault {
         name: "lost last step",
         what: "rays end a step before the volume does",
         change: Change::Numbers { pass: "raycast_volume", by: ends_early },
     },
-    Planted {
+    InjectedFault {
         name: "region off",
         what: "the box that is rendered lies half a pixel of a slice aside",
         change: Change::Numbers {
@@ -95,7 +95,7 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "early detector",
         what: "every surface is found 2 um early",
         change: Change::Shader {
@@ -103,18 +103,18 @@ pub(super) const FAULTS: &[Planted] = &[
             by: |words| added(words, "distance_map", [-2e-3, 0.0, 0.0, 0.0]),
         },
     },
-    Planted {
+    InjectedFault {
         name: "higher threshold",
         what: "the detector wants 2 % more contrast than was asked for",
         change: Change::Numbers { pass: "raycast_surface", by: |_, params| times(params, "threshold", 1.02) },
     },
-    Planted {
+    InjectedFault {
         name: "the motor's motion ignored",
         what: "all lines of a frame lie where its first does",
         change: Change::Numbers { pass: "raycast_", by: |_, params| set(params, "advance", 0.0) },
     },
-    Planted { name: "nearest neighbour", what: "the sampler does not filter", change: Change::Nearest },
-    Planted {
+    InjectedFault { name: "nearest neighbour", what: "the sampler does not filter", change: Change::Nearest },
+    InjectedFault {
         name: "colour channels swapped",
         what: "red and blue of the transfer function change places",
         change: Change::Table {
@@ -122,7 +122,7 @@ pub(super) const FAULTS: &[Planted] = &[
             by: |_, values| values.chunks_exact_mut(4).for_each(|entry| entry.swap(0, 2)),
         },
     },
-    Planted {
+    InjectedFault {
         name: "off-by-one row",
         what: "the pre-integrated table is entered a row of 256 too far",
         change: Change::Table {
@@ -133,12 +133,12 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "leap one brick too far",
         what: "the distance to the next brick of another kind is counted from the one behind",
         change: Change::Shader { pass: "leap_", by: |words| added(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]) },
     },
-    Planted {
+    InjectedFault {
         name: "brick taken for empty",
         what: "bricks a hundredth above the threshold are leapt over",
         change: Change::Numbers {
@@ -152,7 +152,7 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "clip plane's sign",
         what: "a clip plane keeps what it should cut",
         change: Change::Numbers {
@@ -166,17 +166,17 @@ pub(super) const FAULTS: &[Planted] = &[
             },
         },
     },
-    Planted {
+    InjectedFault {
         name: "wrong volume image",
         what: "of the volumes that take turns the first is shown, whichever was asked for",
-        change: Change::Turn { pass: "raycast_", by: |_, turn| turn.image = 0 },
+        change: Change::DispatchArgs { pass: "raycast_", by: |_, args| args.image = 0 },
     },
-    Planted {
+    InjectedFault {
         name: "ambient and diffuse swapped",
         what: "two numbers in the wrong order",
         change: Change::Numbers { pass: "light", by: |_, params| swap(params, "ambient", "diffuse") },
     },
-    Planted {
+    InjectedFault {
         name: "shadow softness",
         what: "edges of shadows are a tenth too wide",
         change: Change::Numbers { pass: "shadow", by: |_, params| times(params, "softness", 1.1) },

@@ -7,6 +7,10 @@ mod files;
 mod kiosk;
 mod motor;
 mod network;
+// Not the whole of `common`: tools/fuzz has this folder without the rest of the tests.
+#[allow(dead_code)]
+#[path = "../../common/probes.rs"]
+mod probes;
 mod reports;
 mod scenes;
 mod voxels;
@@ -67,7 +71,7 @@ pub const TARGETS: &[Target] = &[
         memory: 64 * MIB,
         rounds: 80_000,
         also: &[
-            "tests/motor/probe.toml",
+            "tests/data/motor/probe.toml",
             "tests/data/wobbler-4dc7/probe.toml",
             "tests/data/ultrasonix-curvilinear/probe.toml",
         ],

@@ -1,12 +1,12 @@
 //! What an earlier run wrote, and ordinary pictures.
 
 use super::{told, written};
+use echolume::error_report::{Measure, Report, choose, summary_table};
 use echolume::picture::grey::Grey;
-use echolume::report::curves::{Measure, Report, choose, table};
-use echolume::report::profile::{compare, formats, table as passes};
-use echolume::report::verify::{baseline, html as page, json as verified, junit, words};
+use echolume::profile::{compare, formats, table as passes};
 #[cfg(feature = "view")]
-use echolume::ui::ladder;
+use echolume::ui::quality_ladder;
+use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -17,14 +17,14 @@ pub fn error_report(bytes: &[u8]) -> String {
     assert_eq!(Report::from_json(&written).expect("what was written is right"), report);
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
-        table::table(&report, measure);
+        summary_table::table(&report, measure);
         outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
         outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
     }
     #[cfg(not(feature = "view"))]
     let rungs = 0;
     #[cfg(feature = "view")]
-    let rungs = ladder::measured(&report).map_or(0, |rungs| rungs.len());
+    let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
     format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
 }
 

@@ -1,25 +1,16 @@
 //! Settings from files and the command line. What is accepted must make a scene or be refused, and a scene a plan.
 
+use super::probes::wobbler;
 use super::{told, written};
-use echolume::passes::Turn;
+use echolume::passes::DispatchArgs;
 use echolume::plan::Plan;
-use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
+use echolume::probe::{Advance, Axis, Geometry, Grid, Motion, Probe};
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene, Settings, transfer};
 use echolume::source::StoredType;
 
 fn geometries() -> [Geometry; 3] {
-    let fan = Probe {
-        array: Array::Curved { radius: 30.0 },
-        lines: Axis::centred(0.05, 16),
-        start_depth: 0.0,
-        sample_pitch: 0.5,
-        samples: 64,
-        motion: Motion::Fan { wobble_radius: 15.0 },
-        slices: Axis::centred(0.05, 8),
-        advance: Advance::Same(0.02),
-        sound_speed: 1540.0,
-    };
+    let fan = Probe { advance: Advance::Same(0.02), ..wobbler() };
     let still = Motion::Still { thickness: 1.0 };
     let frame = Probe { motion: still, slices: Axis::centred(1.0, 1), advance: Advance::None, ..fan.clone() };
     let grid = Grid { size: [9, 8, 7], spacing: [1.0, 0.5, 2.0], origin: [-4.0, 0.0, -6.0] };
@@ -43,9 +34,9 @@ fn planned(settings: &Settings) -> String {
             assert!(!plan.steps.is_empty() && plan.bytes(&scene) > 0);
             assert!(!plan.explain(&scene).is_empty());
             for step in &plan.steps {
-                let (pass, turn) = (step.pass, Turn { iteration: step.iteration, ..Turn::default() });
-                pass.invocations(&scene, &turn);
-                let _ = ((pass.shader)(&scene, &turn), (pass.constants)(&scene, &turn));
+                let (pass, args) = (step.pass, DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() });
+                pass.invocations(&scene, &args);
+                let _ = ((pass.shader)(&scene, &args), (pass.constants)(&scene, &args));
             }
             let _ = (Plan::new(&usual).rerun(&usual, &scene), plan.rerun(&scene, &usual), plan.rerun(&scene, &scene));
             outcome += &format!("{:?}", scene.settings.mode);

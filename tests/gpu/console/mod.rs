@@ -1,13 +1,13 @@
 //! The console without a screen: what hands do on one side, pictures on the other, and whatever goes wrong in between.
 
-mod amiss;
-mod hands;
+mod failures;
+mod gestures;
+mod idle;
 mod monkey;
-mod rest;
 
-use crate::common::*;
+use crate::common::gpu::*;
 use crate::live::header;
-use crate::live_kept::{BOUND, Fed, ROOM};
+use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
 use echolume::live::Update;
 use echolume::live::views::Views;
@@ -18,9 +18,8 @@ use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
 use echolume::ui::console::{Console, ConsoleError, Next, Options};
 use echolume::ui::input::{Button, Input, Key, Modifiers};
-use echolume::ui::ladder;
-use echolume::ui::supply::Open;
-use std::path::PathBuf;
+use echolume::ui::quality_ladder;
+use echolume::ui::source_supervisor::Open;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -42,7 +41,7 @@ pub fn options() -> Options {
         queues: None,
         cine: ROOM,
         budget: None,
-        rungs: ladder::built_in(),
+        rungs: quality_ladder::built_in(),
         retry: None,
         record: None,
         folder: std::env::temp_dir(),
@@ -56,14 +55,7 @@ pub fn options() -> Options {
     }
 }
 
-/// A folder of this test alone, gone with it.
-pub struct Folder(pub PathBuf);
-
 impl Folder {
-    pub fn new(name: &str) -> Folder {
-        Folder(std::env::temp_dir().join(format!("echolume-{name}-{}", std::process::id())))
-    }
-
     /// The first file with this ending, once it can be read.
     pub fn wait<T>(&self, ending: &str, mut read: impl FnMut(&std::path::Path) -> Option<T>) -> T {
         let begun = Instant::now();
@@ -75,12 +67,6 @@ impl Folder {
             }
             std::thread::sleep(Duration::from_millis(2));
         }
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 

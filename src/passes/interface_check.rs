@@ -1,0 +1,184 @@
+//! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
+
+use super::slots::{Format, Shape};
+use super::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
+use crate::scene::Scene;
+use crate::spirv::hoist_uniforms::hoisted;
+use crate::spirv::strip_bindings::without;
+use crate::spirv::tables::as_texels;
+use crate::spirv::texture_to_storage::{ImageFormat, as_storage};
+use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
+
+/// Textures that a shader has and a pass need not: what rays leap by, and quads. Specialization constants say whether they are read.
+const OPTIONAL: [&str; 2] = ["bricks", "quads"];
+
+/// A pass's shader without the textures that this scene has not.
+///
+/// # Errors
+/// A module that breaks the format.
+pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
+    let bound = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+    let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
+    without(words, &absent).map_err(|e| e.to_string())
+}
+
+/// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
+/// tables as storage texel buffers, where `stores` says that the slot can be one.
+///
+/// # Errors
+/// A module that breaks the format.
+pub fn for_cpu(
+    pass: &Pass,
+    scene: &Scene,
+    args: &DispatchArgs,
+    words: &[u32],
+    stores: impl Fn(Slot) -> bool,
+) -> Result<Vec<u32>, String> {
+    let module = spirv::reflect(words).map_err(|e| e.to_string())?;
+    let is_texture = |bind: &Bind| {
+        let binding = module.bindings.iter().find(|b| b.name == bind.name);
+        binding.is_some_and(|b| matches!(b.kind, Kind::Sampled | Kind::Filtered))
+    };
+    let textures: Vec<_> = (pass.reads)(scene, args)
+        .into_iter()
+        .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
+        .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
+        .collect();
+    let words = hoisted(words).and_then(|words| as_storage(&words, &textures)).map_err(|e| e.to_string())?;
+    let reads = (pass.reads)(scene, args);
+    as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
+}
+
+fn image_format(format: Format) -> Option<ImageFormat> {
+    Some(match format {
+        Format::R8 => ImageFormat::R8,
+        Format::R16 => ImageFormat::R16,
+        Format::R16f => ImageFormat::R16f,
+        Format::R32f => ImageFormat::R32f,
+        Format::Rg16 => ImageFormat::Rg16,
+        Format::Rg16f => ImageFormat::Rg16f,
+        Format::Rg32f => ImageFormat::Rg32f,
+        Format::R32u => ImageFormat::R32ui,
+        Format::Rg32u => ImageFormat::Rg32ui,
+        Format::Rgba16f => ImageFormat::Rgba16f,
+        Format::Rgba32f => ImageFormat::Rgba32f,
+        Format::Rgba8 => ImageFormat::Rgba8,
+        Format::Floats => return None,
+    })
+}
+
+/// The first disagreement, naming both sides.
+pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
+    let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
+    for bind in &reads {
+        check_bind(scene, module, bind, Access::Read)?;
+    }
+    for bind in &writes {
+        check_bind(scene, module, bind, Access::Write)?;
+    }
+    for binding in module.bindings.iter().filter(|b| b.kind != Kind::Params) {
+        if !reads.iter().chain(&writes).any(|b| b.name == binding.name) {
+            return Err(format!("glsl declares '{}', the pass neither reads nor writes it", binding.name));
+        }
+    }
+    check_params(module, &pass.numbers(scene, args))?;
+    let constants = (pass.constants)(scene, args);
+    for (name, _) in &constants {
+        if !module.constants.iter().any(|c| c.name == *name) {
+            return Err(format!("the pass sets constant '{name}', glsl has none of that name"));
+        }
+    }
+    for constant in &module.constants {
+        if !constants.iter().any(|(name, _)| *name == constant.name) {
+            return Err(format!("glsl has constant '{}', the pass does not set it", constant.name));
+        }
+    }
+    match module.local_size[0] % 8 {
+        0 => Ok(()),
+        _ => Err(format!("workgroup width {} is no multiple of 8", module.local_size[0])),
+    }
+}
+
+fn check_bind(scene: &Scene, module: &Module, bind: &Bind, access: Access) -> Result<(), String> {
+    let verb = if access == Access::Read { "reads" } else { "writes" };
+    let Some(binding) = module.bindings.iter().find(|b| b.name == bind.name) else {
+        return Err(format!("the pass {verb} '{}', glsl declares nothing of that name", bind.name));
+    };
+    if binding.access != access {
+        return Err(format!("glsl declares '{}' {:?}, the pass {verb} it", bind.name, binding.access));
+    }
+    if bind.filtered && binding.kind != Kind::Filtered {
+        return Err(format!("glsl declares '{}' {:?}, the pass takes filtered samples of it", bind.name, binding.kind));
+    }
+    let declared = binding.dimension;
+    let there = match (bind.slot.shape(scene), bind.part) {
+        (Shape::Two(_), _) | (Shape::Layers(_), Part::Layer) => Dimension::Two,
+        (Shape::Layers(_), _) => Dimension::Layers,
+        (Shape::Three(_), _) => Dimension::Three,
+        (Shape::Buffer(_), _) => Dimension::None,
+    };
+    match declared == there {
+        true => Ok(()),
+        false => Err(format!("glsl declares '{}' {declared:?}, slot '{}' is {there:?}", bind.name, bind.slot.name())),
+    }
+}
+
+fn check_params(module: &Module, params: &Params) -> Result<(), String> {
+    for (i, (name, _)) in params.0.iter().enumerate() {
+        if params.0[..i].iter().any(|(n, _)| n == name) {
+            return Err(format!("the pass sets parameter '{name}' twice"));
+        }
+        // A block that a variant does not use at all is optimised away.
+        if !module.params.is_empty() && !module.params.iter().any(|m| m.name == *name) {
+            return Err(format!("the pass sets parameter '{name}', glsl has none of that name"));
+        }
+    }
+    for member in &module.params {
+        let Some((_, value)) = params.0.iter().find(|(name, _)| *name == member.name) else {
+            return Err(format!("glsl has parameter '{}', the pass does not set it", member.name));
+        };
+        if !fits(member, value) {
+            return Err(format!("glsl declares '{}' as {}, the pass sets {value:?}", member.name, type_name(member)));
+        }
+    }
+    Ok(())
+}
+
+fn fits(member: &Member, value: &Value) -> bool {
+    match value {
+        Value::F32(_) => member.is_float && member.components == 1,
+        Value::I32(_) => !member.is_float && member.is_signed && member.components == 1,
+        Value::Vec2(_) => member.is_float && member.components == 2,
+        Value::Vec3(_) => member.is_float && member.components == 3,
+        Value::Vec4(_) => member.is_float && member.components == 4,
+    }
+}
+
+fn type_name(member: &Member) -> String {
+    let scalar = if member.is_float {
+        "float"
+    } else if member.is_signed {
+        "int"
+    } else {
+        "uint"
+    };
+    if member.components == 1 { scalar.into() } else { format!("{scalar} x {}", member.components) }
+}
+
+/// The parameter block as the shader lays it out.
+pub fn pack(module: &Module, params: &Params) -> Vec<u8> {
+    let mut block = vec![0; module.params_size as usize];
+    for member in &module.params {
+        let Some((_, value)) = params.0.iter().find(|(name, _)| *name == member.name) else { continue };
+        let words: &[u8] = match value {
+            Value::F32(v) => bytemuck::bytes_of(v),
+            Value::I32(v) => bytemuck::bytes_of(v),
+            Value::Vec2(v) => bytemuck::bytes_of(v),
+            Value::Vec3(v) => bytemuck::bytes_of(v),
+            Value::Vec4(v) => bytemuck::bytes_of(v),
+        };
+        let at = member.offset as usize;
+        block[at..at + words.len()].copy_from_slice(words);
+    }
+    block
+}

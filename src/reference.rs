@@ -1,0 +1,62 @@
+//! The four stages in f64 on the CPU: every step of a plan by its reference, slots as plain arrays. What goldens are made of,
+//! and what error is measured against where it is fast enough.
+
+use crate::passes::slots::{Initializer, Shape};
+use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain};
+use crate::plan::{Plan, Step};
+use crate::scene::Scene;
+use std::collections::BTreeMap;
+
+/// Renders `frames` (values as the frame's texture yields them, one array a slice, in geometric order). Returns every slot.
+pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
+    let plan = Plan::new(scene);
+    let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
+    for (slice, frame) in frames.iter().enumerate() {
+        if let Some(volume) = chain::copied(scene).and_then(|slot| slots.get_mut(&slot)) {
+            for (x, y) in (0..frame.size[1]).flat_map(|y| (0..frame.size[0]).map(move |x| (x, y))) {
+                volume.set([x, y, slice], frame.get([x, y, 0]));
+            }
+        }
+        slots.insert(Slot::Frames, frame.clone());
+        for (_, step) in plan.steps_of(Frequency::Frame) {
+            run(scene, step, &DispatchArgs { slice: slice as u32, ..step.args() }, &mut slots);
+        }
+    }
+    for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
+        run(scene, step, &DispatchArgs { slices: scene.slices(), ..step.args() }, &mut slots);
+    }
+    slots
+}
+
+/// A slot as the device holds it before any pass: zero, or made from the scene.
+fn empty(slot: Slot, scene: &Scene) -> Texels {
+    let format = slot.format(scene);
+    let size = match slot.shape(scene) {
+        Shape::Two([w, h]) => [w as usize, h as usize, 1],
+        Shape::Layers([w, h, _]) => [w as usize, h as usize, 1],
+        Shape::Three(n) => n.map(|n| n as usize),
+        Shape::Buffer(bytes) => [bytes as usize / 4, 1, 1],
+    };
+    let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
+    if let Initializer::ByScene(make) = slot.filled() {
+        texels.values = make(scene).into_iter().map(f64::from).collect();
+    }
+    texels
+}
+
+fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>) {
+    let (reads, writes) = ((step.pass.reads)(scene, args), (step.pass.writes)(scene, args));
+    let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+    // A plan lists every slot that its steps name, and no step reads what it writes.
+    let missing = || Texels::untouched([0; 3], 1);
+    for bind in &reads {
+        inputs.insert(bind.name, slots.get(&bind.slot).cloned().unwrap_or_else(missing));
+    }
+    for bind in &writes {
+        outputs.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(missing));
+    }
+    (step.pass.reference)(scene, args, &inputs, &mut outputs);
+    for bind in writes {
+        slots.insert(bind.slot, outputs.get(bind.name).clone());
+    }
+}

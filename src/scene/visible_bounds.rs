@@ -1,0 +1,303 @@
+//! What of the volume can be seen: the texels that any sample of stage 2 may touch. Stage 1 makes no others (after Solteszova
+//! and others 2017, who filter only what a picture shows). The camera does not enter: it may turn at any time.
+
+use super::{Layout, Mode, RING, Scene, SliceGrid};
+use crate::probe::{Array, Geometry, Motion, Probe};
+use glam::{DMat3, DVec3};
+use std::ops::Range;
+
+/// Texels by which a place may be off in f32, and in the device's filter.
+const SLACK: f64 = 0.5;
+
+/// A box of texels of the volume, columns, rows and slices: from `low` up to `high`, which is no part of it. Empty: all zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VisibleBounds {
+    pub low: [u32; 3],
+    pub high: [u32; 3],
+}
+
+impl VisibleBounds {
+    /// All of a volume of that size.
+    pub fn all(size: [u32; 3]) -> VisibleBounds {
+        VisibleBounds { low: [0; 3], high: size }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        (0..3).any(|a| self.low[a] >= self.high[a])
+    }
+
+    /// Whether every texel of the other is one of this.
+    pub fn holds(&self, other: &VisibleBounds) -> bool {
+        other.is_empty() || (0..3).all(|a| self.low[a] <= other.low[a] && other.high[a] <= self.high[a])
+    }
+
+    pub fn slices(&self) -> Range<u32> {
+        self.low[2]..self.high[2]
+    }
+
+    /// The box around both.
+    pub fn with(self, other: VisibleBounds) -> VisibleBounds {
+        if self.is_empty() || other.is_empty() {
+            return if self.is_empty() { other } else { self };
+        }
+        VisibleBounds {
+            low: std::array::from_fn(|a| self.low[a].min(other.low[a])),
+            high: std::array::from_fn(|a| self.high[a].max(other.high[a])),
+        }
+    }
+}
+
+/// Where samples of a pass lie: in a box, on the near side of every plane, or at most `reach` mm outside of all that.
+struct Look {
+    low: DVec3,
+    high: DVec3,
+    /// Outward unit normals and limits, mm.
+    planes: Vec<(DVec3, f64)>,
+    reach: f64,
+}
+
+impl Scene {
+    /// The same scene with slices on another lattice.
+    pub fn on_grid(mut self, grid: SliceGrid) -> Scene {
+        self.grid = grid;
+        self.seen = seen(&self);
+        self
+    }
+
+    /// The frames that stage 1 needs: what is seen, and the slices that smoothing across slices reaches.
+    pub fn frames_seen(&self) -> Range<u32> {
+        let reach = self.smoothing_radius()[2];
+        let Range { start, end } = self.seen.slices();
+        if self.seen.is_empty() { 0..0 } else { start.saturating_sub(reach)..(end + reach).min(self.slices()) }
+    }
+
+    /// Share of the volume's texels that are seen.
+    pub fn share_seen(&self) -> f64 {
+        let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();
+        texels(std::array::from_fn(|a| self.seen.high[a] - self.seen.low[a])) / texels(self.volume_size())
+    }
+}
+
+/// The texels that the samples of a scene may touch.
+pub(super) fn seen(scene: &Scene) -> VisibleBounds {
+    let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
+    if scene.settings.slices.everything || counts_growth {
+        return VisibleBounds::all(scene.volume_size());
+    }
+    looks(scene).iter().filter_map(|look| touched(scene, look)).fold(VisibleBounds::default(), VisibleBounds::with)
+}
+
+fn looks(scene: &Scene) -> Vec<Look> {
+    let clips: Vec<(DVec3, f64)> = scene.clips().collect();
+    let look =
+        |low, planes: &[_], steps| Look { low, high: scene.high, planes: planes.to_vec(), reach: reach(scene, steps) };
+    // Of a filter that slides along the ray: its taps along and across, beyond the last step that begins within the region.
+    let sliding = match scene.settings.ray.sliding {
+        0 => 0,
+        edge => edge + 1,
+    };
+    let mut looks = Vec::new();
+    if scene.detects_surface() {
+        let ring = RING / 2 * scene.settings.surface.rough + RING;
+        let mut look = look(scene.surface_view().low, &clips, ring + sliding);
+        look.reach += f64::from(scene.samples_behind()) * scene.step;
+        looks.push(look);
+    }
+    if scene.composites() {
+        looks.push(look(scene.volume_view().low, &clips, sliding));
+    }
+    match scene.settings.mode {
+        Mode::Mip | Mode::MinIp | Mode::Mean => looks.push(look(scene.projection_view().low, &clips, sliding)),
+        Mode::Cube => {
+            let block: Vec<_> = scene.block().iter().map(|half| (half.normal, half.limit)).collect();
+            looks.push(look(scene.low, &block, 0));
+        }
+        _ => {}
+    }
+    if scene.is_flat() || scene.settings.layout == Layout::Four {
+        looks.push(look(scene.low, &clips, 0));
+    }
+    looks
+}
+
+/// How far that many steps of a ray lead at most, mm. Steps that grow go on growing outside of the region.
+pub(super) fn reach(scene: &Scene, steps: u32) -> f64 {
+    let steps = f64::from(steps);
+    let (mut widest, mut growth) = (1.0, 0.0);
+    if let Some(probe) = scene.probe().filter(|_| scene.spreads()) {
+        // As the ray casters have it: in proportion to the range, from this one on.
+        let (spread, from) = (scene.settings.ray.spread, probe.first_range().max(probe.last_range() / 8.0).max(1e-6));
+        widest = 1.0 + spread * 7.0;
+        growth = scene.step * spread / from;
+    }
+    (scene.step * widest * steps * ((steps + 1.0) * growth).exp()).min(1e7)
+}
+
+/// Lowest and highest of what is added to it.
+#[derive(Clone, Copy)]
+struct Span(f64, f64);
+
+impl Span {
+    fn of(values: impl Iterator<Item = f64>) -> Span {
+        values.fold(Span(f64::MAX, f64::MIN), |s, v| Span(s.0.min(v), s.1.max(v)))
+    }
+
+    fn within(self, low: f64, high: f64) -> Span {
+        Span(self.0.max(low), self.1.min(high))
+    }
+
+    /// The number of it that is nearest to zero.
+    fn least(self) -> f64 {
+        0f64.clamp(self.0, self.1.max(self.0))
+    }
+
+    fn most(self) -> f64 {
+        self.0.abs().max(self.1.abs())
+    }
+}
+
+fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
+    let (mut low, mut high) = (look.low - look.reach, look.high + look.reach);
+    if let Geometry::Sweep(probe) = &scene.geometry {
+        // What is not insonified is not sampled. A single frame is, wherever it is looked at along its thickness.
+        let (first, last) = probe.bounds();
+        let thick = matches!(probe.motion, Motion::Still { .. });
+        let nudge = 1e-9 * (1.0 + first.abs().max(last.abs()).max_element());
+        let axes = if thick { 0..2 } else { 0..3 };
+        for axis in axes {
+            (low[axis], high[axis]) = (low[axis].max(first[axis] - nudge), high[axis].min(last[axis] + nudge));
+        }
+    }
+    let planes: Vec<_> = look.planes.iter().map(|(normal, limit)| (*normal, limit + look.reach)).collect();
+    let corners = corners(low, high, &planes);
+    if corners.is_empty() {
+        return None;
+    }
+    let along = |axis: usize| Span::of(corners.iter().map(|c| c[axis]));
+    let [column, row, slice] = match &scene.geometry {
+        Geometry::Cartesian(grid) => std::array::from_fn(|a| {
+            Span((along(a).0 - grid.origin[a]) / grid.spacing[a], (along(a).1 - grid.origin[a]) / grid.spacing[a])
+        }),
+        Geometry::Sweep(probe) => {
+            let (x, y, position) = unswept(probe, &corners, along(0), along(1), along(2));
+            let (x, y) = in_sector(probe, x, y);
+            let index = |v: Span, axis: usize| {
+                let (origin, pitch) = (scene.grid.origin[axis], scene.grid.pitch[axis]);
+                Span((v.0 - origin) / pitch, (v.1 - origin) / pitch)
+            };
+            [index(x, 0), index(y, 1), slices(scene, probe, position)]
+        }
+    };
+    let size = scene.volume_size();
+    let texel = |index: f64, axis: usize| index.floor().clamp(0.0, f64::from(size[axis] - 1)) as u32;
+    let spans = [column, row, slice];
+    let seen = VisibleBounds {
+        low: std::array::from_fn(|a| texel(spans[a].0 - SLACK, a)),
+        high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0, a) + 1),
+    };
+    // The sector may leave nothing of what lies within its bounds.
+    Some(seen).filter(|seen| !seen.is_empty())
+}
+
+/// In-plane x and y and slice positions of a convex solid that has these corners.
+fn unswept(probe: &Probe, corners: &[DVec3], x: Span, y: Span, z: Span) -> (Span, Span, Span) {
+    let Motion::Fan { .. } = probe.motion else { return (x, y, z) };
+    let axis = probe.axis_depth();
+    // All of the sector lies beyond the axis, and with it the solid. There a plane of constant angle cuts the solid in two, so
+    // that angles, as the largest distance from the axis, are extreme at corners; the least distance need not be.
+    let beyond = Span((y.0 - axis).max(0.0), y.1 - axis);
+    let angle = Span::of(corners.iter().map(|c| c.z.atan2((c.y - axis).max(1e-12))));
+    let farthest = corners.iter().map(|c| (c.y - axis).hypot(c.z)).fold(0.0, f64::max);
+    (x, Span(beyond.least().hypot(z.least()) + axis, farthest + axis), angle)
+}
+
+/// What the sector leaves of a rectangle in the plane of a frame.
+fn in_sector(probe: &Probe, x: Span, y: Span) -> (Span, Span) {
+    let (low, high) = probe.plane_bounds();
+    let (mut x, mut y) = (x.within(low[0], high[0]), y.within(low[1], high[1]));
+    if let Array::Curved { .. } = probe.array {
+        let chord = |range: f64, across: f64| (range * range - across * across).max(0.0).sqrt();
+        y = y.within(chord(probe.first_range(), x.most()), chord(probe.last_range(), x.least()));
+        let (first, last) = (probe.lines.first().tan(), probe.lines.last().tan());
+        let side = |tangent: f64, far: bool| tangent * if (tangent > 0.0) == far { y.1 } else { y.0 };
+        let half = chord(probe.last_range(), y.least());
+        x = x.within(side(first, false).max(-half), side(last, true).min(half));
+    }
+    (x, y)
+}
+
+/// Slice indices at slice positions, whichever line shows them.
+fn slices(scene: &Scene, probe: &Probe, position: Span) -> Span {
+    let (first, last) = probe.slice_bounds();
+    let slack = match probe.motion {
+        Motion::Still { .. } => return Span(0.0, 0.0),
+        Motion::Translated => 0.0,
+        // The ray casters go between entries of a table over the half tangent t: off by h^2/8 of (2 atan t)'' at most.
+        Motion::Fan { .. } => {
+            let h = ((last / 2.0).tan() - (first / 2.0).tan()) / f64::from(scene.settings.ray.entries - 1);
+            1.3 * h * h / 8.0
+        }
+    };
+    // The slice that is at a place when a line fires falls or rises with the line all the way.
+    let lines = [0.0, (probe.lines.len() - 1) as f64];
+    let at = |position: f64| lines.map(|line| probe.slice_index(position, line));
+    let ([a, b], [c, d]) = (at(position.0 - slack), at(position.1 + slack));
+    Span(a.min(b), c.max(d))
+}
+
+/// Corners of what planes (outward normals and limits) leave of a box.
+fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
+    if (0..3).any(|a| low[a] > high[a]) {
+        return Vec::new();
+    }
+    let sides = DVec3::AXES.iter().enumerate().flat_map(|(a, n)| [(-*n, -low[a]), (*n, high[a])]);
+    let all: Vec<(DVec3, f64)> = sides.chain(planes.iter().copied()).collect();
+    let tolerance = 1e-6 * (1.0 + low.abs().max(high.abs()).max_element());
+    let mut corners = Vec::new();
+    for (i, a) in all.iter().enumerate() {
+        for (j, b) in all.iter().enumerate().skip(i + 1) {
+            for c in all.iter().skip(j + 1) {
+                let across = DMat3::from_cols(a.0, b.0, c.0).transpose();
+                // Planes that are nearly parallel add no corner that another two do not.
+                if across.determinant().abs() < 1e-6 {
+                    continue;
+                }
+                let corner = across.inverse() * DVec3::new(a.1, b.1, c.1);
+                if all.iter().all(|(normal, limit)| normal.dot(corner) <= limit + tolerance) {
+                    corners.push(corner);
+                }
+            }
+        }
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::{Advance, Axis};
+    use crate::scene::{Input, Settings};
+    use crate::source::StoredType;
+
+    #[test]
+    fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
+        let probe = Probe {
+            array: Array::Curved { radius: 20.0 },
+            lines: Axis::centred(0.05, 24),
+            start_depth: 2.0,
+            sample_pitch: 0.8,
+            samples: 64,
+            motion: Motion::Fan { wobble_radius: 12.0 },
+            slices: Axis::centred(0.06, 9),
+            advance: Advance::None,
+            sound_speed: 1540.0,
+        };
+        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+        for side in [[30.0, 38.0], [-38.0, -30.0]] {
+            let settings = format!("mode = 'mip'\nregion = {{ lateral = {side:?}, depth = [2, 6] }}");
+            let settings: Settings = toml::from_str(&settings).expect("settings");
+            let scene = Scene::new(Geometry::Sweep(probe.clone()), input, settings).expect("scene");
+            assert_eq!((scene.seen, scene.share_seen(), scene.frames_seen()), (VisibleBounds::default(), 0.0, 0..0));
+        }
+    }
+}

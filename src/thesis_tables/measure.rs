@@ -1,0 +1,178 @@
+//! Tables 3-6 of the thesis measured on a device, and 7-9 on pictures: the scenes of [`crate::thesis_tables`] rendered again
+//! and again.
+
+use super::measure_growth::Fault;
+use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
+use crate::picture::grey::Grey;
+use crate::profile::machine;
+use crate::scene::{
+    EnhancedSigma, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth, VolumeFormat,
+};
+use crate::source::{Frame, Geometry, StoredType};
+use crate::thesis_tables::window_growth;
+use crate::thesis_tables::{Conditions, DEPTH, Filter3d, Grown, Reached, Report, Row, Table, tables};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Half the edge of the region that is rendered across the beam, mm: all of it lies within the sweep where the surfaces are.
+pub const HALF_REGION: f64 = 45.0;
+/// Sigma of the 2D filter, mm.
+const SIGMA: f64 = 0.5;
+
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    pub quick: bool,
+    /// Volumes measured in each row, and rendered before that.
+    pub repeats: usize,
+    pub warm_up: usize,
+}
+
+impl Asked {
+    /// Volumes rendered in all.
+    pub fn volumes(&self) -> usize {
+        tables(self.quick).iter().map(|t| t.rows.len()).sum::<usize>() * (self.repeats + self.warm_up)
+    }
+}
+
+/// Measures every row; `after_each` is called after every volume.
+///
+/// # Errors
+/// What the device cannot hold or do.
+pub fn run(context: &Arc<Context>, asked: &Asked, after_each: &mut dyn FnMut()) -> Result<Report, GpuError> {
+    let device = machine::device(context);
+    let mut tables = tables(asked.quick);
+    let mut sweeps: BTreeMap<usize, Vec<Frame>> = BTreeMap::new();
+    for row in tables.iter().flat_map(|t| &t.rows) {
+        let Conditions { frames, lines, .. } = row.conditions;
+        sweeps.entry(frames).or_insert_with(|| super::sweep::frames(frames, lines));
+    }
+    for table in &mut tables {
+        measure(context, table, &sweeps, asked, after_each)?;
+    }
+    Ok(Report {
+        device,
+        program: machine::program(),
+        date: machine::date(),
+        quick: asked.quick,
+        repeats: asked.repeats,
+        warm_up: asked.warm_up,
+        tables,
+        grown: Vec::new(),
+    })
+}
+
+/// The rows of one table in turns, so that what else the machine does falls on all of them alike.
+fn measure(
+    context: &Arc<Context>,
+    table: &mut Table,
+    sweeps: &BTreeMap<usize, Vec<Frame>>,
+    asked: &Asked,
+    after_each: &mut dyn FnMut(),
+) -> Result<(), GpuError> {
+    let mut renderers = Vec::new();
+    for row in &table.rows {
+        let scene = scene(&row.conditions).map_err(|e| broken(&e))?;
+        renderers.push(Renderer::new(context, scene, &Options::default())?);
+    }
+    for n in 0..asked.warm_up + asked.repeats {
+        for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {
+            for frame in sweeps.get(&row.conditions.frames).into_iter().flatten() {
+                renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
+            }
+            renderer.show(0)?;
+            renderer.picture()?;
+            let times = renderer.take_times()?;
+            if n >= asked.warm_up {
+                add(row, &times);
+            }
+            after_each();
+        }
+    }
+    for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {
+        row.reached = reached(renderer)?;
+    }
+    Ok(())
+}
+
+/// Copies to and from the device belong to no stage.
+fn add(row: &mut Row, times: &[PassTime]) {
+    // Without time stamps there is nothing, rather than nothing that took no time.
+    if times.is_empty() {
+        return;
+    }
+    let of = |is_first: bool| -> f64 {
+        let staged = times.iter().filter_map(|t| Some((by_name(t.name)?.stage, t.total)));
+        staged.filter(|(stage, _)| (*stage == Stage::Preprocess) == is_first).map(|(_, ns)| ns).sum()
+    };
+    row.times.preprocess.push(of(true));
+    row.times.picture.push(of(false));
+}
+
+fn reached(renderer: &mut Renderer) -> Result<Option<Reached>, GpuError> {
+    let Some(map) = renderer.read(Slot::Distance)? else { return Ok(None) };
+    // Parallel rays along the depth: all begin as deep.
+    let scene = renderer.scene();
+    let above = scene.rays.at(0.5, 0.5).0.y - scene.probe().map_or(0.0, |p| p.array_radius());
+    let depths: Vec<f64> = map.values.iter().filter(|t| is_hit(**t)).map(|t| above + t).collect();
+    let depth = depths.iter().sum::<f64>() / depths.len().max(1) as f64;
+    Ok(Some(Reached { share: depths.len() as f64 / map.values.len().max(1) as f64, depth }))
+}
+
+fn broken(error: &SceneError) -> GpuError {
+    GpuError::Broken(format!("the scene that measures: {error}"))
+}
+
+/// The scene of a row: no filter, light or shadow but what the thesis' conditions name. The rough detector is off, so that a
+/// ray takes all of its samples.
+///
+/// # Errors
+/// None for the conditions of [`tables`].
+pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
+    let n = conditions.volume;
+    let mut settings = Settings { mode: Mode::Surface, ..Settings::default() };
+    settings.picture.size = [n, n];
+    settings.slices.pixels = n;
+    settings.region.lateral = Some([-HALF_REGION, HALF_REGION]);
+    settings.region.elevation = Some([-HALF_REGION, HALF_REGION]);
+    settings.region.depth = Some([0.0, DEPTH]);
+    settings.ray.step = Some(DEPTH / f64::from(n));
+    // The thesis takes every sample.
+    settings.ray.brick = 0;
+    settings.surface.rough = 1;
+    settings.surface.place = Place::FirstCrossing;
+    settings.distance.sigma = Some(Sigma { window: conditions.filter_2d, sigma: SIGMA, ..Sigma::default() });
+    match conditions.filter_3d {
+        Filter3d::None => {}
+        Filter3d::Sliding(samples) => settings.ray.sliding = samples,
+        Filter3d::Kept(taps) => settings.slices.smooth = Some(Smooth { kernel: Some(taps), ..Smooth::default() }),
+    }
+    let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+    let probe = super::sweep::probe(conditions.frames, conditions.lines);
+    let (low, high) = probe.plane_bounds();
+    let scene = Scene::new(Geometry::Sweep(probe), input, settings)?;
+    // A slice's pixels are square otherwise, and a sector is wider than deep: n x n are denser in depth.
+    let pitch = [0, 1].map(|i| (high[i] - low[i]) / f64::from(n - 1));
+    Ok(scene.on_grid(SliceGrid { size: [n, n], origin: low, pitch }))
+}
+
+/// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).
+///
+/// # Errors
+/// Windows beyond what is filtered; a picture that the device cannot hold.
+pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, Fault> {
+    let windows = |sigma: f64| window_growth::WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
+    let rows =
+        super::measure_growth::measure(context, grey, window_growth::SIGMAS.into_iter().flat_map(windows).collect())?;
+    Ok(Grown { picture: picture.into(), rows })
+}
+
+/// A row of Tables 7-9.
+pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
+    let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
+    settings.picture.size = [1, 1];
+    settings.slices.format = VolumeFormat::R32f;
+    settings.slices.enhanced_sigma =
+        Some(EnhancedSigma { window, largest, sigma, growth: true, ..EnhancedSigma::default() });
+    settings
+}

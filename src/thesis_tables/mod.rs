@@ -1,0 +1,296 @@
+//! Tables 3-6 of the thesis (4.3), time per rendered volume in surface mode, beside this device's times: which rows there are,
+//! under which conditions, and what the thesis measured. Text is made in [`markdown`] and [`csv`]; nothing here
+//! measures.
+
+pub mod csv;
+pub mod markdown;
+pub mod measure;
+pub mod measure_growth;
+pub mod sweep;
+pub mod window_growth;
+
+use crate::profile::Device;
+use crate::profile::statistics::Sample;
+use crate::thesis_tables::window_growth::Growth;
+
+/// Thesis conditions, each unless varied (4.3): angles in deg, depth in mm.
+pub const SECTOR_ANGLE: f64 = 77.0;
+pub const FAN_ANGLE: f64 = 61.0;
+pub const DEPTH: f64 = 160.0;
+pub const SAMPLES: usize = 512;
+/// m/s.
+pub const SOUND_SPEED: f64 = 1540.0;
+/// What the thesis measured under all of those conditions, ms.
+const USUAL_MS: f64 = 54.6;
+
+/// The 3D filter on the volume's samples, and who makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filter3d {
+    None,
+    /// The thesis' own: along every ray, with a sliding front slice (`ray.sliding`). Samples along each edge.
+    Sliding(u32),
+    /// Separable, and kept up to date slice by slice in stage 1 (`slices.smooth.kernel`). Taps along each axis.
+    Kept(u32),
+}
+
+impl Filter3d {
+    pub fn name(self) -> String {
+        match self {
+            Filter3d::None => "none".into(),
+            Filter3d::Sliding(n) => format!("{n}x{n}x{n} along the ray"),
+            Filter3d::Kept(n) => format!("{n}x{n}x{n} slice by slice"),
+        }
+    }
+}
+
+/// What one row is measured under.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// Frames a volume.
+    pub frames: usize,
+    /// Scan lines a frame, of [`SAMPLES`] samples.
+    pub lines: usize,
+    /// n of n^3: slices of n x n pixels, n samples on a ray from the face to the end of the volume, picture of n x n pixels.
+    pub volume: u32,
+    pub filter_3d: Filter3d,
+    /// Edge of the sigma filter's window on the distance map, pixels.
+    pub filter_2d: u32,
+}
+
+impl Conditions {
+    /// The thesis', or a quarter of its volume's edge to try things with.
+    pub fn usual(quick: bool) -> Conditions {
+        let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
+        Conditions { frames: 37, lines, volume, filter_3d: Filter3d::Sliding(3), filter_2d: 9 }
+    }
+}
+
+/// Time on the device, ns, one entry a repeat.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Stages 2-4: what the thesis timed.
+    pub picture: Vec<f64>,
+    /// Stage 1, all frames of a volume.
+    pub preprocess: Vec<f64>,
+}
+
+/// Median, least and most of repeats, ms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    pub median: f64,
+    pub least: f64,
+    pub most: f64,
+}
+
+impl Spread {
+    /// None where nothing was measured.
+    pub fn new(ns: &[f64]) -> Option<Spread> {
+        let sample = Sample::new(ns).ok()?;
+        let [median, least, most] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
+        Some(Spread { median, least, most })
+    }
+}
+
+/// What the thesis measured in a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thesis {
+    /// ms a rendered volume.
+    pub ms: f64,
+    /// Its table has no such row: the figure is that of the same conditions in its other tables.
+    pub from_others: bool,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What is varied, in words.
+    pub label: String,
+    pub conditions: Conditions,
+    pub thesis: Thesis,
+    /// Empty until measured, and where the device has no time stamps.
+    pub times: Times,
+    /// None until measured.
+    pub reached: Option<Reached>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// As the thesis numbers it.
+    pub number: u32,
+    pub varied: &'static str,
+    pub rows: Vec<Row>,
+    /// The row of the usual conditions: ratios are to it.
+    pub usual: usize,
+}
+
+impl Table {
+    /// This row's median of stages 2-4 over that of the usual row.
+    pub fn ratio(&self, row: &Row) -> Option<f64> {
+        let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
+        let own = Spread::new(&row.times.picture)?;
+        (usual.median > 0.0).then(|| own.median / usual.median)
+    }
+
+    /// The same of the thesis' figures.
+    pub fn thesis_ratio(&self, row: &Row) -> Option<f64> {
+        self.rows.get(self.usual).map(|usual| row.thesis.ms / usual.thesis.ms)
+    }
+}
+
+/// Tables 3-6, not measured yet. A `quick` one has a quarter of every volume's edge.
+pub fn tables(quick: bool) -> Vec<Table> {
+    let usual = Conditions::usual(quick);
+    let table = |number, varied, rows: Vec<(String, Conditions, f64)>| {
+        let row = |(label, conditions, ms): (String, Conditions, f64)| {
+            // Table 6 leaves out what the other tables were measured with.
+            let from_others = number == 6 && conditions == usual;
+            Row { label, conditions, thesis: Thesis { ms, from_others }, times: Times::default(), reached: None }
+        };
+        let at = rows.iter().position(|(_, conditions, _)| *conditions == usual).unwrap_or(0);
+        Table { number, varied, rows: rows.into_iter().map(row).collect(), usual: at }
+    };
+    let frames = [(27, 53.7), (31, 54.0), (35, 54.6), (37, USUAL_MS)];
+    let volumes = [(128, 13.2), (256, 15.8), (384, 35.0), (512, USUAL_MS)];
+    let filters = [
+        (Filter3d::None, 21.5),
+        (Filter3d::Sliding(3), USUAL_MS),
+        (Filter3d::Sliding(5), 187.0),
+        (Filter3d::Kept(3), USUAL_MS),
+        (Filter3d::Kept(5), 187.0),
+    ];
+    let windows = [(3, 54.3), (5, 54.9), (7, 55.5), (9, USUAL_MS), (11, 56.8)];
+    let volume = |(n, ms): (u32, f64)| {
+        let edge = n / (512 / usual.volume);
+        let label = if quick { format!("{edge}^3 (for {n}^3)") } else { format!("{n}^3") };
+        (label, Conditions { volume: edge, ..usual }, ms)
+    };
+    vec![
+        table(3, "frames", frames.map(|(n, ms)| (n.to_string(), Conditions { frames: n, ..usual }, ms)).to_vec()),
+        table(4, "volume", volumes.map(volume).to_vec()),
+        table(5, "3D filter", filters.map(|(f, ms)| (f.name(), Conditions { filter_3d: f, ..usual }, ms)).to_vec()),
+        table(
+            6,
+            "2D filter",
+            windows.map(|(n, ms)| (format!("{n}x{n}"), Conditions { filter_2d: n, ..usual }, ms)).to_vec(),
+        ),
+    ]
+}
+
+/// What the rays of a row met: how far they went tells whether rows did as much work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reached {
+    /// Share of the rays that met a surface, 0..1.
+    pub share: f64,
+    /// Mean depth of those surfaces below the face, mm; 0 where there are none.
+    pub depth: f64,
+}
+
+/// How far the windows of the enhanced sigma filter grew on one picture (Tables 7-9).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    /// The picture's name.
+    pub picture: String,
+    pub rows: Vec<Growth>,
+}
+
+/// Everything that the text is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    pub device: Device,
+    /// Name, version and build of the program.
+    pub program: String,
+    /// By RFC 3339.
+    pub date: String,
+    pub quick: bool,
+    pub repeats: usize,
+    /// Volumes rendered before those.
+    pub warm_up: usize,
+    pub tables: Vec<Table>,
+    pub grown: Vec<Grown>,
+}
+
+impl Report {
+    pub fn has_times(&self) -> bool {
+        self.tables.iter().flat_map(|t| &t.rows).any(|r| !r.times.picture.is_empty())
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// Nothing measured.
+    pub(crate) fn report() -> Report {
+        Report {
+            device: Device {
+                name: "Some, \"device\" | one".into(),
+                driver: "driver 1".into(),
+                api: "1.3.0".into(),
+                is_software: true,
+                timestamp_period_ns: 1.0,
+                valid_bits: 64,
+                calibrated: true,
+                clocks: None,
+            },
+            program: "echolume 0".into(),
+            date: "2026-01-02T03:04:05Z".into(),
+            quick: false,
+            repeats: 3,
+            warm_up: 1,
+            tables: tables(false),
+            grown: Vec::new(),
+        }
+    }
+
+    /// Row n takes 2 (n + 1) ms and in stage 1 ten times as long.
+    pub(crate) fn measured() -> Report {
+        let mut report = report();
+        for table in &mut report.tables {
+            for (n, row) in table.rows.iter_mut().enumerate() {
+                let ns = 2e6 * (n + 1) as f64;
+                row.times.picture = vec![ns * 1.5, ns * 0.5, ns];
+                row.times.preprocess = vec![ns * 10.0; 3];
+                row.reached = Some(Reached { share: 0.987, depth: 71.25 });
+            }
+        }
+        report
+    }
+
+    #[test]
+    fn rows_vary_one_condition_and_all_tables_share_the_usual_row() {
+        for quick in [false, true] {
+            let usual = Conditions::usual(quick);
+            let counts: Vec<_> = tables(quick).iter().map(|t| (t.number, t.rows.len())).collect();
+            assert_eq!(counts, [(3, 4), (4, 4), (5, 5), (6, 5)]);
+            for table in tables(quick) {
+                let at_usual: Vec<_> = table.rows.iter().filter(|r| r.conditions == usual).collect();
+                assert_eq!(at_usual.len(), 1, "table {}", table.number);
+                assert_eq!(table.rows[table.usual].conditions, usual);
+                assert_eq!(at_usual[0].thesis.ms, 54.6);
+                for row in &table.rows {
+                    let (c, u) = (row.conditions, usual);
+                    let differs = [
+                        c.frames != u.frames,
+                        c.volume != u.volume,
+                        c.filter_3d != u.filter_3d,
+                        c.filter_2d != u.filter_2d,
+                    ];
+                    let expected = [3, 4, 5, 6].map(|n| n == table.number && c != u);
+                    assert_eq!((differs, c.lines), (expected, u.lines), "table {}: {}", table.number, row.label);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ratios_are_to_the_usual_row() {
+        let mut table = tables(false).remove(2);
+        assert_eq!(table.ratio(&table.rows[0]), None);
+        for (row, ms) in table.rows.iter_mut().zip([2.0, 4.0, 10.0, 3.0, 3.0]) {
+            row.times.picture = vec![ms * 1e6; 3];
+        }
+        let ratios: Vec<_> = table.rows.iter().map(|r| table.ratio(r)).collect();
+        assert_eq!(ratios, [0.5, 1.0, 2.5, 0.75, 0.75].map(Some));
+        let thesis = table.thesis_ratio(&table.rows[2]).expect("a ratio");
+        assert!((thesis - 187.0 / 54.6).abs() < 1e-12);
+    }
+}

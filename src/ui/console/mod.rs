@@ -1,0 +1,379 @@
+//! The console: the stream on one side, hands and eyes on the other. It knows no window, only inputs, the time, and a screen to show
+//! things on, which may be missing; so that whatever can be done in a window is tested without one.
+
+mod act;
+mod look;
+mod tick;
+
+use super::command::Command;
+use super::controls::Controls;
+use super::export::Exporter;
+use super::frame_budget::FrameBudget;
+use super::gestures::Gestures;
+use super::input::Input;
+use super::keys::Keys;
+use super::panels::{self, Note, Panels};
+use super::picture::Picture;
+use super::quality_ladder::Rung;
+use super::source_supervisor::{Open, SourceSupervisor};
+use super::times::Times;
+use crate::gpu::window::Screen;
+use crate::gpu::{Context, GpuError, Wake};
+use crate::kiosk::chord::Chord;
+use crate::live::cine::Room;
+use crate::live::{self, Feed, Stream, StreamError, Update};
+use crate::scene::Settings;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How long a note stays.
+const NOTE: Duration = Duration::from_secs(5);
+/// Between two looks whether what is amiss is mended.
+const LOOK: Duration = Duration::from_secs(2);
+/// Notes at once, the newest.
+const NOTES: usize = 4;
+
+pub struct Options {
+    pub settings: Settings,
+    pub update: Update,
+    /// Volume images that take turns, 2 or 3.
+    pub images: u32,
+    pub queues: Option<usize>,
+    pub cine: Room,
+    /// Time of a picture that is held while the view moves.
+    pub budget: Option<Duration>,
+    pub rungs: Vec<Rung>,
+    /// How long to wait before a source that ended is opened again; none ends with it.
+    pub retry: Option<Duration>,
+    /// Every frame goes there too.
+    pub record: Option<PathBuf>,
+    /// Where pictures and loops are saved.
+    pub folder: PathBuf,
+    /// Anything besides the picture is drawn at all.
+    pub overlay: bool,
+    /// Sliders and buttons, to begin with.
+    pub panels: bool,
+    /// Pixels a point.
+    pub scale: f32,
+    /// The only way out of a kiosk, if there is any.
+    pub exit: Option<Chord>,
+    pub is_kiosk: bool,
+    /// Called when [`Console::tick`] has something to do.
+    pub wake: Wake,
+    /// Nothing of this can be right: only why is shown.
+    pub amiss: Option<Amiss>,
+}
+
+impl Options {
+    /// Of a window that somebody looks into, full quality always, nothing kept; nobody is told when there is something to do.
+    pub fn usual() -> Options {
+        Options {
+            settings: Settings::default(),
+            update: Update::Whole,
+            images: 3,
+            queues: None,
+            cine: Room::default(),
+            budget: None,
+            rungs: super::quality_ladder::built_in(),
+            retry: None,
+            record: None,
+            folder: ".".into(),
+            overlay: true,
+            panels: true,
+            scale: 1.0,
+            exit: None,
+            is_kiosk: false,
+            wake: Arc::new(|| ()),
+            amiss: None,
+        }
+    }
+}
+
+/// What keeps everything from being shown, and how to find out that it is gone.
+pub struct Amiss {
+    pub title: String,
+    pub why: String,
+    /// Asked every two seconds: when it is mended another console is asked for.
+    pub is_mended: Box<dyn Fn() -> bool>,
+}
+
+/// What whoever drives the console does next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Next {
+    /// When to tick again, whatever comes; none: when something does.
+    pub at: Option<Instant>,
+    pub exit: bool,
+    pub toggles_full_screen: bool,
+    /// Another console is to take the place of this one.
+    pub renews: bool,
+}
+
+/// Why the console cannot go on by itself.
+#[derive(Debug, thiserror::Error)]
+pub enum ConsoleError {
+    /// [`Console::revive`] goes on.
+    #[error("{0}")]
+    DeviceLost(GpuError),
+    /// The screen is gone; [`Console::set_screen`] goes on.
+    #[error("{0}")]
+    Screen(GpuError),
+}
+
+pub struct Console {
+    // Dropped in this order: what shows before what is shown.
+    screen: Option<Screen>,
+    stream: Stream,
+    context: Arc<Context>,
+    supply: SourceSupervisor,
+    controls: Controls,
+    hand: Gestures,
+    keys: Keys,
+    keep: Exporter,
+    pace: FrameBudget,
+    rungs: Vec<Rung>,
+    panels: Panels,
+    times: Times,
+    options: Shape,
+    /// Of the window, pixels.
+    size: [u32; 2],
+    began: Instant,
+    /// The settings that the stream was given last, and the rung that they stand on.
+    sent: Option<Settings>,
+    rung: usize,
+    /// Settings that could not be drawn are told once.
+    refused: Option<Settings>,
+    notes: Vec<(Instant, Note)>,
+    /// Something besides the picture looks different.
+    stale: bool,
+    /// A picture was drawn that has not been shown.
+    fresh: bool,
+    help: bool,
+    hud: bool,
+    is_panelled: bool,
+    /// Where it is to be drawn, pixels of the window.
+    pointer: Option<[f64; 2]>,
+    playing: Option<Instant>,
+    /// The first thing that a hand did which no settings have taken up yet, and which no picture has shown yet.
+    touched: Option<Instant>,
+    awaited: Option<(Instant, Instant)>,
+    /// When statistics were taken last, and when anything came last.
+    counted: Instant,
+    heard: Instant,
+    frames: u64,
+    /// Of the device, since the last picture.
+    faults: u32,
+    /// Since when nothing that was drawn can be shown.
+    blank: Option<Instant>,
+    again: Option<Instant>,
+    /// There was nothing to show things on: not tried again before.
+    nowhere: Option<Instant>,
+    amiss: Option<(Amiss, Instant)>,
+    next: Next,
+}
+
+/// What stays as it was given.
+struct Shape {
+    overlay: bool,
+    exit: Option<Chord>,
+    is_kiosk: bool,
+}
+
+impl Console {
+    /// `size`: of the window, pixels.
+    pub fn new(context: &Arc<Context>, open: Open, options: Options, size: [u32; 2]) -> Console {
+        let now = Instant::now();
+        let is_panelled = options.panels && options.overlay;
+        let mut controls = Controls::new(options.settings);
+        controls.resize(panels::place(size, options.scale, is_panelled).1);
+        let streamed = live::Options {
+            update: options.update,
+            images: options.images,
+            queues: options.queues,
+            readback: false,
+            cine: options.cine,
+            wake: Some(options.wake.clone()),
+        };
+        let shares: Vec<f64> = options.rungs.iter().map(|rung| rung.share).collect();
+        Console {
+            screen: None,
+            stream: Stream::new(context, Feed::none(), controls.settings().clone(), streamed),
+            context: context.clone(),
+            supply: SourceSupervisor::new(open, options.retry, options.record, options.wake.clone()),
+            controls,
+            hand: Gestures::default(),
+            keys: Keys::default(),
+            keep: Exporter::new(options.folder, options.wake),
+            pace: FrameBudget::new(options.budget, &shares),
+            rungs: options.rungs,
+            panels: Panels::new(options.scale),
+            times: Times::default(),
+            options: Shape { overlay: options.overlay, is_kiosk: options.is_kiosk, exit: options.exit },
+            size,
+            began: now,
+            sent: None,
+            rung: 0,
+            refused: None,
+            notes: Vec::new(),
+            stale: true,
+            fresh: false,
+            help: false,
+            hud: false,
+            is_panelled,
+            pointer: None,
+            playing: None,
+            touched: None,
+            awaited: None,
+            counted: now,
+            heard: now,
+            frames: 0,
+            faults: 0,
+            blank: None,
+            again: None,
+            nowhere: None,
+            amiss: options.amiss.map(|amiss| (amiss, now + LOOK)),
+            next: Next::default(),
+        }
+    }
+
+    /// What to show things on.
+    pub fn set_screen(&mut self, screen: Option<Screen>) {
+        // The old one goes first: a window has one surface at a time.
+        self.screen = None;
+        self.screen = screen;
+        self.panels.renew();
+        self.stale = true;
+    }
+
+    /// What it showed things on, for another.
+    pub fn into_screen(mut self) -> Option<Screen> {
+        self.screen.take()
+    }
+
+    /// Goes on with another device, or the same one anew: with what was kept, and the volume that comes next.
+    ///
+    /// # Errors
+    /// A device that cannot hold what is shown.
+    pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
+        self.screen = None;
+        self.context = context.clone();
+        let revived = self.stream.revive(context);
+        self.set_screen(screen);
+        match &revived {
+            Ok(()) => self.say("the device was lost and opened anew", false),
+            // A source that is opened again tells its geometry, of which everything is made then.
+            Err(fault) => self.ended(Some(fault.to_string()), Instant::now()),
+        }
+        revived
+    }
+
+    /// The window has this size from here on, pixels; 0 while it is minimised.
+    pub fn resize(&mut self, size: [u32; 2]) {
+        if let Some(screen) = &mut self.screen {
+            screen.resize(size);
+        }
+        if size.contains(&0) {
+            return;
+        }
+        self.size = size;
+        self.fit();
+    }
+
+    /// What was on the window is gone.
+    pub fn expose(&mut self) {
+        (self.stale, self.nowhere) = (true, None);
+    }
+
+    /// The picture has the room that the panels leave.
+    fn fit(&mut self) {
+        self.controls.resize(self.place().1);
+        self.stale = true;
+    }
+
+    /// Where the picture lies, pixels of the window.
+    fn place(&self) -> ([u32; 2], [u32; 2]) {
+        panels::place(self.size, self.panels.scale(), self.is_panelled)
+    }
+
+    /// What was done by hand.
+    pub fn input(&mut self, input: &Input) {
+        let now = Instant::now();
+        // Panels break at places that are none.
+        let Some(input) = &input.believed() else { return };
+        if self.options.overlay {
+            self.panels.input(input);
+            self.stale = true;
+        }
+        if let (Some(exit), Input::Key { key, pressed: true }) = (&self.options.exit, input)
+            && exit.is(*key, self.keys.modifiers())
+        {
+            self.next.exit = true;
+        }
+        if let Some(command) = self.keys.input(input) {
+            self.command(&command, now);
+        }
+        let place = self.place();
+        let at = match input {
+            Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
+            _ => None,
+        };
+        let on = Picture {
+            corner: place.0.map(f64::from),
+            size: place.1.map(f64::from),
+            scene: self.stream.scene(),
+            taken: at.or(self.hand.pointer()).is_some_and(|at| self.panels.covers(at)) && self.options.overlay,
+            now: now.saturating_duration_since(self.began),
+        };
+        for command in self.hand.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
+            self.command(&command, now);
+        }
+    }
+
+    /// Draws a pointer there, pixels, from here on: where no windowing system does.
+    pub fn point(&mut self, at: Option<[f64; 2]>) {
+        self.stale |= self.pointer != at;
+        self.pointer = at;
+    }
+
+    /// Something to be said, for a few seconds and in the log.
+    pub fn say(&mut self, text: &str, is_fault: bool) {
+        match is_fault {
+            true => tracing::warn!("{text}"),
+            false => tracing::info!("{text}"),
+        }
+        let note = Note { text: text.into(), is_fault };
+        self.notes.retain(|(_, known)| *known != note);
+        self.notes.push((Instant::now() + NOTE, note));
+        if self.notes.len() > NOTES {
+            self.notes.remove(0);
+        }
+        self.stale = true;
+    }
+
+    pub fn controls(&self) -> &Controls {
+        &self.controls
+    }
+
+    pub fn stream(&mut self) -> &mut Stream {
+        &mut self.stream
+    }
+
+    pub fn times(&self) -> &Times {
+        &self.times
+    }
+
+    pub fn screen(&self) -> Option<&Screen> {
+        self.screen.as_ref()
+    }
+
+    /// The rung of the ladder that the last settings stand on.
+    pub fn rung(&self) -> usize {
+        self.rung
+    }
+
+    /// Does what is asked for, by whomever.
+    pub fn command(&mut self, command: &Command, now: Instant) {
+        tracing::debug!("{command:?}");
+        self.act(command, now);
+    }
+}

@@ -1,0 +1,122 @@
+//! A device with validation on, scenes, and noise that is the same everywhere.
+
+use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::passes::slots::Format;
+use echolume::passes::{Slot, Texels, is_hit};
+use echolume::picture::Picture;
+use echolume::scene::Scene;
+use echolume::verify::built_in;
+use std::ops::Deref;
+use std::sync::Arc;
+
+pub use super::files::*;
+pub use super::probes::wobbler;
+pub use super::scenes::*;
+pub use echolume::verify::built_in::{
+    ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
+};
+
+/// A context that fails its test if validation said anything.
+pub struct Device {
+    context: Arc<Context>,
+    /// Messages were asked for.
+    pub provoked: bool,
+}
+
+/// ECHOLUME_DEVICE picks another device than the first that fits.
+pub fn chosen() -> Choice {
+    std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().expect("a device"))
+}
+
+impl Device {
+    pub fn new() -> Device {
+        Device::watched(true)
+    }
+
+    /// Without validation where not watched: its layers keep something of all that was ever made.
+    pub fn watched(validation: bool) -> Device {
+        let context = Context::new(&ContextOptions { device: chosen(), validation }).expect("a Vulkan device");
+        Device { context, provoked: false }
+    }
+
+    /// Looked at with `--nocapture`: which device and driver the tests ran on.
+    pub fn describe(&self) -> String {
+        format!("{}, {}", self.context.candidate.name, self.context.candidate.driver.trim())
+    }
+}
+
+impl Deref for Device {
+    type Target = Arc<Context>;
+    fn deref(&self) -> &Arc<Context> {
+        &self.context
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        let messages = self.context.messages();
+        if !std::thread::panicking() && !self.provoked {
+            // The first says it; a flood of the same hides it.
+            assert!(messages.is_empty(), "{} messages of validation, first: {}", messages.len(), messages[0]);
+        }
+    }
+}
+
+/// Scenes by name that among them need every pass.
+pub fn scenes() -> Vec<(String, Scene)> {
+    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.make().expect("scene"))).collect()
+}
+
+pub fn frame_format(scene: &Scene) -> Format {
+    Slot::Frames.format(scene)
+}
+
+/// A renderer with the frames sent.
+pub fn rendered(device: &Device, scene: Scene, frames: &[Texels]) -> Renderer {
+    let mut renderer = Renderer::new(device, scene, &Options::default()).expect("renderer");
+    send(&mut renderer, frames, 0);
+    renderer
+}
+
+pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) {
+    let format = frame_format(renderer.scene());
+    for (k, frame) in frames.iter().enumerate() {
+        renderer.frame(k as u32, &frame.encode(format), image).expect("frame");
+    }
+    renderer.show(image).expect("show");
+}
+
+/// Mean and largest difference of two pictures, levels of 255.
+pub fn difference(a: &Picture, b: &Picture) -> (f64, f64) {
+    assert_eq!((a.width, a.height), (b.width, b.height));
+    let differences = a.rgba.iter().zip(&b.rgba).map(|(a, b)| f64::from(a.abs_diff(*b)));
+    let (sum, largest) = differences.fold((0.0, 0.0f64), |(sum, largest), d| (sum + d, largest.max(d)));
+    (sum / a.rgba.len() as f64, largest)
+}
+
+/// A slot of the f64 render as a picture.
+pub fn as_picture(texels: &Texels) -> Picture {
+    let rgba = texels.encode(Format::Rgba8);
+    Picture { width: texels.size[0] as u32, height: texels.size[1] as u32, rgba }
+}
+
+/// Rays that meet a sphere within 0.8 of its radius (further out the chord is shorter than the detector's ring), and the
+/// largest error of their distances, mm. A hole fails.
+pub fn sphere_error(scene: &Scene, distances: &Texels, centre: glam::DVec3, radius: f64) -> (u32, f64) {
+    let (mut hits, mut worst) = (0, 0.0f64);
+    for y in 0..distances.size[1] {
+        for x in 0..distances.size[0] {
+            let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+            let along = (centre - origin).dot(direction);
+            let offset = (origin + direction * along).distance(centre);
+            if offset > 0.8 * radius {
+                continue;
+            }
+            let got = distances.one(x, y, 0);
+            assert!(is_hit(got), "a hole at {x}, {y}");
+            worst = worst.max((got - along + (radius * radius - offset * offset).sqrt()).abs());
+            hits += 1;
+        }
+    }
+    (hits, worst)
+}

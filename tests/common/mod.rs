@@ -1,0 +1,14 @@
+//! Fixtures of all test binaries: files, processes, probes, scenes, devices, the simulated motor.
+
+// Each binary uses a part.
+#![allow(dead_code, unused_imports)]
+
+pub mod files;
+pub mod gpu;
+#[cfg(target_os = "linux")]
+pub mod motor;
+pub mod own_process;
+pub mod probes;
+pub mod program;
+pub mod scenes;
+pub mod wait;

@@ -1,0 +1,75 @@
+//! A console at rest, and how it gets there: nothing runs for nothing, and what stays to be seen has full quality.
+
+use super::*;
+
+/// Prevents a kiosk that runs hot all night: nothing is dispatched and nobody woken for a picture that stands still.
+#[test]
+fn a_console_at_rest_does_nothing_and_wants_nothing() {
+    let device = Device::new();
+    for (overlay, panels, hud) in [(true, false, false), (false, false, false), (true, true, true)] {
+        let mut desk = Desk::new(&device, Options { overlay, panels, scale: 0.5, ..options() });
+        desk.console.resize([400, 240]);
+        desk.begin();
+        desk.live(0);
+        if hud {
+            desk.press(Key::Function(2));
+        }
+        desk.drag([150.0, 100.0], [160.0, 90.0]);
+        desk.rest();
+        let dispatches = desk.console.stream().dispatches();
+        let (mut now, mut woken) = (Instant::now() + LATER, 0);
+        // Ten minutes, of which each moment is skipped at which nothing is asked for.
+        let end = now + Duration::from_secs(600);
+        while now < end {
+            let next = desk.tick(now);
+            woken += 1;
+            match next.at {
+                None => break,
+                Some(at) => {
+                    assert!(at > now, "again at once: overlay {overlay}, panels {panels}");
+                    now = at;
+                }
+            }
+        }
+        // The display of times looks once a second; a note goes, and that nothing is heard is said.
+        assert!(woken < if hud { 650 } else { 12 }, "{woken} times: overlay {overlay}, panels {panels}");
+        for _ in 0..50 {
+            desk.tick(now);
+        }
+        assert_eq!(desk.console.stream().dispatches(), dispatches);
+    }
+}
+
+/// Prevents a view that stays coarse, and one that is slow under a hand for being fine.
+#[test]
+fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() {
+    let device = Device::new();
+    let mut settings = plain();
+    settings.light.shadow = Some(Default::default());
+    let budget = Some(Duration::from_nanos(1));
+    let mut desk = Desk::new(&device, Options { settings, budget, ..options() });
+    desk.begin();
+    desk.live(0);
+    let last = quality_ladder::built_in().len() - 1;
+    let mut coarse = 0;
+    desk.console.input(&Input::Moved([40.0, 36.0]));
+    desk.console.input(&Input::Button { button: Button::Left, pressed: true });
+    for n in 0..60 {
+        // Not later than the hand moved, however slow the machine is.
+        let now = Instant::now();
+        desk.console.input(&Input::Moved([40.0 + f64::from(n % 20), 36.0 - f64::from(n % 13)]));
+        desk.tick(now);
+        // The hand goes off a click's reach first, and the first picture tells how long they take.
+        assert!(n < 12 || desk.console.rung() == last, "{n}: rung {}", desk.console.rung());
+        let begun = Instant::now();
+        while desk.console.stream().is_drawing() && begun.elapsed() < BOUND {
+            desk.tick(now);
+        }
+        let drawn = desk.drawn();
+        coarse += u32::from(desk.console.stream().scene().is_some_and(|s| s.settings.ray.half && s.settings != drawn));
+    }
+    desk.console.input(&Input::Button { button: Button::Left, pressed: false });
+    desk.rest();
+    assert_eq!(desk.console.rung(), 0);
+    assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "{coarse} coarse pictures");
+}

@@ -1,0 +1,270 @@
+//! Hands that do anything, sources that end anywhere, devices that are lost: nothing breaks, and nothing is left behind.
+
+mod random_source;
+
+use super::*;
+use crate::common::own_process;
+use ash::vk;
+use echolume::gpu::faults::Seam;
+use echolume::ui::input::Phase;
+use echolume::ui::keys::KEYS;
+use echolume::ui::sliders::SLIDERS;
+use random_source::Wild;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// It runs in a process of its own, whose memory no other test uses.
+const TEST: &str = "console::monkey::nothing_that_hands_sources_and_devices_do_breaks_it";
+/// Resident memory that the second half may take more than the first, bytes: pictures are large at times, and what they leave is not
+/// given back at once.
+const GROWTH: u64 = 128 << 20;
+
+/// Prevents panics, messages of validation, leaks, and a console that draws no more, after whatever was done to it. MONKEY_SECONDS goes
+/// on for longer, MONKEY_SEED does the same again.
+#[test]
+fn nothing_that_hands_sources_and_devices_do_breaks_it() {
+    if own_process::is_child() {
+        return run();
+    }
+    // Validation is silent, and without it memory is bounded: its layers grow with every pipeline.
+    for watched in ["1", "0"] {
+        let printed = own_process::passes(own_process::command(TEST).env("MONKEY_WATCHED", watched));
+        printed.lines().filter(|line| line.contains("monkey:")).for_each(|line| println!("{line}"));
+    }
+}
+
+fn of_environment(name: &str, unless: u64) -> u64 {
+    std::env::var(name).map_or(unless, |value| value.parse().expect(name))
+}
+
+/// Says what to do again when a test fails.
+struct Told(u64, u64);
+
+impl Drop for Told {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("MONKEY_SEED={} after {} steps", self.0, self.1);
+        }
+    }
+}
+
+struct Monkey {
+    noise: Noise,
+    desk: Desk,
+    device: Device,
+    seed: u64,
+    folder: Folder,
+    calm: Arc<AtomicBool>,
+    last: Arc<Mutex<Vec<Receiver<Event>>>>,
+    lost: u32,
+    watched: bool,
+}
+
+impl Monkey {
+    fn new(seed: u64, watched: bool) -> Monkey {
+        let (device, calm, folder) =
+            (Device::watched(watched), Arc::new(AtomicBool::new(false)), Folder::new("monkey"));
+        let last: Arc<Mutex<Vec<Receiver<Event>>>> = Arc::default();
+        let (is_calm, sources, opened) = (calm.clone(), last.clone(), std::sync::atomic::AtomicU64::new(seed));
+        let open: Open = Arc::new(move || {
+            let n = opened.fetch_add(1, Ordering::Relaxed);
+            match is_calm.load(Ordering::Relaxed) {
+                true => match sources.lock().expect("lock").pop() {
+                    Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
+                    None => Err("no probe".into()),
+                },
+                false if n % 5 == 4 => Err("no probe".into()),
+                false => Ok(Box::new(Wild::new(n, is_calm.clone()))),
+            }
+        });
+        let options = Options {
+            retry: Some(Duration::from_millis(10)),
+            budget: Some(Duration::from_millis(8)),
+            folder: folder.0.clone(),
+            is_kiosk: true,
+            ..options()
+        };
+        let console = Console::new(&device, open, options, SIZE);
+        let desk = Desk { console, say: channel().0 };
+        Monkey { noise: Noise(seed), desk, device, seed, folder, calm, last, lost: 0, watched }
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        ((self.noise.next() * n as f64) as usize).min(n - 1)
+    }
+
+    /// As a rule something sensible.
+    fn number(&mut self) -> f64 {
+        const ODD: [f64; 10] =
+            [0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300, f64::MIN_POSITIVE, 1e9, -1e9, -0.0];
+        match self.below(12) {
+            0 => ODD[self.below(ODD.len())],
+            1 => self.noise.range(-1e4, 1e4),
+            _ => self.noise.range(-40.0, 40.0),
+        }
+    }
+
+    fn place(&mut self) -> [f64; 2] {
+        if self.below(40) == 0 {
+            return [self.number(), self.number()];
+        }
+        [self.noise.range(-20.0, 420.0), self.noise.range(-20.0, 320.0)]
+    }
+
+    fn input(&mut self) -> Input {
+        let pressed = self.below(2) == 0;
+        match self.below(14) {
+            0 => Input::Left,
+            1 => Input::Scroll(self.number()),
+            2 | 3 => Input::Button { button: [Button::Left, Button::Right, Button::Middle][self.below(3)], pressed },
+            4 => Input::Modifiers(Modifiers { shift: pressed, control: self.below(3) == 0, alt: self.below(9) == 0 }),
+            5..=7 => {
+                let phase = [Phase::Down, Phase::Moved, Phase::Moved, Phase::Up, Phase::Gone][self.below(5)];
+                Input::Touch { finger: self.below(4) as u64, phase, at: self.place() }
+            }
+            8..=10 => {
+                let bound = &KEYS[self.below(KEYS.len())];
+                Input::Key { key: bound.key, pressed }
+            }
+            _ => Input::Moved(self.place()),
+        }
+    }
+
+    fn command(&mut self) -> Command {
+        let (a, b, c) = (self.number(), self.number(), self.number());
+        match self.below(16) {
+            0 => Command::Turn([a, b]),
+            1 => Command::Roll(a),
+            2 => Command::Zoom(a),
+            3 => Command::Pan([a / 40.0, b / 40.0]),
+            4 => Command::Light([a / 40.0, b]),
+            5 => Command::Face(echolume::ui::command::Face { axis: self.below(5), high: a > 0.0 }, b),
+            6 => Command::Clip(a),
+            7 => Command::PlaneBy(a),
+            8 => Command::Meet([a, b, c]),
+            9 => Command::PlaneTurn([a, b]),
+            10 => Command::Slide(self.below(SLIDERS.len() + 2), a),
+            11 => Command::Nudge(self.below(SLIDERS.len() + 2), [i32::MIN, i32::MAX, -1, 1, 3][self.below(5)]),
+            12 => Command::Cine([i32::MIN, i32::MAX, -1, 1, 5][self.below(5)]),
+            13 => Command::CineAt([0, 1, 3, usize::MAX][self.below(4)]),
+            // Far from the edges, where pictures are of something.
+            14 => Command::Reset,
+            _ => KEYS[self.below(KEYS.len())].what,
+        }
+    }
+
+    fn step(&mut self) {
+        match self.below(200) {
+            0..=3 => {
+                // Small ones as a rule: there are more of them to a second.
+                let edge = |m: &mut Monkey, most: f64| most.powf(m.noise.next()).round() as u32;
+                let size = if self.below(8) == 0 { [700.0, 500.0] } else { [160.0, 120.0] };
+                let size = size.map(|most| edge(self, most));
+                self.desk.console.resize(size);
+            }
+            4 => {
+                let n = self.below(30) as u32;
+                self.device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+            }
+            5 if self.below(4) == 0 => {
+                let (n, seam) = (self.below(6) as u32, [Seam::Submit, Seam::Wait][self.below(2)]);
+                self.device.faults.inject(seam, n, vk::Result::ERROR_DEVICE_LOST);
+            }
+            6 => self.desk.console.expose(),
+            7..=30 => {
+                let command = self.command();
+                self.desk.console.command(&command, Instant::now());
+            }
+            _ => {
+                let input = self.input();
+                self.desk.console.input(&input);
+            }
+        }
+        for _ in 0..self.below(4) {
+            self.tick(Instant::now());
+        }
+    }
+
+    fn tick(&mut self, now: Instant) {
+        match self.desk.console.tick(now) {
+            Ok(next) => assert!(!next.exit && !next.renews),
+            Err(ConsoleError::Screen(fault)) => panic!("there is no screen: {fault}"),
+            Err(ConsoleError::DeviceLost(_)) => {
+                self.lost += 1;
+                let other = Device::watched(self.watched);
+                // What cannot be made of it now is made of the next source's geometry.
+                let _ = self.desk.console.revive(&other, None);
+                // Looked at here for what it said.
+                self.device = other;
+            }
+        }
+    }
+
+    /// No failure is planned any more, the volume of a source of ours is shown as at the start, and drawn as by itself.
+    fn rest(&mut self) {
+        self.device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        self.calm.store(true, Ordering::Relaxed);
+        self.desk.console.input(&Input::Left);
+        self.desk.console.input(&Input::Modifiers(Modifiers::default()));
+        self.desk.console.command(&Command::Reset, Instant::now());
+        self.desk.console.command(&Command::Tool(Tool::Turn), Instant::now());
+        if self.desk.console.stream().is_frozen() {
+            self.desk.console.command(&Command::Freeze, Instant::now());
+        }
+        self.desk.console.resize(SIZE);
+        let (say, said) = channel();
+        self.desk.say = say;
+        self.last.lock().expect("lock").push(said);
+        self.desk.begin();
+        self.desk.frames(body(1));
+        let begun = Instant::now();
+        // Panels may lie beside it.
+        let settings = self.desk.drawn();
+        let expected = headless(&self.device, &settings, &body(1));
+        loop {
+            self.tick(Instant::now() + LATER);
+            let stream = self.desk.console.stream();
+            let drawn = stream.is_idle() && stream.renderer().is_some_and(|renderer| renderer.has_drawn());
+            if drawn && self.desk.picture() == expected {
+                break;
+            }
+            assert!(begun.elapsed() < BOUND, "the picture at the end is another");
+        }
+        self.calm.store(false, Ordering::Relaxed);
+        // The wild ones come again.
+        self.desk.say.send(Event::End(None)).expect("listens");
+    }
+}
+
+/// Bytes of this process that lie in memory.
+fn resident() -> u64 {
+    let pages = std::fs::read_to_string("/proc/self/statm").expect("statm");
+    4096 * pages.split(' ').nth(1).expect("resident").parse::<u64>().expect("pages")
+}
+
+fn run() {
+    let seed = of_environment("MONKEY_SEED", 7);
+    let time = Duration::from_secs(of_environment("MONKEY_SECONDS", 7));
+    let watched = of_environment("MONKEY_WATCHED", 1) == 1;
+    let mut told = Told(seed, 0);
+    let mut monkey = Monkey::new(seed, watched);
+    let (begun, mut half) = (Instant::now(), None);
+    while begun.elapsed() < time {
+        monkey.step();
+        told.1 += 1;
+        if half.is_none() && begun.elapsed() > time / 2 {
+            monkey.rest();
+            half = Some((monkey.device.allocated(), resident()));
+        }
+    }
+    monkey.rest();
+    let (device, host) = half.expect("half");
+    let (now, resident) = (monkey.device.allocated(), resident());
+    let Monkey { seed, lost, .. } = monkey;
+    println!(
+        "monkey: seed {seed}, {} steps, {lost} devices lost; device {device} to {now} bytes, process {host} to {resident}",
+        told.1
+    );
+    assert!(now <= device + device / 8 + (1 << 20), "device memory: {device}, then {now}");
+    assert!(watched || resident <= host + GROWTH, "the process: {host}, then {resident}");
+    assert!(!monkey.folder.names().is_empty() || told.1 < 5000, "nothing was ever saved");
+}

@@ -1,0 +1,91 @@
+//! Half the rays along each edge while a view moves: the same view, near enough, and back to all of it.
+
+use crate::common::gpu::*;
+use echolume::gpu::Renderer;
+use echolume::passes::{PASSES, Stage};
+use echolume::plan::Rerun;
+use echolume::probe::Geometry;
+use echolume::scene::{Distance, Scene};
+
+const LOOK: &str = "picture.size = [97, 72]
+    slices = { pixels = 120, smooth = { lateral = 0.8, depth = 0.8, elevation = 0.8 } }
+    camera = { azimuth = 15, elevation = -20 }
+    distance = { median = 7, bilateral = { pixels = 3.0, distance = 2.0 } }
+    light = { shadow = {}, occlusion = {} }";
+
+fn look(mode: &str) -> Scene {
+    scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = {mode}\n{LOOK}"))
+}
+
+/// The view of a moving scene.
+fn moving(scene: &Scene) -> Scene {
+    Scene::new(scene.geometry.clone(), scene.input, scene.settings.moving()).expect("scene")
+}
+
+#[test]
+fn a_ray_of_four_pixels_goes_through_their_common_corner() {
+    for more in ["", "\ncamera = { field_of_view = 40, azimuth = 20 }", "\nlayout = 'four'\nray.rays = 3"] {
+        for size in ["[64, 48]", "[63, 47]"] {
+            let full = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\npicture.size = {size}{more}"));
+            let half = moving(&full);
+            let rays = f64::from(full.settings.ray.rays);
+            assert_eq!((half.settings.ray.rays, half.seen), (1, full.seen));
+            for (x, y) in [(0.5, 0.5), (20.5, 3.5), (31.5, 23.5)] {
+                let (a, along_a) = half.rays.at(x, y);
+                let (b, along_b) = full.rays.at(2.0 * rays * x, 2.0 * rays * y);
+                assert!((a - b).length() < 1e-9 && (along_a - along_b).length() < 1e-12, "{more} {size}: {a} {b}");
+            }
+            let [w, h] = full.ray_size().map(|n| (n / full.settings.ray.rays).div_ceil(2));
+            assert_eq!(half.ray_size(), [w, h]);
+        }
+    }
+}
+
+#[test]
+fn filters_span_as_much_of_the_picture_with_half_the_rays() {
+    let distance: Distance = toml::from_str(
+        "median = 15\nbilateral = { pixels = 4.0, distance = 1.0 }\nsigma = { window = 3 }
+         enhanced_sigma = { window = 5, largest = 19 }\nperona_malik = { step = 0.2, repeat = 5 }",
+    )
+    .expect("settings");
+    let half = distance.halved();
+    assert_eq!(half.median, 7);
+    assert_eq!(half.bilateral.map(|b| (b.pixels, b.distance, b.repeat)), Some((2.0, 1.0, 1)));
+    // No window is narrower than three.
+    assert_eq!(half.sigma.map(|s| s.window), Some(3));
+    assert_eq!(half.enhanced_sigma.map(|e| (e.window, e.largest)), Some((3, 9)));
+    let diffused = half.perona_malik.expect("diffusion");
+    assert!((diffused.step * f64::from(diffused.repeat) - 0.25).abs() < 1e-12 && diffused.step <= 0.2);
+    assert_eq!(Distance::default().halved(), Distance::default());
+    let refused = toml::from_str("ray = { half = true, rays = 2 }").expect("settings");
+    let error = Scene::new(Geometry::Sweep(wobbler()), BYTES, refused).unwrap_err().to_string();
+    assert!(error.contains("ray.half"), "{error}");
+}
+
+#[test]
+fn back_from_moving_the_picture_is_whole_again_and_no_frame_was_needed() {
+    let device = Device::new();
+    for mode in ["'sr'", "'vr'", "'mixed'", "'vr'\nvolume.shading = 'first-hit'", "'mip'\nlayout = 'four'"] {
+        let full = look(mode);
+        let half = moving(&full);
+        let body = |p: glam::DVec3| 0.1 + 0.8 / (1.0 + (-(p.y - 42.0 + 3.0 * (0.3 * p.x).sin())).exp());
+        let frames = body_frames(&full, body);
+        let mut renderer: Renderer = rendered(&device, full.clone(), &frames);
+        let picture = renderer.picture().expect("picture");
+        let change = |renderer: &mut Renderer, to: &Scene| {
+            let rerun = renderer.change(to.clone()).expect("change");
+            assert!(matches!(rerun, Rerun::Steps { .. }), "{mode}: {rerun:?}");
+            let names = renderer.dispatched(|r| r.picture()).expect("picture");
+            let stage_one = |n: &&str| PASSES.iter().any(|p| p.name == *n && p.stage == Stage::Preprocess);
+            assert!(names.contains(&"tone") && !names.iter().any(stage_one), "{mode}: {names:?}");
+            renderer.picture().expect("picture")
+        };
+        let coarse = change(&mut renderer, &half);
+        let (mean, largest) = difference(&picture, &coarse);
+        println!("{mode}: half is off by {mean:.2} levels on average, {largest} at most");
+        assert!(mean > 0.0, "{mode}: half the rays are all of them");
+        assert!(mean < 3.0, "{mode}: {mean}");
+        assert_eq!(change(&mut renderer, &full), picture, "{mode}");
+        assert_eq!(rendered(&device, half, &frames).picture().expect("picture"), coarse, "{mode}");
+    }
+}

@@ -1,0 +1,191 @@
+//! Freezing, the cine loop, and settings that change while nothing comes.
+
+use super::*;
+use echolume::source::recorder::Replay;
+
+/// Prevents a frozen picture that changes, work for frames that nobody sees, a recording with a gap, and a volume of which the first
+/// frames came while frozen from being shown as if it were whole.
+#[test]
+fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
+    let device = Device::new();
+    for update in [Update::Whole, Update::Rolling] {
+        let folder = Folder::new("frozen");
+        let file = folder.join("exam.frames");
+        let mut bench = Bench::recorded(&device, "mode = 'mip'", kept(update), Some(&file));
+        bench.begin(header(0.3));
+        let before = bench.live(0);
+        bench.stream.freeze(true);
+        let dispatches = bench.dispatches();
+        bench.frames([speckled(1), speckled(2)].concat());
+        bench.frames(speckled(3).drain(..4));
+        assert!(bench.settle().is_empty());
+        assert_eq!(bench.dispatches(), dispatches, "{update:?}");
+        assert!(bench.stream.renderer().expect("begun").end_picture().expect("picture") == before);
+        assert_eq!(bench.stream.cine().kept().len(), 1, "what was not shown is not kept");
+
+        bench.stream.freeze(false);
+        bench.frames(speckled(3).drain(4..));
+        let shown = bench.settle();
+        assert!(update == Update::Rolling || shown.is_empty(), "a volume that lacks frames");
+        let after = bench.live(4);
+        assert!(after == fresh(&device, "mode = 'mip'", &header(0.3), update, &speckled(4)), "{update:?}");
+        let counts = bench.stream.statistics().expect("statistics").volumes;
+        assert_eq!((counts.shown, counts.dropped, bench.faults.len()), (2, 0, 0), "{counts:?}");
+        drop(bench);
+        let recording = Replay::open(&file).expect("recording");
+        assert_eq!((recording.frames(), recording.rebuilt()), (5 * 9, false));
+    }
+}
+
+/// Prevents a look back at something else than what was seen, volumes that are counted twice, and a place that points at another volume.
+#[test]
+fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
+    let device = Device::new();
+    for (update, toml) in [
+        (Update::Whole, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Rolling, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
+        (Update::Whole, "mode = 'orthogonal'"),
+    ] {
+        let mut bench = Bench::new(&device, toml, kept(update));
+        bench.begin(header(0.3));
+        let seen: Vec<_> = (0..4).map(|number| bench.live(number)).collect();
+        bench.stream.freeze(true);
+        for (n, place) in [3usize, 0, 2, 2, 1].into_iter().enumerate() {
+            bench.stream.show_kept(place);
+            assert_eq!(bench.stream.cine_place(), Some(place));
+            // Frozen, but the probe goes on.
+            bench.frames(speckled(4 + n as u32));
+            let (volume, picture) = bench.picture();
+            assert!(volume == place as u32 && picture == seen[place], "{update:?}: {toml}: {place}");
+            assert_eq!(bench.stream.cine_place(), Some(place));
+        }
+        bench.stream.show_kept(99);
+        assert!(bench.settle().is_empty(), "a place that is not there");
+        bench.stream.freeze(false);
+        bench.live(9);
+        let counts = bench.stream.statistics().expect("statistics").volumes;
+        assert_eq!((counts.shown, counts.dropped, counts.incomplete), (5, 0, 0), "{update:?}: {counts:?}");
+    }
+}
+
+/// Prevents a look back that tears the volume that is arriving meanwhile, or is torn by it, with no image to spare and with one.
+#[test]
+fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
+    let device = Device::new();
+    let toml = "mode = 'mip'\nslices.everything = true";
+    for images in [2, 3] {
+        let mut bench = Bench::new(&device, toml, live::Options { images, ..kept(Update::Whole) });
+        bench.begin(header(0.3));
+        let seen: Vec<_> = (0..3).map(|number| bench.live(number)).collect();
+        let mut counted = 3;
+        for number in 3..7 {
+            bench.frames(speckled(number).drain(..5));
+            bench.settle();
+            let place = number as usize % 3;
+            bench.stream.show_kept(place);
+            // Both are under way now.
+            bench.frames(speckled(number).drain(5..));
+            for shown in bench.settle() {
+                let expected = seen.get(shown.volume as usize).cloned();
+                let expected = expected.unwrap_or_else(|| of(&device, toml, shown.volume));
+                assert!(shown.picture == Some(expected), "{images} images, volume {}", shown.volume);
+            }
+            counted += 1;
+            let counts = bench.stream.statistics().expect("statistics").volumes;
+            assert_eq!(counts.shown + counts.dropped + counts.incomplete, counted, "{counts:?}");
+        }
+        assert!(bench.live(7) == of(&device, toml, 7));
+    }
+}
+
+/// Prevents frozen pictures of which a part is of the settings before, and frames that are sent again for nothing.
+#[test]
+fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
+    let device = Device::new();
+    for update in [Update::Whole, Update::Rolling] {
+        let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
+        bench.begin(header(0.3));
+        (0..3).for_each(|number| drop(bench.live(number)));
+        bench.stream.freeze(true);
+        for (volume, toml, comes_again) in [
+            (2, "mode = 'mip'\nslices.median = true", true),
+            (2, "mode = 'mip'\ncamera = { azimuth = 40 }\nslices.median = true", false),
+            (2, "mode = 'sr'\ncamera = { azimuth = 40 }\nslices.median = true", false),
+            (2, "mode = 'sr'\nlight = { ambient = 0.7 }\npost = { contrast = 1.3 }\nslices.median = true", false),
+            (1, "mode = 'sr'\nslices.sigma = {}", true),
+            (1, "mode = 'orthogonal'\nslices.sigma = {}", false),
+        ] {
+            if bench.stream.cine_place() != Some(volume) {
+                bench.stream.show_kept(volume);
+                bench.settle();
+            }
+            bench.stream.change(settings(toml)).expect("change");
+            bench.frames(speckled(7));
+            let mut came_again = false;
+            let mut last = None;
+            while !bench.stream.is_idle() {
+                if let Step::Picture(shown) = bench.stream.step(Duration::from_millis(1)).expect("step") {
+                    last = Some(shown);
+                }
+                came_again |= bench.stream.is_looking_back();
+            }
+            let last = last.expect("drawn");
+            let expected = fresh(&device, toml, &header(0.3), update, &speckled(volume as u32));
+            assert_eq!((last.volume, came_again), (volume as u32, comes_again), "{update:?}: {toml}");
+            assert!(last.picture == Some(expected), "{update:?}: {toml}");
+        }
+    }
+}
+
+/// Prevents a volume of slices with and without a filter, where settings change twice before it has come again; and that another
+/// volume is shown than the one that was asked for last.
+#[test]
+fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginning() {
+    let device = Device::new();
+    for update in [Update::Whole, Update::Rolling] {
+        for asked in [None, Some(0)] {
+            let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
+            bench.begin(header(0.3));
+            (0..3).for_each(|number| drop(bench.live(number)));
+            bench.stream.freeze(true);
+            match asked {
+                Some(place) => bench.stream.show_kept(place),
+                None => bench.stream.change(settings("mode = 'mip'\nslices.median = true")).expect("change"),
+            }
+            let begun = Instant::now();
+            let half_way = |stream: &Stream| stream.is_looking_back() && !stream.is_drawing();
+            while asked.is_none() && !half_way(&bench.stream) {
+                bench.stream.step(Duration::from_millis(1)).expect("step");
+                assert!(begun.elapsed() < BOUND);
+            }
+            // All but the last frame are there now.
+            bench.stream.step(Duration::ZERO).expect("step");
+            let toml = "mode = 'mip'\nslices.sigma = {}";
+            bench.stream.change(settings(toml)).expect("change");
+            let (volume, picture) = bench.picture();
+            let expected = asked.map_or(2, |place| place as u32);
+            assert_eq!(volume, expected, "{update:?}");
+            let expected = fresh(&device, toml, &header(0.3), update, &speckled(expected));
+            assert!(picture == expected, "{update:?}, asked for {asked:?}");
+        }
+    }
+}
+
+/// Prevents a stream that waits for ever for frames that nobody kept.
+#[test]
+fn without_a_cine_loop_other_settings_wait_for_the_next_volume_and_nothing_else_does() {
+    let device = Device::new();
+    for update in [Update::Whole, Update::Rolling] {
+        let options = live::Options { update, ..live::Options::default() };
+        let mut bench = Bench::new(&device, "mode = 'mip'", options);
+        bench.begin(header(0.3));
+        bench.live(0);
+        bench.stream.freeze(true);
+        let toml = "mode = 'mip'\nslices.median = true";
+        bench.stream.change(settings(toml)).expect("change");
+        bench.settle();
+        assert!(bench.stream.is_idle() && bench.stream.cine_place().is_none());
+        bench.stream.freeze(false);
+        assert!(bench.live(1) == fresh(&device, toml, &header(0.3), update, &speckled(1)), "{update:?}");
+    }
+}

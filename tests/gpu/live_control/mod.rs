@@ -1,0 +1,133 @@
+//! Streams that are frozen, looked back on, and told of other settings, sources and devices: what is shown is what was sent.
+
+mod async_compilation;
+mod cine;
+mod sources;
+
+use crate::common::gpu::*;
+use crate::live::*;
+use echolume::gpu::{Options, Renderer};
+use echolume::live::cine::Room;
+use echolume::live::views::Views;
+use echolume::live::{self, Feed, Shown, Step, Stream, Update};
+use echolume::picture::Picture;
+use echolume::source::Frame;
+use echolume::source::live::{Event, Live};
+use echolume::source::recorder::Header;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+/// Nothing here takes nearly so long.
+pub const BOUND: Duration = Duration::from_secs(120);
+pub const ROOM: Room = Room { volumes: 8, bytes: 1 << 24 };
+const MARK: &str = "so far";
+
+/// A source that says what it is sent, when it is sent.
+pub struct Fed(pub Receiver<Event>);
+
+impl Live for Fed {
+    fn next(&mut self, patience: Duration) -> Event {
+        match self.0.recv_timeout(patience) {
+            Ok(event) => event,
+            Err(RecvTimeoutError::Timeout) => Event::Idle,
+            Err(RecvTimeoutError::Disconnected) => Event::End(None),
+        }
+    }
+
+    fn can_wait(&self) -> bool {
+        true
+    }
+}
+
+pub fn fed(record: Option<&Path>) -> (Sender<Event>, Feed) {
+    let (say, said) = channel();
+    (say, Feed::new(Box::new(Fed(said)), record).expect("thread"))
+}
+
+/// A stream, and what speaks to it.
+struct Bench {
+    stream: Stream,
+    say: Sender<Event>,
+    faults: Vec<String>,
+}
+
+impl Bench {
+    fn new(device: &Device, toml: &str, options: live::Options) -> Bench {
+        Bench::recorded(device, toml, options, None)
+    }
+
+    fn recorded(device: &Device, toml: &str, options: live::Options, record: Option<&Path>) -> Bench {
+        let (say, feed) = fed(record);
+        Bench { stream: Stream::new(device, feed, settings(toml), options), say, faults: Vec::new() }
+    }
+
+    fn begin(&self, header: Header) {
+        self.say.send(Event::Begin(Box::new(header))).expect("listens");
+    }
+
+    fn frames(&self, frames: impl IntoIterator<Item = Frame>) {
+        frames.into_iter().for_each(|frame| self.say.send(Event::Frame(frame)).expect("listens"));
+    }
+
+    /// All that was said is looked at, and all that follows from it is done.
+    fn settle(&mut self) -> Vec<Shown> {
+        self.say.send(Event::Fault(MARK.into())).expect("listens");
+        let (mut shown, mut is_marked, begun) = (Vec::new(), false, Instant::now());
+        while !is_marked || !self.stream.is_idle() {
+            assert!(begun.elapsed() < BOUND, "it does not come to rest");
+            match self.stream.step(Duration::from_millis(1)).expect("step") {
+                Step::Picture(picture) => shown.push(picture),
+                Step::Fault(fault) if fault == MARK => is_marked = true,
+                Step::Fault(fault) => self.faults.push(fault),
+                Step::Went => {}
+                Step::End(why) => panic!("the end: {why:?}"),
+            }
+        }
+        shown
+    }
+
+    /// The last picture after all that was said, and its volume.
+    fn picture(&mut self) -> (u32, Picture) {
+        let last = self.settle().pop().expect("a picture");
+        (last.volume, last.picture.expect("brought back"))
+    }
+
+    /// A volume shown live, and its picture.
+    fn live(&mut self, number: u32) -> Picture {
+        self.frames(speckled(number));
+        let (volume, picture) = self.picture();
+        assert_eq!(volume, number);
+        picture
+    }
+
+    fn dispatches(&self) -> u64 {
+        self.stream.dispatches()
+    }
+}
+
+fn kept(update: Update) -> live::Options {
+    live::Options { update, cine: ROOM, ..live::Options::default() }
+}
+
+/// A volume as a renderer of its own draws it.
+fn fresh(device: &Device, toml: &str, header: &Header, update: Update, frames: &[Frame]) -> Picture {
+    let views = Views::new(header, &settings(toml), update).expect("views");
+    let backward = vec![frames[0].backward; frames.len()];
+    let scene = views.of(&backward).into_owned();
+    let mut plain = Renderer::new(device, scene, &Options::default()).expect("renderer");
+    frames.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
+    plain.show(0).expect("show");
+    plain.picture().expect("picture")
+}
+
+fn of(device: &Device, toml: &str, number: u32) -> Picture {
+    fresh(device, toml, &header(0.3), Update::Whole, &speckled(number))
+}
+
+/// Pipelines that were made while whoever draws waited for them.
+fn waited_for(device: &Device) -> u64 {
+    let counts = &device.counts;
+    counts.pipelines.load(Ordering::Relaxed) - counts.beside.load(Ordering::Relaxed)
+}

@@ -1,0 +1,189 @@
+//! Streams in which something goes wrong or changes half-way: what is shown stays whole, and the rest is said.
+
+use crate::common::gpu::*;
+use crate::live::*;
+use echolume::gpu::{Options, Renderer};
+use echolume::live::{self, Step};
+use echolume::probe::Geometry;
+use echolume::source::Frame;
+use echolume::source::live::Event;
+use echolume::source::recorder::Header;
+use std::time::Duration;
+
+/// Prevents a stream that stops, or shows anything wrong, for what a source does wrong.
+#[test]
+fn what_is_wrong_is_said_and_left_out() {
+    let device = Device::new();
+    let mut events = events(header(0.0), stamped(1));
+    events.insert(0, Event::Frame(stamped(0).remove(0)));
+    let of = |change: &dyn Fn(&mut Frame)| {
+        let mut frame = stamped(2).remove(0);
+        change(&mut frame);
+        Event::Frame(frame)
+    };
+    events.push(of(&|f| f.bytes.truncate(1000)));
+    events.push(of(&|f| f.bytes.extend([0; 64])));
+    events.push(of(&|f| f.bytes.truncate(64 * 20)));
+    // A number that is not to be believed: frames of volume 3 come after it.
+    events.push(of(&|f| (f.volume, f.bytes) = (1 << 31, vec![0; 7])));
+    events.push(of(&|f| f.slice = 9));
+    events.push(of(&|f| f.slice = usize::MAX));
+    events.push(Event::Lines { frame: stamped(2).remove(3), first: 7 });
+    events.push(Event::Fault("the peer went away".into()));
+    events.push(Event::Begin(Box::new(header(0.3))));
+    events.extend(stamped(3).into_iter().map(Event::Frame));
+    // Another geometry, with frames of another size.
+    let other = Geometry::Sweep(linear());
+    events.push(Event::Begin(Box::new(Header { forward: other.clone(), backward: other, ..header(0.0) })));
+    let frame =
+        |n| Frame { volume: 4, number: n, slice: n as usize, backward: false, time: None, bytes: vec![45; 48 * 20] };
+    events.extend((0..7).map(|n| Event::Frame(frame(n))));
+    let mut stream = stream(&device, events, settings("mode = 'mip'"), live::Options::default());
+    let mut shown = Vec::new();
+    let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
+    assert_eq!(shown.last(), Some(&4), "{shown:?}: {faults:?}");
+    let expected = [
+        "not told",
+        "1000 bytes",
+        "1600 bytes",
+        "1280 bytes",
+        "7 bytes",
+        "slice 9",
+        "slice",
+        "from line 7",
+        "the peer went away",
+    ];
+    assert_eq!(faults.len(), expected.len(), "{faults:?}");
+    for (fault, part) in faults.iter().zip(expected) {
+        assert!(fault.contains(part), "{part}: {fault}");
+    }
+}
+
+/// Prevents settings that reach pictures only with the next volume, or take the stream down.
+#[test]
+fn other_settings_are_drawn_of_the_volume_that_is_there() {
+    let device = Device::new();
+    let mut stream =
+        stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::Options::default());
+    let mut first = None;
+    while first.is_none() {
+        if let Step::Picture(shown) = stream.step(Duration::from_millis(20)).expect("step") {
+            first = Some(shown.picture);
+        }
+    }
+    assert!(stream.change(settings("mode = 'mip'\ncamera = { zoom = -1 }")).is_err());
+    stream.change(settings("mode = 'mip'\ncamera = { azimuth = 40 }")).expect("change");
+    let mut second = None;
+    run(&mut stream, |_, shown| second = Some((shown.volume, shown.picture)));
+    let (volume, second) = second.expect("drawn again");
+    assert!(volume == 0 && Some(&second) != first.as_ref());
+}
+
+/// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
+#[test]
+fn a_lost_device_costs_a_volume_and_not_the_stream() {
+    use echolume::gpu::faults::Seam;
+    let (device, other) = (Device::new(), Device::new());
+    let options = live::Options::default();
+    let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
+    let (mut shown, mut lost) = (Vec::new(), 0);
+    loop {
+        match stream.step(Duration::from_millis(20)) {
+            Ok(Step::Picture(picture)) => {
+                shown.push(picture.volume);
+                if shown.len() == 2 {
+                    device.faults.inject(Seam::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
+                }
+            }
+            Ok(Step::End(why)) => break assert_eq!(why, None),
+            Ok(_) => {}
+            Err(live::StreamError::Gpu(error)) if error.is_device_lost() => {
+                lost += 1;
+                stream.revive(&other).expect("made anew");
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert!(lost == 1 && shown.first() == Some(&0) && shown.last() == Some(&5), "{lost} lost, {shown:?}");
+    let counts = stream.statistics().expect("statistics").volumes;
+    assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
+    assert!(counts.incomplete >= 1, "{counts:?}");
+}
+
+/// Prevents volumes that are never whole where some slices are not seen and frames come line by line.
+#[test]
+fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
+    let device = Device::new();
+    let toml = "mode = 'mip'\nregion = { elevation = [-1, 1], depth = [30, 50] }";
+    let lines = |frame: Frame| {
+        let chunks: Vec<_> = frame.bytes.chunks(64 * 5).map(<[u8]>::to_vec).collect();
+        let part = move |(n, bytes)| Event::Lines { frame: Frame { bytes, ..frame.clone() }, first: 5 * n };
+        chunks.into_iter().enumerate().map(part).collect::<Vec<_>>()
+    };
+    let mut events = events(header(0.3), []);
+    events.extend((0..3).flat_map(stamped).flat_map(lines));
+    let mut stream = stream(&device, events, settings(toml), live::Options::default());
+    let mut shown = Vec::new();
+    let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
+    assert_eq!((faults, shown), (vec![], vec![0, 1, 2]));
+    assert!(stream.renderer().expect("begun").skipped() > 0, "all slices are seen");
+}
+
+/// Prevents slices that went through stage 1 as it was before from being shown beside those after, as one whole volume.
+#[test]
+fn settings_that_need_frames_again_show_whole_volumes_only() {
+    let device = Device::new();
+    for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
+        let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));
+        let source = Told(events(header(0.0), (0..80).flat_map(speckled)).into(), Duration::from_millis(2), false);
+        let mut stream = stream_of(&device, source, before, live::Options::default());
+        let (mut pictures, mut frames, mut checked) = (0, 0, 0);
+        // On a busy machine most volumes pass while one is drawn.
+        while checked < 3 {
+            match stream.step(Duration::from_millis(20)).expect("step") {
+                Step::Picture(shown) => {
+                    pictures += 1;
+                    let scene = stream.scene().expect("begun").clone();
+                    if scene.settings != after {
+                        continue;
+                    }
+                    checked += 1;
+                    let mut plain = Renderer::new(&device, scene, &Options::default()).expect("renderer");
+                    let whole = speckled(shown.volume);
+                    whole.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
+                    plain.show(0).expect("show");
+                    assert!(shown.picture == plain.picture().ok(), "{toml}: volume {}", shown.volume);
+                }
+                Step::End(_) => break,
+                _ => frames += 1,
+            }
+            // In the middle of the first volume, and of one behind a picture.
+            if (pictures, frames) == (0, 5) && at == 0 || pictures == 1 && at == 1 && checked == 0 {
+                stream.change(after.clone()).expect("change");
+            }
+        }
+        assert!(checked > 0, "{toml}: {pictures} pictures, none after the change");
+    }
+}
+
+/// Prevents a frame that arrives line by line from being torn by a picture, where slices are copied many at once.
+#[test]
+fn lines_that_wait_in_a_slab_outlive_a_picture() {
+    let device = Device::new();
+    let scene =
+        scene(cartesian([16, 12, 6]), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }\nslices.format = 'r8'");
+    let frame = |k: usize| -> Vec<u8> { (0..16 * 12).map(|i| (i * 7 + k * 31) as u8).collect() };
+    let mut renderer = Renderer::new(&device, scene, &Options::default()).expect("renderer");
+    for k in 0..6u32 {
+        let bytes = frame(k as usize);
+        renderer.lines(k, 0, &bytes[..16 * 5], 0).expect("lines");
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        assert!(renderer.lines(k, 5, &bytes[16 * 5..], 0).expect("lines"));
+    }
+    renderer.show(0).expect("show");
+    let volume = volume_of(&mut renderer);
+    let expected: Vec<f64> = (0..6).flat_map(frame).map(|v| f64::from(v) / 255.0).collect();
+    let off = volume.values.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(off < 1e-6 && renderer.torn() == 0, "{off}");
+}

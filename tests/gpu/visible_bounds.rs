@@ -1,0 +1,355 @@
+//! Only what can be seen is converted and filtered: no sample of stage 2 lies outside of it, the picture is the same bit for
+//! bit, and frames are asked for anew only when more is to be seen.
+
+use crate::common::gpu::*;
+use echolume::gpu::{Options, Renderer};
+use echolume::passes::chain::rectangle;
+use echolume::passes::{DispatchArgs, Slot, Texels};
+use echolume::plan::Rerun;
+use echolume::probe::{Advance, Geometry, Probe};
+use echolume::scene::{Mode, RING, Scene, VisibleBounds};
+use glam::DVec3;
+
+fn moved(probe: Probe) -> Probe {
+    Probe { advance: Advance::Same(0.7 * probe.slices.pitch()), ..probe }
+}
+
+fn geometries() -> Vec<(&'static str, Geometry)> {
+    let each = (0..9).map(|k| if k % 3 == 0 { 0.03 } else { -0.02 }).collect();
+    vec![
+        ("Cartesian", cartesian([61, 70, 9])),
+        ("fan", Geometry::Sweep(wobbler())),
+        ("fan, motor moving", Geometry::Sweep(moved(wobbler()))),
+        ("fan, uneven and moving", Geometry::Sweep(Probe { advance: Advance::Each(each), ..uneven(wobbler()) })),
+        ("translated", Geometry::Sweep(linear())),
+        ("translated, moving", Geometry::Sweep(moved(linear()))),
+        ("single frame", Geometry::Sweep(still())),
+    ]
+}
+
+/// Texel indices of a place, by the exact inverse of the probe's maps; none where it is not insonified.
+fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
+    let column = |v: f64, axis: usize| (v - scene.grid.origin[axis]) / scene.grid.pitch[axis];
+    match &scene.geometry {
+        Geometry::Cartesian(grid) => Some(std::array::from_fn(|a| (place[a] - grid.origin[a]) / grid.spacing[a])),
+        Geometry::Sweep(probe) => {
+            let (x, y, _) = probe.unswept(place);
+            let at = probe.to_indices(place);
+            let within = |index: f64, count: usize| index >= 0.0 && index <= (count - 1) as f64;
+            let inside = within(at.sample, probe.samples)
+                && within(at.line, probe.lines.len())
+                && within(at.slice, probe.slices.len());
+            inside.then(|| [column(x, 0), column(y, 1), at.slice])
+        }
+    }
+}
+
+/// The texels that the device's filter mixes at these indices.
+fn mixed(scene: &Scene, at: [f64; 3]) -> VisibleBounds {
+    let last = scene.volume_size().map(|n| f64::from(n - 1));
+    let clamped = |v: f64, axis: usize| v.clamp(0.0, last[axis]) as u32;
+    VisibleBounds {
+        low: std::array::from_fn(|a| clamped(at[a].floor(), a)),
+        high: std::array::from_fn(|a| clamped(at[a].floor() + 1.0, a) + 1),
+    }
+}
+
+fn random_scene(geometry: &Geometry, noise: &mut Noise) -> Scene {
+    let free = scene(geometry.clone(), BYTES, "");
+    let offset = free.probe().map_or(0.0, |p| p.array_radius());
+    let mut sides = Vec::new();
+    for (axis, name) in ["lateral", "depth", "elevation"].iter().enumerate() {
+        let off = if axis == 1 { offset } else { 0.0 };
+        let (low, high) = (free.low[axis] - off, free.high[axis] - off);
+        let at = noise.range(low, high);
+        let end = noise.range(at, high).max(at + 0.02 * (high - low));
+        if noise.next() < 0.7 {
+            sides.push(format!("{name} = [{at}, {end}]"));
+        }
+    }
+    let mode = ["sr", "vr", "mixed", "mip", "plane", "cube"][(noise.next() * 6.0) as usize];
+    let clip = match noise.next() < 0.4 {
+        true => {
+            let at = (free.low + free.high) / 2.0 - DVec3::Y * offset;
+            let n: [f64; 3] = std::array::from_fn(|_| noise.range(-1.0, 1.0));
+            format!("clip = [{{ at = [{}, {}, {}], normal = [{}, {}, {}] }}]", at.x, at.y, at.z, n[0], n[1], n[2])
+        }
+        false => String::new(),
+    };
+    let pick = |noise: &mut Noise, of: &[&str]| of[(noise.next() * of.len() as f64) as usize].to_string();
+    let ray = pick(noise, &["", "ray.sliding = 3", "ray.sliding = 5", "ray.spread = 1.0", "ray.entries = 5"]);
+    let rough = pick(noise, &["1", "2", "5"]);
+    let depth = free.low.y - offset + noise.range(0.0, 0.5) * (free.high.y - free.low.y);
+    let start = if noise.next() < 0.3 { format!("surface.start_depth = {depth}") } else { String::new() };
+    let toml = format!(
+        "mode = '{mode}'\nslices.pixels = 120\nsurface.rough = {rough}\n{ray}\n{start}\n{clip}\nregion = {{ {} }}",
+        sides.join(", ")
+    );
+    let settings = toml::from_str(&toml).expect("settings");
+    // A start depth below the region, or a face that leaves nothing, is refused: the region alone is left then.
+    Scene::new(geometry.clone(), BYTES, settings)
+        .unwrap_or_else(|_| scene(geometry.clone(), BYTES, &format!("mode = '{mode}'\nslices.pixels = 120")))
+}
+
+/// A place that some pass may sample: one of what is kept, or at most as far from it as its samples reach.
+fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
+    let sr = scene.settings.mode == Mode::Surface || (scene.settings.mode == Mode::Mixed && noise.next() < 0.5);
+    let low = if sr { scene.surface_view().low } else { scene.low };
+    // Corners and edges are where a bound fails first.
+    let within = |noise: &mut Noise, a: f64, b: f64| match noise.next() {
+        s if s < 0.2 => a,
+        s if s < 0.4 => b,
+        _ => noise.range(a, b),
+    };
+    let place = DVec3::from_array(std::array::from_fn(|a| within(noise, low[a], scene.high[a])));
+    if scene.clips().any(|(normal, limit)| normal.dot(place) > limit) {
+        return None;
+    }
+    let marches = !matches!(scene.settings.mode, Mode::Plane | Mode::Cube);
+    let ring = if sr { RING / 2 * scene.settings.surface.rough + RING } else { 0 };
+    let steps = if marches { ring + scene.settings.ray.sliding / 2 } else { 0 };
+    let away = DVec3::from_array(std::array::from_fn(|_| noise.range(-1.0, 1.0))).normalize_or_zero();
+    Some(place + away * (f64::from(steps) * scene.step * within(noise, 0.0, 1.0)))
+}
+
+#[test]
+fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
+    let mut noise = Noise(17);
+    for (name, geometry) in geometries() {
+        let (mut shares, mut cases) = (0.0, 0);
+        for _ in 0..60 {
+            let scene = random_scene(&geometry, &mut noise);
+            let mut found: Option<VisibleBounds> = None;
+            for _ in 0..4000 {
+                let Some(at) = sampled(&scene, &mut noise).and_then(|place| texel(&scene, place)) else { continue };
+                let mixed = mixed(&scene, at);
+                assert!(
+                    scene.seen.holds(&mixed),
+                    "{name}: {at:?} is not of {:?}\n{}",
+                    scene.seen,
+                    toml::to_string(&scene.settings).unwrap()
+                );
+                let old = found.unwrap_or(mixed);
+                found = Some(VisibleBounds {
+                    low: std::array::from_fn(|a| old.low[a].min(mixed.low[a])),
+                    high: std::array::from_fn(|a| old.high[a].max(mixed.high[a])),
+                });
+            }
+            let Some(found) = found else { continue };
+            // Two texels of slack on each side, and what random places have missed.
+            let (size, count) = (scene.volume_size(), |low: [u32; 3], high: [u32; 3]| {
+                (0..3).map(|a| f64::from(high[a] - low[a])).product::<f64>()
+            });
+            let least = count(
+                found.low.map(|n| n.saturating_sub(2)),
+                std::array::from_fn(|a| (found.high[a] + 2).min(size[a])),
+            );
+            shares += count(scene.seen.low, scene.seen.high) / least;
+            cases += 1;
+        }
+        println!("{name}: {:.2} of the least box on average over {cases} scenes", shares / f64::from(cases));
+        // Of nine slices, the way of the motor within a frame may be one on each side: the box reaches as far as a sweep either way.
+        assert!(cases > 20 && shares / f64::from(cases) < 3.0, "{name}");
+    }
+}
+
+#[test]
+fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
+    let all =
+        |toml: &str| scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\nslices.pixels = 200\n{toml}"));
+    let whole = all("").seen;
+    assert_eq!(whole, VisibleBounds::all(all("").volume_size()));
+    let cuts = |toml: &str| {
+        let seen = all(toml).seen;
+        let sides = (0..3).flat_map(|a| [seen.low[a] > whole.low[a] + 1, seen.high[a] + 1 < whole.high[a]]);
+        sides.enumerate().filter(|(_, cut)| *cut).map(|(i, _)| i).collect::<Vec<_>>()
+    };
+    assert_eq!(cuts("region.lateral = [-5, 60]"), [0]);
+    assert_eq!(cuts("region.lateral = [-60, 5]"), [1]);
+    assert_eq!(cuts("region.elevation = [2, 60]"), [4]);
+    assert_eq!(cuts("region.elevation = [-60, -2]"), [5]);
+    assert!(cuts("region.depth = [30, 90]").contains(&2), "the near side");
+    assert!(cuts("region.depth = [-9, 20]").contains(&3), "the far side");
+    assert_eq!(cuts("volume.start_depth = 30"), cuts("region.depth = [30, 90]"));
+    assert_eq!(cuts("clip = [{ at = [5, 0, 0], normal = [2, 0, 0] }]"), [1]);
+    assert_eq!(
+        all("clip = [{ at = [500, 0, 0], normal = [-1, 0, 0] }]").seen,
+        VisibleBounds::default(),
+        "all is cut away"
+    );
+    assert_eq!(cuts("region.lateral = [-5, 5]\nslices.everything = true"), [0; 0]);
+}
+
+const FILTERS: [(&str, &str); 11] = [
+    ("none", ""),
+    ("median", "median = true"),
+    ("Nagao-Matsuyama", "estimator = 'nagao-matsuyama'"),
+    ("sigma", "sigma = { window = 9, sigma = 0.1 }"),
+    ("enhanced sigma", "enhanced_sigma = { window = 3, largest = 11, sigma = 0.05, centre = 'nagao-matsuyama' }"),
+    ("Perona-Malik", "perona_malik = { repeat = 12 }"),
+    (
+        "AOS between filters",
+        "median = true, perona_malik = { scheme = 'aos', step = 3.0, repeat = 2 }, smooth = { lateral = 1.0 }",
+    ),
+    ("Gaussian", "smooth = { lateral = 1.2, depth = 0.9, elevation = 0.8 }"),
+    ("kernel", "smooth = { kernel = 5 }"),
+    ("slight blur", "blur = true, median = true"),
+    (
+        "all",
+        "median = true, estimator = 'perona-malik', sigma = { window = 5 }, enhanced_sigma = { window = 3, largest = 7 }, \
+         perona_malik = { repeat = 2 }, smooth = { lateral = 0.8, depth = 0.8, elevation = 1.1 }",
+    ),
+];
+
+/// Windows on the volume, in depths below the face or along the axes of the Cartesian one.
+const WINDOWS: [&str; 5] = [
+    "mode = 'sr'\nregion = { lateral = [-6, 9], depth = [14, 24], elevation = [-2, 3] }",
+    "mode = 'vr'\nvolume = { start_depth = 13.0 }\nray.sliding = 3\nregion = { lateral = [-20, 4] }",
+    "mode = 'mixed'\nsurface = { start_depth = 16.0 }\nvolume = { start_depth = 10.0 }\nlight.skin = {}\nregion = { elevation = [-3, 1] }",
+    "mode = 'mip'\nlayout = 'four'\nregion = { lateral = [-3, 8], depth = [5, 19] }\nclip = [{ at = [4, 15, 0], normal = [1, 0.4, 0.3] }]",
+    "mode = 'cube'\ncube.inset.right = 3\nregion = { depth = [8, 22], elevation = [-1, 2] }",
+];
+
+fn speckle(scene: &Scene) -> Vec<Texels> {
+    let mut noise = Noise(23);
+    let mut frames = body_frames(scene, |p| 0.35 + 0.3 * (0.4 * (p.x + 1.3 * p.y + 0.7 * p.z)).sin());
+    frames.iter_mut().flat_map(|f| &mut f.values).for_each(|v| *v = (*v + 0.3 * noise.next()).clamp(0.0, 1.0));
+    frames
+}
+
+#[test]
+fn the_picture_is_that_of_a_volume_filtered_whole() {
+    let device = Device::new();
+    let mut smallest = 1.0f64;
+    for (g, (name, geometry)) in geometries().iter().enumerate() {
+        for (f, (filter, slices)) in FILTERS.iter().enumerate() {
+            let window = WINDOWS[(g + f) % WINDOWS.len()];
+            let toml = |everything: bool| {
+                let slices = format!("pixels = 96, everything = {everything}, {slices}");
+                format!(
+                    "{window}\npicture.size = [26, 22]\ncamera = {{ azimuth = 25, elevation = -15 }}\nslices = {{ {} }}",
+                    slices.trim_end_matches([',', ' '])
+                )
+            };
+            let made = |everything: bool| scene(geometry.clone(), BYTES, &toml(everything));
+            let frames = speckle(&made(true));
+            let draw = |renderer: &mut Renderer| {
+                let picture = renderer.picture().expect("picture");
+                let distance = renderer.read(Slot::Distance).expect("read");
+                let drawn = renderer.read(Slot::Picture).expect("read").expect("there");
+                (renderer.scene().share_seen(), picture, distance, drawn)
+            };
+            // First what is seen, so that nothing of the whole volume is there yet.
+            let mut renderer = rendered(&device, made(false), &frames);
+            let (share, b, b_distance, b_drawn) = draw(&mut renderer);
+            let rerun = renderer.change(made(true)).expect("change");
+            assert_eq!(rerun == Rerun::Frames, share < 1.0, "{name}, {filter}: {rerun:?}");
+            send(&mut renderer, &frames, 0);
+            let (whole, a, a_distance, a_drawn) = draw(&mut renderer);
+            assert_eq!(whole, 1.0);
+            smallest = smallest.min(share);
+            assert!(a_drawn.values.iter().any(|v| *v > 0.0), "{name}, {filter}: a black picture shows nothing");
+            assert!(a == b && a_drawn == b_drawn && a_distance == b_distance, "{name}, {filter}, {window}");
+        }
+    }
+    assert!(smallest < 0.1, "{smallest}: the windows hide too little");
+}
+
+const WINDOW: &str = "mode = 'sr'\npicture.size = [24, 24]\nray.step = 0.1\ncamera = { target = [0, 25, 0] }";
+
+fn with(window: &str, slices: &str) -> Scene {
+    scene(Geometry::Sweep(wobbler()), BYTES, &format!("{WINDOW}\nslices = {{ pixels = 200{slices} }}\n{window}"))
+}
+
+#[test]
+fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
+    let device = Device::new();
+    let smooth = ", median = true, smooth = { lateral = 1.0, elevation = 0.3 }";
+    let scene = with("region = { lateral = [-4, 6], depth = [20, 30], elevation = [4, 9] }", smooth);
+    let frames = scene.frames_seen();
+    assert!(frames.len() < 8 && frames.len() > scene.seen.slices().len(), "{frames:?} of 9, {:?}", scene.seen);
+    let bright = speckle(&scene);
+    let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+    let recorded = renderer
+        .recorded(|r| {
+            send(r, &bright, 0);
+            r.picture()
+        })
+        .expect("recorded");
+    assert_eq!(renderer.skipped(), 9 - frames.len() as u64);
+    for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
+        let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
+        let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
+        // Some passes make four texels an invocation.
+        let run = |axis: usize| {
+            if (name, axis) == ("median_slice", 1) || (name, axis) == ("gaussian_lateral", 0) { 4 } else { 1 }
+        };
+        let each = extents.iter().all(|[x, y, _]| [x * run(0), y * run(1)] == made.size);
+        assert!(each && made.size[0] < scene.grid.size[0] / 2, "{name}: {extents:?}, {made:?}");
+        let slices = if name == "gaussian_elevation" { scene.seen.slices().len() } else { frames.len() };
+        let run = if name == "gaussian_elevation" { 4 } else { 1 };
+        assert_eq!(extents.iter().map(|e| e[2]).sum::<u32>(), (slices as u32).div_ceil(run), "{name}");
+    }
+    for (slot, pass, slices) in
+        [(Slot::SharpVolume, "gaussian_lateral", frames), (Slot::Volume, "gaussian_elevation", scene.seen.slices())]
+    {
+        let made = rectangle(&scene, pass, &DispatchArgs::default()).expect("a pass over slices");
+        let volume = renderer.read(slot).expect("read").expect("there");
+        let [width, height, depth] = volume.size;
+        let mut written = 0;
+        for (x, y, z) in (0..depth).flat_map(|z| (0..height).flat_map(move |y| (0..width).map(move |x| (x, y, z)))) {
+            let along = |at: usize, a: usize| (made.first[a]..made.first[a] + made.size[a]).contains(&(at as u32));
+            let inside = along(x, 0) && along(y, 1) && slices.contains(&(z as u32));
+            let value = volume.one(x, y, z);
+            assert!(inside || value == 0.0, "{}: {x}, {y}, {z} is {value}", slot.name());
+            written += u32::from(value > 0.0);
+        }
+        assert!(written > 1000, "{}: {written}", slot.name());
+    }
+}
+
+#[test]
+fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
+    let device = Device::new();
+    let smooth = ", smooth = { lateral = 1.0, elevation = 0.8 }";
+    let [small, middle, large] = ["[-3, 4]", "[-6, 7]", "[-10, 12]"]
+        .map(|side| with(&format!("region = {{ lateral = {side}, elevation = {side} }}"), smooth));
+    let frames = speckle(&small);
+    let fresh = |scene: &Scene| rendered(&device, scene.clone(), &frames).picture().expect("picture");
+    let without_frames = |rerun: &Rerun| matches!(rerun, Rerun::Steps { .. });
+
+    let mut renderer = rendered(&device, middle.clone(), &frames);
+    assert_eq!(renderer.picture().expect("picture"), fresh(&middle));
+    assert!(without_frames(&renderer.change(small.clone()).expect("change")), "it shrinks");
+    let passes = renderer.dispatched(|r| r.picture()).expect("picture");
+    assert!(passes[0] == "raycast_surface", "{passes:?}");
+    assert_eq!(renderer.picture().expect("picture"), fresh(&small));
+    assert!(without_frames(&renderer.change(middle.clone()).expect("change")), "what was there is there still");
+    assert_eq!(renderer.picture().expect("picture"), fresh(&middle));
+    assert_eq!(renderer.change(large.clone()).expect("change"), Rerun::Frames, "it grows");
+    send(&mut renderer, &frames, 0);
+    assert_eq!(renderer.picture().expect("picture"), fresh(&large));
+
+    // A frame that came meanwhile was filtered over the smaller region, and so were slices smoothed meanwhile.
+    assert!(without_frames(&renderer.change(small.clone()).expect("change")));
+    renderer.frame(4, &frames[4].encode(frame_format(&small)), 0).expect("frame");
+    assert_eq!(renderer.change(large.clone()).expect("change"), Rerun::Frames);
+    send(&mut renderer, &frames, 0);
+    assert!(without_frames(&renderer.change(small.clone()).expect("change")));
+    renderer.picture().expect("picture");
+    assert_eq!(renderer.change(large.clone()).expect("change"), Rerun::Frames);
+    send(&mut renderer, &frames, 0);
+    assert_eq!(renderer.picture().expect("picture"), fresh(&large));
+
+    // While a region is dragged everything is kept, and afterwards new frames are cut again.
+    let dragged = with("region = { lateral = [-3, 4] }", &format!("{smooth}, everything = true"));
+    assert_eq!(renderer.change(dragged).expect("change"), Rerun::Frames);
+    send(&mut renderer, &frames, 0);
+    renderer.picture().expect("picture");
+    for scene in [&small, &large, &middle] {
+        assert!(without_frames(&renderer.change(scene.clone()).expect("change")));
+        assert_eq!(renderer.picture().expect("picture"), fresh(scene));
+    }
+    let recorded = renderer.recorded(|r| r.frame(4, &frames[4].encode(frame_format(&middle)), 0)).expect("frame");
+    assert!(recorded.iter().all(|(_, [x, _, _])| *x < middle.grid.size[0]), "{recorded:?}");
+}

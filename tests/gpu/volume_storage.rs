@@ -1,0 +1,160 @@
+//! How the volume is stored for the rays: frames that are slices already are copied, and quads of neighbours are what eight texels are.
+
+use crate::common::gpu::*;
+use echolume::gpu::{Options, Renderer};
+use echolume::passes::slots::Format;
+use echolume::passes::{Slot, Texels, chain, is_hit};
+use echolume::plan::Rerun;
+use echolume::probe::Geometry;
+use echolume::scene::{Input, Sampling, Scene};
+use echolume::source::StoredType;
+use glam::DVec3;
+
+const LOOK: &str = "picture.size = [72, 56]\ncamera = { azimuth = 25, elevation = -15 }\nray.step = 0.3";
+
+fn volume(stored: StoredType, full: f64, toml: &str) -> Scene {
+    scene(cartesian([24, 33, 11]), Input { stored, range: [0.0, full] }, &format!("{toml}\n{LOOK}"))
+}
+
+fn blob(p: DVec3) -> f64 {
+    let off = p.distance(DVec3::new(2.0, 8.0, 1.5));
+    if off < 4.0 { 0.9 - 0.08 * off } else { 0.05 * (p.x * 2.0).sin().abs() }
+}
+
+#[test]
+fn a_frame_that_is_a_slice_already_is_copied_and_nothing_runs_on_it() {
+    let device = Device::new();
+    for (stored, full, format) in [(StoredType::U8, 255.0, "r8"), (StoredType::U16, 65535.0, "r16")] {
+        for smooth in ["", ", smooth = { elevation = 1.0 }"] {
+            let set = format!("mode = 'mip'\nslices = {{ format = '{format}'{smooth} }}");
+            let scene = volume(stored, full, &set);
+            let target = chain::copied(&scene).expect("copied");
+            assert_eq!(target, if smooth.is_empty() { Slot::Volume } else { Slot::SharpVolume });
+            let frames = body_frames(&scene, blob);
+            let mut renderer = rendered(&device, scene.clone(), &frames);
+            assert!(!renderer.plan().slots.contains(&Slot::Frames), "no array of frames is kept");
+            assert!(!renderer.plan().steps.iter().any(|s| s.pass.name == "load_slice"));
+            let there = renderer.read(target).expect("read").expect("the volume");
+            for (z, frame) in frames.iter().enumerate() {
+                let slice = Texels::from_fn([24, 33, 1], 1, |[x, y, _], _| there.one(x, y, z));
+                let format = Slot::Frames.format(&scene);
+                assert_eq!(slice.encode(format), frame.encode(format), "{format:?}, slice {z}");
+            }
+            // The same through a pass, into a format that is finer than either.
+            let passed = scene.settings.clone();
+            let mut passed = Scene::new(scene.geometry.clone(), scene.input, passed).expect("scene");
+            passed.settings.slices.format = echolume::scene::VolumeFormat::R32f;
+            assert_eq!(chain::copied(&passed), None);
+            let other = rendered(&device, passed, &frames).picture().expect("picture");
+            let (_, largest) = difference(&renderer.picture().expect("picture"), &other);
+            assert!(largest <= 1.0, "{format}{smooth}: {largest} levels");
+        }
+    }
+}
+
+#[test]
+fn what_has_to_be_scaled_clamped_or_filtered_is_not_copied() {
+    let copied = |stored, full, toml: &str| chain::copied(&volume(stored, full, toml));
+    assert!(copied(StoredType::U8, 255.0, "slices.format = 'r8'").is_some());
+    assert_eq!(copied(StoredType::U8, 200.0, "slices.format = 'r8'"), None, "another range");
+    assert_eq!(copied(StoredType::U8, 255.0, "slices.format = 'r16'"), None, "another format");
+    assert_eq!(copied(StoredType::F32, 1.0, "slices.format = 'r32f'"), None, "floats may be beyond 0..1");
+    assert_eq!(copied(StoredType::U8, 255.0, "slices = { format = 'r8', median = true }"), None, "a filter");
+    let polar = scene(Geometry::Sweep(wobbler()), BYTES, "slices.format = 'r8'");
+    assert_eq!(chain::copied(&polar), None, "polar frames");
+}
+
+#[test]
+fn taking_a_filter_up_and_leaving_it_asks_for_the_frames_again() {
+    let device = Device::new();
+    let plain = volume(StoredType::U8, 255.0, "mode = 'mip'\nslices.format = 'r8'");
+    let filtered = volume(StoredType::U8, 255.0, "mode = 'mip'\nslices = { format = 'r8', median = true }");
+    let frames = body_frames(&plain, blob);
+    let mut renderer = rendered(&device, plain.clone(), &frames);
+    let first = renderer.picture().expect("picture");
+    assert_eq!(renderer.change(filtered).expect("change"), Rerun::Everything);
+    send(&mut renderer, &frames, 0);
+    assert!(difference(&renderer.picture().expect("picture"), &first).1 > 2.0, "the median is seen");
+    assert_eq!(renderer.change(plain).expect("change"), Rerun::Everything);
+    send(&mut renderer, &frames, 0);
+    assert_eq!(renderer.picture().expect("picture").rgba, first.rgba);
+}
+
+/// Modes that take samples in different ways.
+const MODES: [&str; 5] = [
+    "mode = 'sr'\nsurface.threshold = 0.2",
+    "mode = 'vr'\nvolume.threshold = 0.3",
+    "mode = 'mip'",
+    "mode = 'mean'",
+    "mode = 'vr'\nvolume.shading = 'first-hit'\nray.sliding = 3",
+];
+
+#[test]
+fn quads_are_the_samples_of_eight_texels() {
+    let device = Device::new();
+    let geometries = [Geometry::Sweep(wobbler()), Geometry::Sweep(uneven(linear())), cartesian([24, 33, 11])];
+    for (g, geometry) in geometries.into_iter().enumerate() {
+        for format in ["r8", "r16", "r16f"] {
+            for mode in MODES {
+                let of = |sampling: &str| {
+                    let set = format!("{mode}\nray.sampling = '{sampling}'\nslices.format = '{format}'\n{LOOK}");
+                    scene(geometry.clone(), BYTES, &set)
+                };
+                let (quads, exact) = (of("quads"), of("exact"));
+                let frames = body_frames(&quads, |p| if p.y > 25.0 && p.y < 31.0 { 0.8 } else { 0.1 } + 0.1 * blob(p));
+                let mut with = rendered(&device, quads.clone(), &frames);
+                assert!(with.plan().steps.iter().any(|s| s.pass.name == "quads"));
+                let mut without = rendered(&device, exact, &frames);
+                assert!(!without.plan().steps.iter().any(|s| s.pass.name == "quads"));
+                let (a, b) = (with.picture().expect("picture"), without.picture().expect("picture"));
+                let (mean, largest) = difference(&a, &b);
+                let what = format!("geometry {g}, {format}, {mode}");
+                // Sums of the same eight products, rounded in another order.
+                assert!(mean < 0.02 && largest <= 2.0, "{what}: {mean} levels on average, {largest} at most");
+                if quads.has_distance() {
+                    let read = |r: &mut Renderer| r.read(Slot::Distance).expect("read").expect("a map");
+                    let (a, b) = (read(&mut with), read(&mut without));
+                    let off = |(a, b): (&f64, &f64)| is_hit(*a) != is_hit(*b) || (is_hit(*a) && (a - b).abs() > 1e-3);
+                    let apart = a.values.iter().zip(&b.values).filter(|pair| off(*pair)).count();
+                    assert!(apart * 500 <= a.values.len(), "{what}: {apart} distances differ");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_view_that_moves_keeps_its_quads() {
+    for size in [8, 24, 48, 96, 192] {
+        let set = format!("mode = 'mip'\npicture.size = [{size}, {size}]\nslices = {{ pixels = 60, format = 'r8' }}");
+        let still = scene(Geometry::Sweep(wobbler()), BYTES, &set);
+        let moving = Scene::new(still.geometry.clone(), still.input, still.settings.moving()).expect("scene");
+        assert!(moving.settings.ray.half);
+        assert_eq!(still.sampled(Sampling::Quads).sampling, moving.sampled(Sampling::Quads).sampling, "{size}");
+    }
+}
+
+#[test]
+fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_never() {
+    let device = Device::new();
+    let of = |toml: &str| scene(cartesian([48, 64, 40]), BYTES, &format!("mode = 'mip'\n{LOOK}\n{toml}"));
+    let (moving, still) = (of("slices.format = 'r8'"), of("slices = { format = 'r8', still = true }"));
+    let frames = body_frames(&moving, blob);
+    let mut renderer = rendered(&device, moving.clone(), &frames);
+    let first = renderer.picture().expect("picture");
+    let packs = |r: &Renderer| r.plan().steps.iter().any(|s| s.pass.name == "quads");
+    assert!(!packs(&renderer), "fewer than six samples a texel do not pay");
+    let software = renderer.fetch() == echolume::gpu::Fetch::Storage;
+    assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));
+    assert_eq!(packs(&renderer), software, "a GPU filters by itself");
+    assert!(difference(&renderer.picture().expect("picture"), &first).1 <= 1.0);
+    // A single slice that is new is packed alone.
+    renderer.frame(7, &frames[3].encode(Format::R8), 0).expect("frame");
+    renderer.show(0).expect("show");
+    let changed = renderer.picture().expect("picture");
+    let mut others = frames.clone();
+    others[7] = frames[3].clone();
+    assert_eq!(changed.rgba, rendered(&device, still, &others).picture().expect("picture").rgba);
+    let floats = of("ray.sampling = 'quads'\nslices = { format = 'r32f', still = true }");
+    assert!(!packs(&Renderer::new(&device, floats, &Options::default()).expect("renderer")));
+}

@@ -1,0 +1,155 @@
+//! Sweeps as Cartesian volumes: right where the sector is, nothing where it is not, and read back as they were written.
+
+use crate::common::files::{Folder, SWEEP};
+use crate::common::probes::wobbler;
+use crate::common::program;
+use echolume::probe::{Advance, Axis, Geometry, Grid, Indices, Probe};
+use echolume::source::convert::{Volume, VolumeFile, lattice};
+use echolume::source::{Frame, Recording, SampleType, StoredType};
+use glam::DVec3;
+use std::path::Path;
+
+fn probe() -> Probe {
+    Probe {
+        lines: Axis::centred(0.02, 60),
+        sample_pitch: 0.4,
+        samples: 128,
+        slices: Axis::centred(0.02, 27),
+        advance: Advance::Same(0.008),
+        ..wobbler()
+    }
+}
+
+/// Straight in every coordinate, so that only the bend of the polar lattice between samples is left as an error.
+fn field(p: DVec3) -> f64 {
+    20_000.0 + 150.0 * p.x + 90.0 * p.y - 120.0 * p.z
+}
+
+fn filled(probe: &Probe) -> Volume {
+    let mut volume = Volume::new(Geometry::Sweep(probe.clone()), StoredType::U16);
+    for k in 0..probe.slices.len() {
+        let value = |i: usize, j: usize| {
+            field(probe.to_space(Indices { sample: i as f64, line: j as f64, slice: k as f64 })).round() as u16
+        };
+        let lines = 0..probe.lines.len();
+        let bytes = lines.flat_map(|j| (0..probe.samples).flat_map(move |i| value(i, j).to_le_bytes())).collect();
+        volume.take(Frame { volume: 0, number: k as u32, slice: k, backward: false, time: None, bytes });
+    }
+    volume
+}
+
+#[test]
+fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
+    let probe = probe();
+    let volume = filled(&probe);
+    let (mut inside, mut outside, mut worst) = (0, 0, 0.0f64);
+    let grid = lattice(&Geometry::Sweep(probe.clone()), 2.3).expect("a lattice");
+    for n in 0..grid.size.iter().product() {
+        let cell = [n % grid.size[0], n / grid.size[0] % grid.size[1], n / (grid.size[0] * grid.size[1])];
+        let place = DVec3::from(grid.origin) + 2.3 * DVec3::from_array(cell.map(|n| n as f64));
+        let at = probe.to_indices(place);
+        let within = |i: f64, n: usize| i >= 0.0 && i <= (n - 1) as f64;
+        let is_inside = within(at.sample, probe.samples)
+            && within(at.line, probe.lines.len())
+            && within(at.slice, probe.slices.len());
+        match volume.at(place) {
+            Some(value) => {
+                inside += 1;
+                worst = worst.max((value - field(place)).abs());
+                assert!(is_inside, "{place} lies outside");
+            }
+            None => {
+                outside += 1;
+                assert!(!is_inside, "{place} lies inside");
+            }
+        }
+    }
+    println!("{inside} places inside, {outside} outside, worst error {worst} of 65535");
+    assert!(inside > 1000 && outside > 1000);
+    // The chord of a line's pitch at 73 mm is off its arc by 3.7 um, of a slice's by 3.2 um: a unit at most, and one for rounding.
+    assert!(worst < 2.0, "{worst}");
+}
+
+#[test]
+fn what_is_written_is_read_back_voxel_by_voxel() {
+    let folder = Folder::new("round");
+    let volume = filled(&probe());
+    let grid = lattice(&Geometry::Sweep(probe()), 1.7).expect("a lattice");
+    for (sample, shift) in [(SampleType::U16, 0.0), (SampleType::I16, 32768.0)] {
+        let path = folder.join("volume.mha");
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        volume
+            .write(&grid, sample, &path, || {
+                done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            })
+            .expect("written");
+        assert_eq!(done.into_inner(), grid.size[2]);
+        let mut back = Recording::open(&path, None).expect("read");
+        let Geometry::Cartesian(there) = back.geometry(0) else { panic!("a Cartesian volume") };
+        assert_eq!(there.size, grid.size);
+        for axis in 0..3 {
+            assert!((there.origin[axis] - grid.origin[axis]).abs() < 1e-9);
+            assert!((there.spacing[axis] - 1.7).abs() < 1e-12);
+        }
+        for z in 0..grid.size[2] {
+            let frame = back.next_frame().expect("read").expect("a slice");
+            let values: Vec<u16> = frame.bytes.as_chunks::<2>().0.iter().map(|b| u16::from_le_bytes(*b)).collect();
+            for (n, stored) in values.into_iter().enumerate() {
+                let cell = [n % grid.size[0], n / grid.size[0], z].map(|n| n as f64);
+                let place = DVec3::from(grid.origin) + 1.7 * DVec3::from_array(cell);
+                // Outside is the file's zero, which an i16 stores as 32768.
+                let expected = volume.at(place).map_or(shift, f64::round);
+                assert_eq!(f64::from(stored), expected, "{sample} at {place}");
+            }
+        }
+    }
+    let path = folder.join("volume.nrrd");
+    volume.write(&grid, SampleType::U16, &path, || {}).expect("written");
+    let bytes = std::fs::read(&path).expect("read");
+    let end = bytes.windows(2).position(|w| w == b"\n\n").expect("the header's end") + 2;
+    let header = String::from_utf8_lossy(&bytes[..end]).into_owned();
+    let [x, y, z] = grid.size;
+    for line in ["NRRD0004", "type: uint16", &format!("sizes: {x} {y} {z}"), "encoding: raw", "endian: little"] {
+        assert!(header.lines().any(|l| l == line), "{header}");
+    }
+    assert_eq!(bytes.len() - end, x * y * z * 2);
+}
+
+#[test]
+fn no_lattice_is_too_large_to_be_refused() {
+    let geometry = Geometry::Sweep(probe());
+    for spacing in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e-4, 4e-3] {
+        let refused = lattice(&geometry, spacing).expect_err("refused");
+        assert!(refused.starts_with(&format!("{spacing} mm: ")), "{refused}");
+    }
+    assert_eq!(lattice(&geometry, 1e9).expect("a voxel").size, [1; 3]);
+    let same = Grid { size: [7, 5, 3], spacing: [0.5; 3], origin: [-1.0, 2.0, 3.0] };
+    assert_eq!(lattice(&Geometry::Cartesian(same), 0.5).expect("a lattice"), same);
+    assert!(VolumeFile::of(Path::new("a.MHA")).is_ok() && VolumeFile::of(Path::new("a.mhd")).is_err());
+}
+
+#[test]
+fn the_command_writes_a_volume_or_one_line_and_nothing() {
+    let folder = Folder::new("command");
+    let out = folder.join("volume.mha");
+    let run = |arguments: &[&str]| program::run(&[&["convert"], arguments].concat());
+    let to = out.to_str().expect("a plain name");
+    assert_eq!(run(&[SWEEP, to, "--spacing", "2"]).0, Some(0));
+    let before = std::fs::read(&out).expect("written");
+    for (arguments, named) in [
+        (vec![SWEEP, to, "--spacing", "0"], "--spacing 0 mm"),
+        (vec![SWEEP, to, "--spacing", "-3"], "--spacing -3 mm"),
+        (vec![SWEEP, to, "--spacing", "1e-5"], "voxels"),
+        (vec![SWEEP, to, "--volume", "9"], "--volume 9"),
+        (vec![SWEEP, "/dev/null/volume.mha"], "/dev/null/volume.mha"),
+        (vec![SWEEP, "volume.png"], "must end in .mha or .nrrd"),
+        (vec!["nothing.mha", to], "nothing.mha"),
+        (vec![to, to], "would replace an input"),
+    ] {
+        let (code, _, said) = run(&arguments);
+        assert!(matches!(code, Some(1 | 2)), "{arguments:?}: {code:?} {said}");
+        assert!(said.contains(named) && said.trim().lines().count() == 1, "{arguments:?}: {said}");
+    }
+    assert_eq!(std::fs::read(&out).expect("still there"), before);
+    assert!(folder.names().iter().eq(["volume.mha"]), "a part of a file is left: {:?}", folder.names());
+}

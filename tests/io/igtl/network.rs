@@ -1,0 +1,299 @@
+//! OpenIGTLink as a live source: volumes and freehand frames with known values, and what is amiss.
+
+use super::client::*;
+use super::messages::*;
+use echolume::probe::{Geometry, Grid};
+use echolume::source::freehand;
+use echolume::source::live::{Event, Live};
+use echolume::source::recorder::Header;
+use echolume::source::{Frame, StoredType};
+use std::thread;
+
+fn options() -> NetworkOptions {
+    NetworkOptions { client: quick(), ..NetworkOptions::default() }
+}
+
+fn connect(messages: Vec<u8>, options: NetworkOptions) -> Network {
+    Network::connect(&serve(vec![send_and_stay(messages)]), options).unwrap()
+}
+
+/// Events until one is what was waited for, 10 s at most.
+fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> {
+    let (mut events, started) = (Vec::new(), Instant::now());
+    while !events.last().is_some_and(&is_last) {
+        match network.next(Duration::from_millis(50)) {
+            Event::Idle => assert!(started.elapsed() < Duration::from_secs(10), "{events:?}"),
+            event => events.push(event),
+        }
+    }
+    events
+}
+
+/// Waits until so many messages have come, 10 s at most.
+fn received(network: &Network, messages: u64) {
+    let started = Instant::now();
+    while network.statistics().messages < messages && started.elapsed() < Duration::from_secs(10) {
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn is_fault(named: &str) -> impl Fn(&Event) -> bool + use<'_> {
+    move |event| matches!(event, Event::Fault(fault) if fault.contains(named))
+}
+
+/// The next volume: what it began with, if it did, and its frames.
+fn volume(network: &mut Network, slices: usize) -> (Option<Header>, Vec<Frame>) {
+    let events = until(network, |e| matches!(e, Event::Frame(frame) if frame.slice + 1 == slices));
+    let (mut header, mut frames) = (None, Vec::new());
+    for event in events {
+        match event {
+            Event::Begin(begun) => header = Some(*begun),
+            Event::Frame(frame) => frames.push(frame),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(frames.len(), slices);
+    for (k, frame) in frames.iter().enumerate() {
+        assert_eq!((frame.number as usize, frame.slice, frame.volume), (k, k, frames[0].volume));
+    }
+    (header, frames)
+}
+
+fn grid(header: Option<Header>) -> Grid {
+    let header = header.expect("a volume that begins");
+    assert_eq!(header.forward, header.backward);
+    let Geometry::Cartesian(grid) = header.forward else { panic!("a Cartesian volume") };
+    grid
+}
+
+fn all(frames: &[Frame]) -> Vec<u8> {
+    frames.iter().flat_map(|f| f.bytes.clone()).collect()
+}
+
+#[test]
+fn volumes_keep_their_values_and_begin_anew_only_when_they_are_others() {
+    let first = image(5.0, [4, 3, 2]);
+    let second = Image { bytes: vec![9; 24], time: 6.0, ..first.clone() };
+    let turned = Image { axes: [[0.0, 0.3, 0.4], [0.25, 0.0, 0.0], [0.0, 0.8, -0.6]], ..second.clone() };
+    let wider = Image { axes: [[0.6, 0.0, 0.0], turned.axes[1], turned.axes[2]], ..second.clone() };
+    let words: Vec<u8> = (0..24i16).flat_map(|v| (v * 100 - 1000).to_le_bytes()).collect();
+    let signed = Image { scalar: Scalar::I16, bytes: words, ..wider.clone() };
+    let colours = Image { components: 3, bytes: [100, 200, 50].repeat(24), ..wider.clone() };
+    let every = [&first, &second, &turned, &wider, &signed, &colours];
+    let messages = every.into_iter().flat_map(|i| bytes(&Message::Image(i.clone()))).collect();
+    let mut network = connect(messages, options());
+    assert!(!network.can_wait());
+    let (header, frames) = volume(&mut network, 2);
+    assert_eq!((all(&frames), frames[0].volume, frames[1].time), (first.bytes, 0, Some(5.0)));
+    assert_eq!(header.as_ref().map(|h| (h.stored, h.range)), Some((StoredType::U8, [0.0, 255.0])));
+    let expected = Grid { size: [4, 3, 2], spacing: [0.5, 0.25, 1.0], origin: [-0.75, 0.0, -0.5] };
+    assert_eq!(grid(header), expected);
+    for number in 1..3 {
+        let (header, frames) = volume(&mut network, 2);
+        assert_eq!((header, all(&frames), frames[0].volume), (None, vec![9; 24], number), "only its place changed");
+    }
+    let (header, frames) = volume(&mut network, 2);
+    assert_eq!(frames[0].volume, 3);
+    assert!((grid(header).spacing[0] - 0.6).abs() < 1e-6);
+    let (header, frames) = volume(&mut network, 2);
+    let header = header.expect("another type");
+    assert_eq!((header.stored, header.range), (StoredType::U16, [31768.0, 34068.0]));
+    let expected: Vec<u8> = (0..24u16).flat_map(|v| (v * 100 + 31768).to_le_bytes()).collect();
+    assert_eq!(all(&frames), expected);
+    let (header, frames) = volume(&mut network, 2);
+    // 29.9 + 117.4 + 5.7.
+    assert_eq!((header.map(|h| h.stored), all(&frames)), (Some(StoredType::U8), vec![153; 24]));
+}
+
+#[test]
+fn whole_slices_go_into_their_place_and_lesser_parts_are_refused() {
+    let whole = image(1.0, [4, 3, 4]);
+    let part = |offset: [u16; 3], size: [u16; 3], value: u8| Image {
+        region: Region { offset, size },
+        bytes: vec![value; size.iter().map(|n| usize::from(*n)).product()],
+        ..whole.clone()
+    };
+    let two = Image { components: 2, bytes: vec![0; 96], ..whole.clone() };
+    let flat = Image { axes: [[0.5, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]], ..whole.clone() };
+    let first = part([0, 0, 1], [4, 3, 2], 77);
+    let refused = [part([0, 1, 0], [4, 2, 4], 1), two, flat];
+    let every = [vec![first], refused.to_vec(), vec![whole.clone(), part([0, 0, 3], [4, 3, 1], 200)]].concat();
+    let messages = every.into_iter().flat_map(|i| bytes(&Message::Image(i))).collect();
+    let mut network = connect(messages, options());
+    let (header, frames) = volume(&mut network, 4);
+    assert_eq!((grid(header).size, all(&frames)), ([4, 3, 4], [vec![0; 12], vec![77; 24], vec![0; 12]].concat()));
+    let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if (frame.volume, frame.slice) == (2, 3)));
+    let frames: Vec<Frame> =
+        events.iter().filter_map(|e| if let Event::Frame(f) = e { Some(f.clone()) } else { None }).collect();
+    assert_eq!(all(&frames[..4]), whole.bytes);
+    assert_eq!(all(&frames[4..]), [&whole.bytes[..36], &[200; 12]].concat());
+    let faults: Vec<&Event> = events.iter().filter(|e| matches!(e, Event::Fault(_))).collect();
+    assert!(is_fault("images passed over: a part of 4 x 2 of 4 x 3 pixels")(faults[0]), "{faults:?}");
+    // The others a second later, together.
+    until(&mut network, is_fault("images passed over (2): spacing is 0e0 mm"));
+}
+
+#[test]
+fn a_volume_that_is_claimed_and_does_not_come_takes_no_memory() {
+    let mut claim = image(1.0, [4, 3, 1]);
+    claim.size[2] = 65535;
+    let mut network = connect(bytes(&Message::Image(claim)), NetworkOptions { volume_bytes: 100_000, ..options() });
+    until(&mut network, is_fault("a volume of 4 x 3 x 65535 voxels; at most 100000 bytes"));
+}
+
+/// Frame k of a sweep along z, 1 mm apart: pixels of 0.5 x 0.25 mm, the value of each 10 k + 10.
+fn tracked(k: u8) -> Image {
+    Image { bytes: vec![k.wrapping_mul(10).wrapping_add(10); 30], ..image(f64::from(k), [6, 5, 1]) }
+}
+
+fn moved(k: u8) -> Message {
+    let mut matrix = IDENTITY;
+    matrix[2][3] = f32::from(k);
+    Message::Transform(Transform { device: "Probe".into(), time: f64::from(k), matrix })
+}
+
+fn sweep_options() -> NetworkOptions {
+    let freehand = freehand::Options { margin: 1.0, spacing: Some(0.5), ..freehand::Options::default() };
+    NetworkOptions { freehand, first: 4, update: 0.2, frames: 2, ..options() }
+}
+
+/// The values in the middle of each slice.
+fn middles(grid: &Grid, frames: &[Frame]) -> Vec<u8> {
+    let [x, y, _] = grid.size;
+    frames.iter().map(|f| f.bytes[y / 2 * x + x / 2]).collect()
+}
+
+#[test]
+fn tracked_frames_become_a_volume_that_goes_on_growing() {
+    for poses in [Poses::Messages { device: Some("Probe".into()), tolerance: 0.1, patience: 1.0 }, Poses::Image] {
+        let by_messages = poses != Poses::Image;
+        let message = move |k: u8| match by_messages {
+            true => [bytes(&moved(k)), bytes(&Message::Image(tracked(k)))].concat(),
+            false => bytes(&Message::Image(Image { centre: [0.0, 0.0, f32::from(k)], ..tracked(k) })),
+        };
+        let script: Script = Box::new(move |mut stream| {
+            use std::io::Write;
+            stream.write_all(&[0, 1, 2, 4].map(message).concat()).unwrap();
+            thread::sleep(Duration::from_millis(300));
+            stream.write_all(&[3, 9].map(message).concat()).unwrap();
+            stay(&mut stream);
+        });
+        let options = NetworkOptions { poses: poses.clone(), ..sweep_options() };
+        let mut network = Network::connect(&serve(vec![script]), options).unwrap();
+        // 2.5 x 1 x 4 mm and 1 mm around, voxels of 0.5 mm.
+        let (header, frames) = volume(&mut network, 13);
+        let grid = grid(header);
+        assert_eq!(grid.size, [10, 7, 13]);
+        assert!(grid.origin.iter().zip([-2.25, -1.0, -2.75]).all(|(a, b)| (a - b).abs() < 1e-6), "{grid:?}");
+        // Frames fill the slices that they lie on, holes of up to 2 mm are bridged: 3 mm lies in one of 1.5 mm. Nothing is beyond.
+        let expected = [0, 0, 10, 15, 20, 25, 30, 35, 40, 45, 50, 0, 0];
+        assert_eq!(middles(&grid, &frames), expected, "{poses:?}");
+        assert_eq!((frames[0].bytes[0], frames[0].volume), (0, 0));
+        // At 9 mm there is no volume; the one at 3 mm replaces nothing but what was bridged.
+        let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.slice == 12));
+        assert!(events.iter().any(is_fault("frames outside of the volume")), "{events:?}");
+        let frames: Vec<Frame> =
+            events.into_iter().filter_map(|e| if let Event::Frame(f) = e { Some(f) } else { None }).collect();
+        assert_eq!((middles(&grid, &frames), frames[0].volume), (expected.to_vec(), 1));
+    }
+}
+
+#[test]
+fn frames_without_a_pose_are_told_and_a_few_frames_do_not_wait_for_ever() {
+    let early = |k: u8| bytes(&Message::Image(tracked(k)));
+    let messages = [early(1), early(20), bytes(&moved(20)), early(30), bytes(&moved(30)), bytes(&moved(31))].concat();
+    // Two have a pose, four are waited for.
+    let mut network = connect(messages, sweep_options());
+    until(&mut network, is_fault("frames without a pose left out: no pose came near their time"));
+    let started = Instant::now();
+    assert!(matches!(network.next(Duration::from_millis(50)), Event::Idle));
+    assert!((50..5000).contains(&started.elapsed().as_millis()), "{:?}", started.elapsed());
+}
+
+#[test]
+fn poses_without_end_do_not_use_up_more_than_the_patience() {
+    let script: Script = Box::new(|mut stream| {
+        use std::io::Write;
+        let many: Vec<u8> = (0..1000).flat_map(|n| bytes(&transform("Probe", f64::from(n), 0.0))).collect();
+        while stream.write_all(&many).is_ok() {}
+    });
+    let mut network = Network::connect(&serve(vec![script]), options()).unwrap();
+    received(&network, 1000);
+    for patience in [0, 20] {
+        let started = Instant::now();
+        while !matches!(network.next(Duration::from_millis(patience)), Event::Idle) {}
+        assert!(started.elapsed() < Duration::from_secs(5), "{:?}", started.elapsed());
+    }
+}
+
+#[test]
+fn a_killed_peer_is_told_and_frames_come_again() {
+    let good = bytes(&Message::Image(image(1.0, [4, 3, 2])));
+    let cut = [good.clone(), good[..100].to_vec()].concat();
+    let mut network = Network::connect(&serve(vec![send(cut), send_and_stay(good)]), options()).unwrap();
+    let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if (frame.volume, frame.slice) == (1, 1)));
+    let at = |named: &str| events.iter().position(is_fault(named)).unwrap_or_else(|| panic!("{named}: {events:?}"));
+    let lost = at("connection lost: the peer closed the connection 100 bytes into a message");
+    assert!(lost < at("connected again"));
+    assert_eq!(events.iter().filter(|e| matches!(e, Event::Begin(_))).count(), 1, "the same geometry goes on");
+    let nobody = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let mut network = Network::connect(&nobody, options()).unwrap();
+    until(&mut network, is_fault("not connected: cannot connect: "));
+}
+
+#[test]
+fn damaged_messages_are_told_once_a_second_with_their_number() {
+    let good = bytes(&Message::Image(image(1.0, [4, 3, 2])));
+    let mut damaged = good.clone();
+    damaged[120] ^= 1;
+    let malformed = raw(1, "IMAGE", &[0; 30]);
+    let messages = [damaged.repeat(50), malformed, good].concat();
+    let mut network = connect(messages, options());
+    received(&network, 1);
+    let events = until(&mut network, |e| matches!(e, Event::Frame(_)));
+    let faults: Vec<&Event> = events.iter().filter(|e| matches!(e, Event::Fault(_))).collect();
+    assert_eq!(faults.len(), 2, "{faults:?}");
+    assert!(is_fault("messages with a wrong checksum passed over (50): ")(faults[0]), "{faults:?}");
+    assert!(is_fault("malformed messages passed over: IMAGE")(faults[1]), "{faults:?}");
+}
+
+#[test]
+fn what_is_not_taken_is_dropped_by_whole_messages_and_told() {
+    let image = |n: u8| Image { bytes: vec![n; 24], ..image(f64::from(n) + 1.0, [4, 3, 2]) };
+    let messages = (0..50).flat_map(|n| bytes(&Message::Image(image(n)))).collect();
+    let mut client = quick();
+    client.queue_messages = 4;
+    let mut network = connect(messages, NetworkOptions { client, ..options() });
+    received(&network, 50);
+    let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if (frame.volume, frame.slice) == (3, 1)));
+    assert!(events.iter().any(is_fault("messages dropped (46)")), "{events:?}");
+    for event in events {
+        if let Event::Frame(frame) = event {
+            assert_eq!(frame.bytes, vec![46 + frame.volume as u8; 12], "two volumes are mixed");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_message_is_met_with_a_panic(
+        size in prop::array::uniform3(1u16..5),
+        numbers in prop::collection::vec(prop_oneof![-3.0f32..3.0, Just(0.0), Just(1e30), Just(-1e-30)], 12),
+        scalar in prop::sample::select(vec![Scalar::I8, Scalar::U16, Scalar::I32, Scalar::F32, Scalar::F64]),
+        components in 1u8..5,
+        samples in prop::collection::vec(any::<u8>(), 4 * 4 * 4 * 4 * 8),
+    ) {
+        let axes = [[numbers[0], numbers[1], numbers[2]], [numbers[3], numbers[4], numbers[5]], [numbers[6], numbers[7], numbers[8]]];
+        let count = size.iter().map(|n| usize::from(*n)).product::<usize>() * usize::from(components) * scalar.bytes();
+        let any = Image {
+            scalar, components, axes, centre: [numbers[9], numbers[10], numbers[11]],
+            bytes: samples[..count].to_vec(), ..image(1.0, size)
+        };
+        let end = Message::Image(Image { bytes: vec![7; 3 * 3 * 3], ..image(2.0, [3, 3, 3]) });
+        let messages = [bytes(&transform("P", 1.0, 0.0)), bytes(&Message::Image(any)), bytes(&transform("P", 3.0, 0.0)), bytes(&end)];
+        let mut network = connect(messages.concat(), NetworkOptions { first: 1, frames: 1, ..options() });
+        until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.bytes == [7; 9] && frame.slice == 2));
+    }
+}

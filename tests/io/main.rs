@@ -1,0 +1,13 @@
+//! What comes in and goes out: files of recordings, pipes, the network, the motor, signals. Needs no GPU.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod convert;
+mod igtl;
+mod interrupted;
+#[cfg(target_os = "linux")]
+mod motor;
+mod piped;
+mod recorder;
+mod signals;
+mod sources;

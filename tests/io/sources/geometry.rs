@@ -1,0 +1,59 @@
+//! Sweeps both ways, and which geometry wins.
+
+use super::recordings::*;
+const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\
+                     frame_positions_mm = [0, 1, 3]\nframes_per_volume = 3\nboth_ways = true\nspeed_ratio = 0.5\n";
+
+#[test]
+fn sweeps_there_and_back_keep_their_slices_in_geometric_order() {
+    let folder = Folder::new("there-and-back");
+    let data: Vec<u8> = (0..7).flat_map(|frame| [frame; 8]).collect();
+    folder.write("s.probe.toml", TABLE);
+    let more = "UltrasoundImageType = BRIGHTNESS\nUltrasoundImageOrientation = FM\n";
+    let mut recording = open(&folder.write("s.mha", image("4 2 7", "MET_UCHAR", more, &data)));
+    assert_eq!((recording.volumes(), recording.frames_in_file()), (2, 7));
+    let frames = all_frames(&mut recording).unwrap();
+    let order: Vec<_> = frames.iter().map(|f| (f.volume, f.number, f.slice, f.backward, f.bytes[0])).collect();
+    assert_eq!(order[..3], [(0, 0, 0, false, 0), (0, 1, 1, false, 1), (0, 2, 2, false, 2)]);
+    assert_eq!(order[3..], [(1, 0, 2, true, 3), (1, 1, 1, true, 4), (1, 2, 0, true, 5)]);
+    let advance = |volume| match recording.geometry(volume) {
+        Geometry::Sweep(probe) => probe.advance,
+        Geometry::Cartesian(_) => panic!("it is a sweep"),
+    };
+    assert_eq!(advance(0), Advance::Each(vec![0.5, 1.0, 1.0]));
+    assert_eq!(advance(1), Advance::Each(vec![-0.5, -0.5, -1.0]));
+}
+
+#[test]
+fn a_given_probe_file_wins_over_one_beside_and_that_over_the_header() {
+    let folder = Folder::new("precedence");
+    let sweep = folder.write("sweep.mha", fs::read(stored("wobbler-4dc7/sweep.mha")).unwrap());
+    let text = fs::read_to_string(stored("wobbler-4dc7/probe.toml")).unwrap();
+    let with_radius = |mm: &str| text.replace("radius_mm = 39.8 ", &format!("radius_mm = {mm} "));
+    let radius = |given| probe_of(&Recording::open(sweep.as_ref(), given).unwrap()).array_radius();
+    assert_eq!(radius(None), 39.8);
+    folder.write("probe.toml", with_radius("41"));
+    assert_eq!(radius(None), 41.0);
+    folder.write("sweep.probe.toml", with_radius("42"));
+    assert_eq!(radius(None), 42.0);
+    let given = folder.write("other.toml", with_radius("43"));
+    assert_eq!(radius(Some(given.as_ref())), 43.0);
+}
+
+#[test]
+fn lines_stored_from_last_to_first_are_turned_round() {
+    let folder = Folder::new("turned");
+    folder.write("probe.toml", TABLE.replace("frames_per_volume = 3", ""));
+    let data: Vec<u8> = (0..24).collect();
+    let path = folder.write("t.mha", image("4 2 3", "MET_UCHAR", "UltrasoundImageOrientation = FU\n", &data));
+    assert_eq!(total(&path).unwrap()[..12], [4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15]);
+}
+
+#[test]
+fn the_range_of_the_probe_file_is_in_the_units_of_the_recording() {
+    let folder = Folder::new("range");
+    folder
+        .write("probe.toml", format!("{}[samples]\nrange = [-100, 400]\n", TABLE.replace("frames_per_volume = 3", "")));
+    let path = folder.write("r.mha", image("4 2 3", "MET_SHORT", "", &[0; 48]));
+    assert_eq!(open(&path).range(), [32668.0, 33168.0]);
+}

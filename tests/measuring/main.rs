@@ -1,7 +1,0 @@
-//! What `echolume profile` and `echolume report` measure, on a device. A binary of its own: cargo runs it when nothing else runs.
-
-mod commands;
-mod error;
-mod profile;
-mod scenes;
-mod tables;

@@ -1,8 +1,0 @@
-//! What is made of measured times: statistics against known values, comparisons against simulated runs, formats against their
-//! rules. Needs no GPU.
-
-mod compare;
-mod formats;
-mod simulated;
-mod statistics;
-mod trace;

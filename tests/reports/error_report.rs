@@ -1,0 +1,106 @@
+//! `echolume report error` on a device: what it measures is what it says, and what it advises holds where it has not looked.
+
+use crate::scenes::*;
+use echolume::error_report::dials::dial;
+use echolume::error_report::measure::{Asked, Held};
+use echolume::error_report::{Measure, Reference, Report, choose};
+use echolume::scene::Scene;
+use echolume::scene::load::Layers;
+
+const BASE: [&str; 6] = [
+    "mode=vr",
+    "picture.size=[40,32]",
+    "slices.pixels=48",
+    "ray.sampling=exact",
+    "volume.transfer=[{at=0.1,colour=[0.2,0.1,0.1],opacity=0.0},{at=0.9,colour=[1,0.9,0.8],opacity=0.2}]",
+    "camera.zoom=1.2",
+];
+
+fn layers(more: &[&str]) -> Layers {
+    let mut layers = Layers::default();
+    BASE.iter().chain(more).for_each(|set| layers.set(set).expect("setting"));
+    layers
+}
+
+fn resolved(layers: &Layers) -> Scene {
+    scene_of(layers.clone().finish().expect("settings"))
+}
+
+fn report(more: &[&str], names: &[&str], held: Held) -> Report {
+    let (layers, frames) = (layers(more), frames());
+    let scene = resolved(&layers);
+    let dials: Vec<_> = names.iter().map(|n| dial(n, &scene).expect("dial")).collect();
+    let context = device();
+    let asked = Asked {
+        context: &context,
+        layers: &layers,
+        scene: &scene,
+        frames: &frames,
+        input: "a bumpy wall",
+        repeats: 3,
+        held,
+    };
+    asked.report(&dials, |_, _| {}).expect("report")
+}
+
+#[test]
+fn errors_fall_with_the_step_down_to_the_devices_floor() {
+    let _alone = alone();
+    let report = report(&[], &["step"], Held::F64);
+    let dial = &report.dials[0];
+    let mut points: Vec<_> = dial.points.iter().map(|p| (p.value, p.errors.rmse)).collect();
+    points.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let floor = dial.floor.expect("a floor");
+    println!("{points:?}, floor {floor:.2e}, order {:?}", dial.order.as_ref().map(|o| o.order));
+    assert!(floor < 1.5e-3, "{floor}");
+    // The sector's border, which a sample meets or misses, makes it first order there: eight times the step, eight times that.
+    assert!(points[0].1 > 8.0 * points[points.len() - 1].1, "{points:?}");
+    assert!(points.windows(2).all(|p| p[1].1 < 1.05 * p[0].1), "{points:?}");
+    assert_eq!(dial.points.iter().filter(|p| p.is_default).count(), 1);
+}
+
+/// Every way to take a sample, each against the f64 of the same scene.
+#[test]
+fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
+    let _alone = alone();
+    let report = report(&["slices.format=r16"], &["sampling"], Held::F64);
+    let places: Vec<_> = report.dials[0].points.iter().map(|p| (p.label.as_str(), p.errors.rmse)).collect();
+    println!("{places:?}");
+    assert_eq!(places.iter().map(|p| p.0).collect::<Vec<_>>(), ["exact", "hardware", "quads"]);
+    // An 8-bit weight is off by 1/512 of what two texels differ by.
+    assert!(places[0].1 < 1e-3 && places[1].1 < 2e-3 && places[2].1 < 1e-3, "{places:?}");
+}
+
+/// A picture of the device's own as reference says how far it is from where it would go.
+#[test]
+fn a_converged_reference_tells_its_own_error() {
+    let _alone = alone();
+    let report = report(&[], &["rays", "lut", "adaptive"], Held::Converged);
+    for dial in &report.dials {
+        let Reference::Converged { set, rmse } = &dial.reference else { panic!("{} is held against f64", dial.name) };
+        let worst = dial.points.iter().map(|p| p.errors.rmse).fold(0.0, f64::max);
+        println!("{}: worst {worst:.1e}, {} itself {rmse:.1e}", dial.name, set.join(" "));
+        assert!(*rmse < worst, "{}: {rmse} against {worst}", dial.name);
+    }
+    let lut = &report.dials[1];
+    let of = |entries: f64| lut.points.iter().find(|p| p.value == entries).expect("place").errors.rmse;
+    assert!(of(3.0) > 3.0 * of(1025.0), "three entries must show: {} and {}", of(3.0), of(1025.0));
+}
+
+/// Settings chosen from the sweep of one scene, tried on another camera and transfer function, against f64.
+#[test]
+fn the_chosen_settings_hold_on_a_scene_that_the_sweep_did_not_contain() {
+    let _alone = alone();
+    let swept = report(&[], &["step", "format", "termination"], Held::F64);
+    let limit = 0.01;
+    let choice = choose::cheapest_under(&swept, Measure::Rmse, limit, 0.25).expect("a choice");
+    println!("{}", choice.say(Measure::Rmse));
+    let elsewhere = ["camera.azimuth=25", "camera.elevation=-15", "volume.transfer=warm"];
+    let chosen: Vec<&str> = elsewhere.into_iter().chain(choice.set.iter().map(String::as_str)).collect();
+    // The first place of a dial is the scene as it is; the reference of `step` there is f64 with tiny steps.
+    let tried = report(&chosen, &["step"], Held::F64);
+    let error = tried.dials[0].points[0].errors.rmse;
+    println!("predicted {:.2e}, elsewhere {error:.2e}", choice.error);
+    assert!(error < limit, "{error}");
+    assert!(error > 1e-5, "nothing was saved at all");
+}

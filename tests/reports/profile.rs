@@ -1,0 +1,141 @@
+//! The profile's numbers on a device: an injected slow pass is found, and runs that are alike are not called different.
+
+use crate::scenes::*;
+use echolume::passes::{DispatchArgs, by_name};
+use echolume::profile::compare::{Options, Verdict, compare};
+use echolume::profile::measure::{Asked, Run, run};
+use echolume::profile::{formats, trace};
+
+const SETTINGS: &str = "mode = 'sr'
+    picture = { size = [96, 96] }
+    slices = { pixels = 64, format = 'r16f', sigma = { window = 3, sigma = 0.1 } }
+    distance = { median = 5 }
+    post = { sigma = { window = 3, sigma = 0.1 } }";
+
+fn asked(repeats: usize) -> Asked {
+    Asked { repeats, warm_up: 2, still: false, turn: 0.0, input: "a bumpy wall".into(), ceilings: false }
+}
+
+#[test]
+fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
+    let _alone = alone();
+    let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
+    slow.faults.slow_down("median_distance", 6);
+    let mut old = Run::new(&quick, &scene, &asked(18)).expect("run");
+    let mut new = Run::new(&slow, &scene, &asked(18)).expect("run");
+    while old.wants_more() {
+        old.repeat(&frames).expect("repeat");
+        new.repeat(&frames).expect("repeat");
+    }
+    let (old, new) = (old.finish().0, new.finish().0);
+    let compared = compare(&old, &new, &Options::default()).expect("comparison");
+    for line in &compared.lines {
+        println!("{:20} {:?} {:?}", line.name, line.verdict, line.ratio.as_ref().map(|r| r.estimate));
+    }
+    // On a software device a longer pass leaves colder caches to those that run next: they may be slower, but not nearly as much.
+    let ratio = |name: &str| compared.lines.iter().find(|l| l.name == name)?.ratio.as_ref().map(|r| r.estimate);
+    assert!(compared.regressions().any(|l| l.name == "median_distance"), "not found");
+    let slow = ratio("median_distance").expect("a ratio");
+    assert!(slow > 3.0, "{slow} for six times the work");
+    for pass in ["scan_convert", "sigma_slice", "raycast_surface", "light", "sigma_picture", "tone"] {
+        assert!(ratio(pass).is_none_or(|r| r < slow / 1.5), "{pass} is blamed: {:?}", ratio(pass));
+    }
+    let back = compare(&new, &old, &Options::default()).expect("comparison");
+    let line = back.lines.iter().find(|l| l.name == "median_distance").expect("line");
+    assert_eq!(line.verdict, Verdict::Faster);
+}
+
+/// 40 pairs of runs of the same, in turns: at most 5 % of them may be called different in any line.
+#[test]
+fn identical_runs_are_hardly_ever_called_different() {
+    let _alone = alone();
+    let (context, frames, scene) = (device(), frames(), scene(SETTINGS));
+    let mut different = Vec::new();
+    for pair in 0..40 {
+        let mut old = Run::new(&context, &scene, &asked(12)).expect("run");
+        let mut new = Run::new(&context, &scene, &asked(12)).expect("run");
+        while old.wants_more() {
+            old.repeat(&frames).expect("repeat");
+            new.repeat(&frames).expect("repeat");
+        }
+        let compared = compare(&old.finish().0, &new.finish().0, &Options::default()).expect("comparison");
+        let called = compared.lines.iter().filter(|l| matches!(l.verdict, Verdict::Faster | Verdict::Slower));
+        different.extend(called.map(|l| (pair, l.name.clone(), l.ratio.as_ref().map(|r| r.estimate))));
+    }
+    let mut pairs: Vec<_> = different.iter().map(|d| d.0).collect();
+    pairs.dedup();
+    println!("called different: {different:?}");
+    assert!(pairs.len() <= 2, "{} of 40 pairs: {different:?}", pairs.len());
+}
+
+/// What is written down is what was measured, whole and on one clock.
+#[test]
+fn a_profile_adds_up_and_survives_being_written() {
+    let _alone = alone();
+    let context = device();
+    let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
+    profile.check().expect("consistent");
+    // Quads are made where the device is a CPU.
+    let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "quads");
+    assert_eq!(
+        names.collect::<Vec<_>>(),
+        [
+            "upload",
+            "scan_convert",
+            "sigma_slice",
+            "tile_ranges",
+            "brick_ranges",
+            "classify_surface",
+            "leap_surface",
+            "raycast_surface",
+            "median_distance",
+            "light",
+            "sigma_picture",
+            "tone",
+            "readback"
+        ]
+    );
+    let of = |name: &str| profile.passes.iter().find(|p| p.name == name).expect("pass");
+    assert_eq!((of("scan_convert").runs_per_picture, of("light").runs_per_picture), (15, 1));
+    // Invocations of the sigma filter, in groups of 8 x 8; each reads what the windows of four pixels hold.
+    let sigma = by_name("sigma_slice").expect("pass");
+    let [width, height, _] = sigma.invocations(&scene(SETTINGS), &DispatchArgs::default()).map(u64::from);
+    assert_eq!(of("sigma_slice").invocations, Some(15 * width.next_multiple_of(8) * height.next_multiple_of(8)));
+    assert_eq!(of("sigma_slice").fetches, Some(15 * width * height * 3 * 6));
+    assert_eq!(of("tone").bytes_written, 96 * 96 * 4);
+    assert_eq!(of("tone").bytes_read, 96 * 96 * 8);
+    assert_eq!(of("upload").bytes_read, 15 * 60 * 128 * 4);
+    for idle in profile.idle_ns() {
+        assert!(idle > -1e5, "passes overlap by {idle} ns");
+    }
+    let text = formats::to_json(&profile).expect("json");
+    assert_eq!(formats::from_json(&text).expect("read back"), profile);
+    let trace = trace::chrome(&profile, &spans).expect("trace");
+    let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
+    let events = trace["traceEvents"].as_array().expect("events");
+    assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), 6 * 15);
+}
+
+/// The picture alone, from another angle each time: what the camera changes runs again and nothing before it.
+#[test]
+fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
+    let _alone = alone();
+    let context = device();
+    let turning = Asked { still: true, turn: 170.0, ..asked(3) };
+    for (mode, ray, tile) in [("sr", "raycast_surface", false), ("mpr", "raycast_planes", true)] {
+        let scene = scene(&SETTINGS.replace("mode = 'sr'", &format!("mode = '{mode}'")));
+        assert_eq!(scene.cuts_planes(), tile);
+        let (profile, _) = run(&context, &scene, &frames(), &turning).expect("profile");
+        profile.check().expect("consistent");
+        let of = |name: &str| profile.passes.iter().find(|p| p.name == name);
+        assert_eq!(of(ray).expect("cast again").runs_per_picture, 1, "{mode}");
+        assert!(of(ray).expect("cast again").samples_ns.iter().all(|ns| *ns > 0.0), "{mode}: {profile:?}");
+        assert!(of("scan_convert").is_none_or(|p| p.runs_per_picture == 0), "{mode}");
+        assert_eq!(profile.turn, 170.0);
+        // What was asked for, not where the view has turned to.
+        assert_eq!(profile.scene, toml::to_string(&scene.settings).expect("settings"));
+        if cfg!(target_os = "linux") {
+            assert_eq!(profile.cpu_ns.len(), 3);
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! A small sweep of a wall, as a recording would give it.
+
+use crate::common::gpu::Device;
+use crate::common::probes::wobbler;
+use crate::common::scenes::FLOATS;
+use echolume::probe::{Axis, Geometry, Indices, Probe};
+use echolume::scene::{Scene, Settings};
+use echolume::source::Frame;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// What is timed here shares the machine with nothing else of this binary: every test holds this while it runs.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub fn device() -> Device {
+    Device::watched(false)
+}
+
+pub fn probe() -> Probe {
+    Probe {
+        lines: Axis::centred(0.02, 60),
+        sample_pitch: 0.4,
+        samples: 128,
+        slices: Axis::centred(0.04, 15),
+        ..wobbler()
+    }
+}
+
+pub fn scene(toml: &str) -> Scene {
+    scene_of(toml::from_str(toml).expect("settings"))
+}
+
+pub fn scene_of(settings: Settings) -> Scene {
+    Scene::new(Geometry::Sweep(probe()), FLOATS, settings).expect("scene")
+}
+
+/// A bumpy wall behind fluid.
+pub fn frames() -> Vec<Frame> {
+    let probe = probe();
+    let body = |p: glam::DVec3| {
+        let wall = 48.0 + 1.5 * (0.3 * p.x).sin() * (0.25 * p.z).cos();
+        0.1 + 0.7 * ((p.y - wall) / 3.0 + 0.5).clamp(0.0, 1.0)
+    };
+    let value = |sample: usize, line: usize, slice: usize| {
+        let at = Indices { sample: sample as f64, line: line as f64, slice: slice as f64 };
+        body(probe.to_space(at)) as f32
+    };
+    (0..15)
+        .map(|slice| {
+            let lines = (0..60).flat_map(|line| (0..128).map(move |sample| (sample, line)));
+            let bytes = lines.flat_map(|(sample, line)| value(sample, line, slice).to_le_bytes()).collect();
+            Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, bytes }
+        })
+        .collect()
+}

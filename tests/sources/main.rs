@@ -1,6 +1,0 @@
-//! Recorded files: the same frames and places whatever they are stored as, and one clear line for every fault.
-
-mod broken;
-mod common;
-mod geometry;
-mod values;

@@ -1,0 +1,116 @@
+//! Orders of the compositing rules in f64, and what spoils them.
+
+use echolume::error_report::analytic::{Field, Flaw, NONE, errors, steps};
+use echolume::error_report::orders::{Fit, Range, fit};
+use echolume::passes::raycast::composite::Rule;
+
+const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];
+const RAYS: usize = 256;
+/// How far an order may lie from what theory says.
+const WITHIN: f64 = 0.2;
+
+struct Found {
+    fit: Fit,
+    /// Error at the finest step.
+    finest: f64,
+}
+
+fn found(rule: Rule, field: Field, flaw: Flaw) -> Found {
+    let (pairs, own) = errors(rule, field, flaw, &steps(STEPS[0], STEPS[1], 10), RAYS);
+    // The truth has to be better than what it judges.
+    assert!(own < 1e-3 * pairs[0][1], "the truth is only good to {own:.1e}, the finest step to {:.1e}", pairs[0][1]);
+    let fit = fit(&pairs, Range { step: STEPS, floor: own }).expect("ten steps");
+    assert_eq!(fit.points, 10);
+    Found { fit, finest: pairs[0][1] }
+}
+
+fn is_order(fit: &Fit, order: f64) -> bool {
+    (fit.order - order).abs() < WITHIN
+}
+
+#[test]
+fn every_rule_has_its_order() {
+    let orders = [
+        (Rule::Riemann, 1.0),
+        (Rule::CorrectedLeft, 1.0),
+        (Rule::Corrected, 2.0),
+        (Rule::PreIntegrated, 2.0),
+        (Rule::PreIntegratedUnshaded, 1.0),
+    ];
+    for (rule, order) in orders {
+        let Found { fit, .. } = found(rule, Field::Open, NONE);
+        assert!(is_order(&fit, order), "{rule:?}: order {:.3}, expected {order}", fit.order);
+        assert!(fit.standard_error < 0.02, "{rule:?}: the points lie on no line: +-{:.3}", fit.standard_error);
+    }
+}
+
+/// Why the field of the orders must not end softly: a rule of order 1 would pass for one of order 2.
+#[test]
+fn left_samples_look_second_order_where_the_field_vanishes_at_both_ends() {
+    assert!(is_order(&found(Rule::CorrectedLeft, Field::Vanishing, NONE).fit, 2.0));
+    assert!(is_order(&found(Rule::CorrectedLeft, Field::Open, NONE).fit, 1.0));
+}
+
+#[test]
+fn a_dropped_last_step_spoils_order_2() {
+    for rule in [Rule::Corrected, Rule::PreIntegrated] {
+        let dropped = found(rule, Field::Open, Flaw { drops_last_step: true, ..NONE });
+        assert!(is_order(&dropped.fit, 1.0), "{rule:?}: order {:.3}", dropped.fit.order);
+    }
+}
+
+/// Places that are rounded to 1/256 voxel leave a floor near 2e-6; above it, which is what a fit has to keep to, the order
+/// is what it was.
+#[test]
+fn filter_weights_of_8_bits_spoil_order_2_down_at_their_floor() {
+    for rule in [Rule::Corrected, Rule::PreIntegrated] {
+        let flaw = Flaw { weight_bits: Some(8), ..NONE };
+        let (exact, rounded) = (found(rule, Field::Open, NONE), found(rule, Field::Open, flaw));
+        assert!(rounded.fit.order < 2.0 - WITHIN, "{rule:?}: order {:.3}", rounded.fit.order);
+        assert!(rounded.finest > 3.0 * exact.finest, "{rule:?}: {:.1e}", rounded.finest);
+        let (pairs, _) = errors(rule, Field::Open, flaw, &steps(STEPS[0], STEPS[1], 10), RAYS);
+        let above = fit(&pairs, Range { step: STEPS, floor: 2.0 * rounded.finest }).expect("steps above the floor");
+        assert!(above.points < 10 && is_order(&above, 2.0), "{rule:?}: order {:.3} of {}", above.order, above.points);
+    }
+}
+
+/// The experiment can fail: absorption that is 1 % off leaves no order of 2, and an error a thousand times the step's.
+#[test]
+fn a_rule_that_is_one_percent_off_is_noticed() {
+    for rule in [Rule::Riemann, Rule::CorrectedLeft, Rule::Corrected, Rule::PreIntegrated] {
+        let (right, wrong) =
+            (found(rule, Field::Open, NONE), found(rule, Field::Open, Flaw { absorption: 1.01, ..NONE }));
+        assert!(wrong.fit.order < right.fit.order - WITHIN, "{rule:?}: order {:.3}", wrong.fit.order);
+        assert!(wrong.finest > 2.0 * right.finest, "{rule:?}: {:.1e} and {:.1e}", wrong.finest, right.finest);
+    }
+    let wrong = found(Rule::Corrected, Field::Open, Flaw { absorption: 1.01, ..NONE });
+    assert!(wrong.finest > 1000.0 * found(Rule::Corrected, Field::Open, NONE).finest, "{:.1e}", wrong.finest);
+}
+
+#[test]
+fn a_fit_finds_the_line_and_says_how_well() {
+    let line: Vec<[f64; 2]> = steps(0.1, 10.0, 7).iter().map(|h| [*h, 3.0 * h.powf(1.5)]).collect();
+    let range = Range { step: [0.1, 10.0], floor: 0.0 };
+    let exact = fit(&line, range).expect("seven points");
+    assert!((exact.order - 1.5).abs() < 1e-12 && (exact.coefficient - 3.0).abs() < 1e-12, "{exact:?}");
+    assert!(exact.standard_error < 1e-12 && (exact.at(4.0) - 24.0).abs() < 1e-9, "{exact:?}");
+    // By hand: logarithms (0, 0), (1, 1), (2, 3): slope 3/2, residuals 1/6 -1/3 1/6, so sqrt((1/6) / 1 / 2).
+    let e = std::f64::consts::E;
+    let bent = fit(&[[1.0, 1.0], [e, e], [e * e, e.powi(3)]], Range { step: [0.5, 10.0], floor: 0.0 }).expect("three");
+    assert!((bent.order - 1.5).abs() < 1e-12, "{bent:?}");
+    assert!((bent.standard_error - (1.0f64 / 12.0).sqrt()).abs() < 1e-12, "{bent:?}");
+}
+
+#[test]
+fn a_fit_leaves_out_what_is_out_of_range_and_refuses_too_few() {
+    let mut line: Vec<[f64; 2]> = steps(0.1, 10.0, 7).iter().map(|h| [*h, h * h]).collect();
+    line.extend([[0.01, 0.5], [20.0, 1e-9], [1.0, 0.0], [2.0, f64::NAN]]);
+    let kept = fit(&line, Range { step: [0.1, 10.0], floor: 0.0 }).expect("seven points");
+    assert!((kept.order - 2.0).abs() < 1e-12 && kept.points == 7, "{kept:?}");
+    let floored = fit(&line, Range { step: [0.1, 10.0], floor: 0.3 }).expect("the upper points");
+    assert!(floored.points == 4, "{floored:?}");
+    let refused = fit(&line, Range { step: [0.1, 0.3], floor: 0.0 }).expect_err("two points are too few");
+    assert!(refused.contains("2 steps in 0.1..=0.3"), "{refused}");
+    // Three points at two steps make no line either.
+    assert!(fit(&[[1.0, 1.0], [1.0, 2.0], [2.0, 4.0]], Range { step: [0.5, 3.0], floor: 0.0 }).is_err());
+}

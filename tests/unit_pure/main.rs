@@ -1,0 +1,16 @@
+//! What needs neither a device nor the program: geometry, plans, references, statistics, reports, and the rules of the source tree.
+
+mod bricks;
+#[path = "../common/mod.rs"]
+mod common;
+mod compositing_orders;
+mod error_report;
+mod freehand;
+mod geometry;
+mod phantom;
+mod plan;
+mod profile;
+mod references;
+mod rules;
+mod supply;
+mod verify_report;

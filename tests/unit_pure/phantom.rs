@@ -1,0 +1,258 @@
+//! The phantom: its bodies are where their formulas say, its speckle has the right statistics, and the same options give
+//! the same bytes.
+
+use crate::common::files::Folder;
+use echolume::probe::{Advance, Geometry, Indices, Probe};
+use echolume::source::phantom::{Body, DYNAMIC_RANGE, Options, Phantom, Truth};
+use echolume::source::{Frame, Recording};
+use std::fs;
+
+/// A small sweep: the tests need no more.
+fn small(body: Body) -> Options {
+    Options { body, frames: 9, lines: 48, samples: 256, ..Options::default() }
+}
+
+fn phantom(options: Options) -> Phantom {
+    Phantom::new(options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn bytes(options: Options) -> Vec<u8> {
+    phantom(options).volume(0).into_iter().flat_map(|frame| frame.bytes).collect()
+}
+
+/// Every sample of a volume with its place: (probe, indices, grey).
+fn each_sample(phantom: &Phantom, volume: usize, mut see: impl FnMut(&Probe, Indices, f64)) {
+    let probe = phantom.probe(volume);
+    for frame in phantom.volume(volume) {
+        for (i, grey) in frame.bytes.iter().enumerate() {
+            let (line, sample) = ((i / probe.samples) as f64, (i % probe.samples) as f64);
+            see(&probe, Indices { sample, line, slice: frame.slice as f64 }, f64::from(*grey));
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
+    for body in Body::ALL {
+        let first = bytes(small(body));
+        assert!(first == bytes(small(body)), "{body}");
+        assert!(first != bytes(Options { seed: 2, ..small(body) }), "{body}");
+        let bare = |seed| bytes(Options { seed, speckle: false, ..small(body) });
+        assert!(bare(1) == bare(2), "{body}: the seed is the speckle's alone");
+    }
+}
+
+#[test]
+fn the_number_of_threads_does_not_show() {
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bytes(small(Body::Head)))
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(5));
+}
+
+/// Rayleigh in amplitude, Fisher-Tippett in dB; the mean is 15 dB below full scale, so that neither end clips.
+#[test]
+fn speckle_is_fully_developed() {
+    let full = phantom(Options { body: Body::Constant, ..Options::default() });
+    let frames = full.volume(0);
+    for slice in [0, 18, 36] {
+        // One frame has 512 x 128 samples: over 3000 cells of 2 pi x 1.5 x 2 samples.
+        let level: Vec<f64> =
+            frames[slice].bytes.iter().map(|v| (f64::from(*v) / 255.0 - 1.0) * DYNAMIC_RANGE).collect();
+        let (mean_db, sd_db) = mean_and_sd(level.iter().copied());
+        let (mean, sd) = mean_and_sd(level.iter().map(|db| 10f64.powf(db / 20.0)));
+        assert!((mean / sd / 1.913 - 1.0).abs() < 0.05, "slice {slice}: mean / sd is {}", mean / sd);
+        assert!((sd_db / 5.57 - 1.0).abs() < 0.05, "slice {slice}: sd is {sd_db} dB");
+        // The logarithm's mean lies 2.51 dB below that of the power (Euler's constant), which speckle leaves as it was.
+        assert!((mean_db + 2.51 + 15.0).abs() < 0.5, "slice {slice}: mean is {mean_db} dB");
+    }
+}
+
+fn mean_and_sd(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let count = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    (mean, (values.map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
+}
+
+/// Half a grey for rounding, and the f32 in which levels are kept.
+const ROUNDING: f64 = 0.501;
+
+#[test]
+fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
+    for body in [Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp] {
+        let options = Options { speckle: false, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
+        let phantom = phantom(options);
+        let truth = phantom.truth();
+        let mut shown = [255.0f64, 0.0];
+        for volume in 0..2 {
+            each_sample(&phantom, volume, |probe, at, grey| {
+                let place = probe.to_space(at);
+                // How far behind an edge, in samples; -0.5..0.5 is the edge itself.
+                let edge = |beyond: f64, near: f64, far: f64| {
+                    near + (far - near) * (beyond / probe.sample_pitch + 0.5).clamp(0.0, 1.0)
+                };
+                let expected = match &truth {
+                    Truth::Sphere { centre, radius, inside, outside } => {
+                        edge(radius - place.distance(*centre), *outside, *inside)
+                    }
+                    Truth::Step { y, above, below } => edge(place.y - y, *above, *below),
+                    Truth::Wires { wires, peak, per_mm2, outside } => {
+                        let nearest = wires.iter().map(|w| w.distance(place)).fold(f64::MAX, f64::min);
+                        outside.max(peak - per_mm2 * nearest * nearest)
+                    }
+                    Truth::Constant { grey } => *grey,
+                    Truth::Ramp(ramp) => ramp.grey(
+                        probe.first_range() + probe.sample_pitch * at.sample,
+                        probe.lines.at(at.line),
+                        probe.slice_position(at.line, at.slice),
+                    ),
+                    Truth::Head => panic!("has no formula"),
+                };
+                assert!((grey - expected).abs() < ROUNDING, "{body}, volume {volume}, {at:?}: {grey} for {expected}");
+                shown = [shown[0].min(grey), shown[1].max(grey)];
+            });
+        }
+        let spread = if body == Body::Constant { 0.0 } else { 100.0 };
+        assert!(shown[1] - shown[0] >= spread && shown[0] > 0.0 && shown[1] < 255.0, "{body}: {shown:?}");
+    }
+}
+
+/// With speckle too: bright where bright, dark where dark, in the mean.
+#[test]
+fn speckle_leaves_the_body_where_it_is() {
+    let phantom = phantom(Options { body: Body::Sphere, ..Options::default() });
+    let Truth::Sphere { centre, radius, inside, outside } = phantom.truth() else { panic!("is a sphere") };
+    let mut sums = [(0.0, 0.0); 2];
+    each_sample(&phantom, 0, |probe, at, grey| {
+        let from_edge = probe.to_space(at).distance(centre) - radius;
+        if from_edge.abs() > 8.0 {
+            let (sum, count) = &mut sums[usize::from(from_edge > 0.0)];
+            *sum += grey;
+            *count += 1.0;
+        }
+    });
+    // The mean of the logarithm lies 2.51 dB below the power; in the fluid, 45 dB down, clipping lifts it again.
+    let lower = 2.51 / DYNAMIC_RANGE * 255.0;
+    assert!((sums[0].0 / sums[0].1 - (inside - lower)).abs() < 3.0, "{sums:?}");
+    assert!((sums[1].0 / sums[1].1 - outside).abs() < lower, "{sums:?}");
+}
+
+/// The head moves: between volumes by more than its speckle's seed alone would show, and without speckle too.
+#[test]
+fn the_head_is_bright_in_dark_fluid_and_moves() {
+    let phantom = phantom(Options { speckle: false, volumes: 6, ..small(Body::Head) });
+    let grey_at = |volume: usize, place: [f64; 3]| {
+        let probe = phantom.probe(volume);
+        let at = probe.to_indices(place.into());
+        let frame = &phantom.volume(volume)[at.slice.round() as usize];
+        frame.bytes[at.line.round() as usize * probe.samples + at.sample.round() as usize]
+    };
+    assert!(grey_at(0, [0.0, 72.0, 0.0]) < 40, "fluid between wall and face");
+    assert!(grey_at(0, [0.0, 50.0, 0.0]) > 100, "the wall");
+    let between = |a: usize, b: usize| {
+        let (a, b) = (phantom.volume(a), phantom.volume(b));
+        a.iter().zip(&b).map(|(a, b)| a.bytes.iter().zip(&b.bytes).filter(|(a, b)| a != b).count()).sum::<usize>()
+    };
+    assert!(between(0, 5) > 2000, "{} samples differ", between(0, 5));
+}
+
+fn read_back(recording: &mut Recording) -> Vec<Frame> {
+    std::iter::from_fn(|| recording.next_frame().unwrap_or_else(|e| panic!("{e}"))).collect()
+}
+
+#[test]
+fn a_written_sweep_reads_back_as_it_was_made() {
+    let folder = Folder::new("both-ways");
+    let path = folder.join("sweep.mha");
+    let made = phantom(Options { volumes: 3, both_ways: true, speed_ratio: 0.5, ..small(Body::Head) });
+    made.write(&path).unwrap();
+    assert!(folder.names().iter().eq(["sweep.mha", "sweep.probe.toml"]));
+
+    let mut recording = Recording::open(&path, None).unwrap();
+    assert_eq!((recording.format(), recording.volumes()), ("PLUS sequence", 3));
+    let read = read_back(&mut recording);
+    let frames: Vec<Frame> = (0..3).flat_map(|v| made.volume(v)).collect();
+    assert_eq!(read.len(), frames.len());
+    for (read, made) in read.iter().zip(&frames) {
+        assert!((read.time.unwrap() - made.time.unwrap()).abs() < 1e-6);
+        assert!(*read == Frame { time: read.time, ..made.clone() }, "volume {} frame {}", made.volume, made.number);
+    }
+    for volume in 0..3 {
+        assert_eq!(recording.geometry(volume), Geometry::Sweep(made.probe(volume)));
+    }
+}
+
+/// One volume of a motor that stops needs no probe file: the keys of a pre-scan sweep say it all.
+#[test]
+fn a_single_volume_stands_alone() {
+    let folder = Folder::new("alone");
+    let path = folder.join("sweep.mha");
+    let made = phantom(small(Body::Sphere));
+    made.write(&path).unwrap();
+    // Over itself, as a second run would.
+    made.write(&path).unwrap();
+    fs::remove_file(folder.join("sweep.probe.toml")).unwrap();
+    let mut recording = Recording::open(&path, None).unwrap();
+    assert!(read_back(&mut recording).iter().zip(&made.volume(0)).all(|(a, b)| a.bytes == b.bytes));
+    let (Geometry::Sweep(read), made) = (recording.geometry(0), made.probe(0)) else { panic!("is a sweep") };
+    let corner = Indices { sample: 255.0, line: 47.0, slice: 8.0 };
+    assert!(read.to_space(corner).distance(made.to_space(corner)) < 1e-9);
+}
+
+#[test]
+fn every_second_volume_goes_backwards() {
+    let options = Options { volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(Body::Constant) };
+    let phantom = phantom(options);
+    let pitch = phantom.probe(0).slices.pitch();
+    for (volume, sign) in [(0, 1.0), (1, -1.0)] {
+        assert_eq!(phantom.probe(volume).advance, Advance::Same(sign * 0.5 * pitch));
+        phantom.probe(volume).check().unwrap();
+        for (number, frame) in phantom.volume(volume).iter().enumerate() {
+            assert_eq!((frame.volume as usize, frame.number as usize), (volume, number));
+            assert_eq!(frame.backward, volume == 1);
+            assert_eq!(frame.slice, if frame.backward { 8 - number } else { number });
+        }
+    }
+    // A line takes 2 d / c.
+    let time = phantom.volume(1)[0].time.unwrap();
+    assert!((time - phantom.probe(0).acquisition_time()).abs() < 1e-12);
+    assert!((time - 9.0 * 48.0 * 2.0 * 0.12 / 1540.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
+    let ok = small(Body::Sphere);
+    let wrong = [
+        (Options { volumes: 0, ..ok.clone() }, "volumes"),
+        (Options { frames: 1, ..ok.clone() }, "frames"),
+        (Options { lines: 1, ..ok.clone() }, "lines"),
+        (Options { samples: 2, ..ok.clone() }, "samples"),
+        (Options { frames: 1024, lines: 1024, samples: 8192, ..ok.clone() }, "samples"),
+        (Options { samples: usize::MAX, ..ok.clone() }, "samples"),
+        (Options { speed_ratio: 1.5, ..ok.clone() }, "speed_ratio"),
+        (Options { speed_ratio: f64::NAN, ..ok.clone() }, "speed_ratio"),
+    ];
+    for (options, field) in wrong {
+        let Err(error) = Phantom::new(options) else { panic!("{field}") };
+        assert_eq!(error.to_string().lines().count(), 1);
+        assert!(error.to_string().starts_with(&format!("phantom: {field}: ")), "{error}");
+    }
+    let error = "foot\n".parse::<Body>().unwrap_err().to_string();
+    assert!(error.lines().count() == 1 && error.contains("sphere"), "{error}");
+    for body in Body::ALL {
+        assert_eq!(body.name().parse::<Body>().unwrap(), body);
+    }
+
+    let folder = Folder::new("refused");
+    fs::create_dir(folder.join("folder.mha")).unwrap();
+    let made = phantom(ok.clone());
+    for name in ["sweep.vol", "sweep", "folder.mha", "nowhere/sweep.mha"] {
+        let error = made.write(&folder.join(name)).unwrap_err().to_string();
+        assert!(error.lines().count() == 1 && error.contains(name), "{error}");
+    }
+    let long = phantom(Options { volumes: 10_000, ..ok });
+    assert!(long.write(&folder.join("long.mha")).unwrap_err().to_string().contains("volumes"));
+    assert!(folder.names().iter().eq(["folder.mha"]), "something half done is left: {:?}", folder.names());
+}

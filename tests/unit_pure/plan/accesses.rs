@@ -1,0 +1,76 @@
+//! What a dispatch touches, by its pass, its turn and the part of each slot that it binds.
+
+use super::{FILTERED, scene};
+use crate::common::probes::voxels;
+use echolume::barriers::{Access, Resource, Worker, Workers, accesses};
+use echolume::passes::{DispatchArgs, Slot, by_name};
+use std::ops::Range;
+
+/// Slot, volume image, and parts.
+type Touched = Vec<(Slot, u32, Range<u32>)>;
+
+/// What it reads and what it writes.
+fn touched(name: &str, args: DispatchArgs) -> (Touched, Touched) {
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
+    let all = accesses(&scene, by_name(name).expect("pass"), &args);
+    let of = |write| {
+        let part = |a: &Access| match a.resource {
+            Resource::Slot(slot, image) => (slot, image, a.parts.clone()),
+            Resource::Readback => panic!("no pass reads back"),
+        };
+        assert!(all.iter().all(|a| a.by == Worker::Compute));
+        all.iter().filter(|a| a.write == write).map(part).collect()
+    };
+    (of(false), of(true))
+}
+
+#[test]
+fn a_pass_over_frames_touches_its_layer_and_one_over_slices_its_slice() {
+    let args = DispatchArgs { layer: 2, slice: 3, image: 1, ..DispatchArgs::default() };
+    let (reads, writes) = touched("load_slice", args);
+    assert_eq!(reads, [(Slot::Frames, 0, 2..3)]);
+    assert_eq!(writes, [(Slot::SliceA, 0, 0..1)]);
+    let (reads, writes) = touched("aos_slice", DispatchArgs { iteration: 7, ..args });
+    let whole = |slot| (slot, 0, 0..1);
+    assert_eq!(reads, [whole(Slot::SliceShares), whole(Slot::SliceForward), whole(Slot::SliceRows)]);
+    assert_eq!(writes, [(Slot::SharpVolume, 1, 3..4)]);
+}
+
+#[test]
+fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
+    let around = |slice, slices| {
+        touched("gaussian_elevation", DispatchArgs { slice, slices, image: 1, ..DispatchArgs::default() })
+    };
+    assert_eq!(around(0, 1), (vec![(Slot::SharpVolume, 1, 0..4)], vec![(Slot::Volume, 1, 0..1)]));
+    assert_eq!(around(4, 1), (vec![(Slot::SharpVolume, 1, 1..5)], vec![(Slot::Volume, 1, 4..5)]));
+    assert_eq!(around(1, 2), (vec![(Slot::SharpVolume, 1, 0..5)], vec![(Slot::Volume, 1, 1..3)]));
+    let (reads, writes) = touched("raycast_projection", DispatchArgs { image: 1, ..DispatchArgs::default() });
+    assert_eq!((&reads[0], &writes[0]), (&(Slot::Volume, 1, 0..5), &(Slot::Picture, 0, 0..1)));
+}
+
+#[test]
+fn a_set_of_workers_lacks_what_was_taken_out_of_it() {
+    assert!(Workers::DEVICE.has(Worker::Compute) && Workers::DEVICE.has(Worker::Copy));
+    assert!(!Workers::DEVICE.has(Worker::Host));
+    let copies = Workers::DEVICE.without(Worker::Compute);
+    assert_eq!(copies, Workers::from(Worker::Copy));
+    assert_eq!(copies.without(Worker::Host), copies, "what is not there cannot be taken out");
+    assert_eq!(copies.without(Worker::Copy), Workers::default());
+}
+
+/// Tiles of a volume's slices are texels of one 3D image too.
+#[test]
+fn a_reader_and_a_writer_of_a_volume_conflict_wherever_they_are_and_of_other_slots_where_they_meet() {
+    let access = |slot, parts: Range<u32>, write| Access::of_slot(slot, 0, parts, write, Worker::Compute);
+    for slot in [Slot::Volume, Slot::SharpVolume, Slot::TileRanges] {
+        assert!(access(slot, 0..1, true).conflicts(&access(slot, 3..4, false)), "{slot:?}");
+        assert!(access(slot, 0..1, false).conflicts(&access(slot, 3..4, true)), "{slot:?}");
+        assert!(!access(slot, 0..1, true).conflicts(&access(slot, 1..2, true)), "{slot:?}");
+        assert!(!access(slot, 0..1, false).conflicts(&access(slot, 0..1, false)), "{slot:?}");
+    }
+    let frames = |parts, write| access(Slot::Frames, parts, write);
+    assert!(frames(0..2, true).conflicts(&frames(1..3, false)) && frames(1..3, true).conflicts(&frames(0..2, true)));
+    assert!(!frames(0..2, true).conflicts(&frames(2..3, false)) && !frames(2..3, true).conflicts(&frames(0..2, false)));
+    let other = Access::of_slot(Slot::Frames, 1, 0..2, true, Worker::Compute);
+    assert!(!frames(0..2, true).conflicts(&other), "another image");
+}

@@ -1,0 +1,115 @@
+//! Plans and what follows from them, without a GPU: which steps and slots, what runs again after a change, what a dispatch touches,
+//! which slots the filters of a chain take turns with.
+
+mod accesses;
+mod chains;
+mod reruns;
+
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{self, BYTES};
+use echolume::passes::{Frequency, Slot};
+use echolume::plan::{Plan, Step, affected};
+use echolume::probe::{Advance, Geometry, Probe};
+use echolume::scene::Scene;
+
+fn fan(advance: Advance) -> Geometry {
+    Geometry::Sweep(Probe { advance, ..wobbler() })
+}
+
+fn scene(geometry: Geometry, toml: &str) -> Scene {
+    scenes::scene(geometry, BYTES, toml)
+}
+
+fn step<'a>(plan: &'a Plan, name: &str) -> &'a Step {
+    plan.steps.iter().find(|s| s.pass.name == name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+const FILTERED: &str = "mode = 'mip'
+    ray = { brick = 0 }
+    picture = { size = [5, 4] }
+    slices = { median = true, perona_malik = { scheme = 'aos', repeat = 2 }, smooth = { elevation = 1.0 } }";
+
+#[test]
+fn steps_are_told_apart_by_what_makes_them_run() {
+    let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
+    let names = |when| plan.steps_of(when).map(|(i, s)| (i, s.pass.name, s.iteration)).collect::<Vec<_>>();
+    let frame = names(Frequency::Frame);
+    assert_eq!(frame[..2], [(0, "load_slice", 0), (1, "median_slice", 0)]);
+    assert_eq!(frame[2..], std::array::from_fn::<_, 8, _>(|n| (2 + n, "aos_slice", n as u32)));
+    assert_eq!(names(Frequency::Volume), [(10, "gaussian_elevation", 0)]);
+    assert_eq!(names(Frequency::Picture), [(11, "raycast_projection", 0), (12, "tone", 0)]);
+    assert_eq!(plan.steps[9].id(), ("aos_slice", 7));
+    assert_eq!(plan.steps[9].args().iteration, 7);
+}
+
+#[test]
+fn a_step_names_what_it_reads_and_what_it_writes() {
+    let scene = scene(fan(Advance::None), "mode = 'vr'");
+    let plan = Plan::new(&scene);
+    let names = |slots: Vec<Slot>| slots.iter().map(|slot| slot.name()).collect::<Vec<_>>();
+    let of = |name: &str| (names(step(&plan, name).reads(&scene)), names(step(&plan, name).writes(&scene)));
+    let (reads, writes) = of("scan_convert");
+    assert!(reads.contains(&"frames") && reads.contains(&"scan_lut"), "{reads:?}");
+    assert_eq!(writes, ["volume"]);
+    let (reads, writes) = of("tone");
+    assert_eq!((reads, writes), (vec!["picture"], vec!["screen"]));
+}
+
+#[test]
+fn a_step_reaches_as_many_slices_as_its_gaussian() {
+    let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
+    assert_eq!(step(&plan, "gaussian_elevation").reach(&scene(voxels([6, 8, 5]), FILTERED)), 3);
+    assert_eq!(step(&plan, "median_slice").reach(&scene(voxels([6, 8, 5]), FILTERED)), 0);
+}
+
+/// Frames of 6x8 bytes, four on their way; two spare slices, the shares of an elimination and what it passes on, rows, all of f32; two
+/// volumes of 6x8x5 in R16F; a picture of 5x4 in RGBA16F and one of bytes; and what the pass over the volume looks up.
+#[test]
+fn a_plan_counts_the_bytes_of_its_slots() {
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
+    let plan = Plan::new(&scene);
+    let slots: Vec<_> = plan.slots.iter().map(|s| s.name()).collect();
+    let expected =
+        ["frames", "slice_a", "slice_b", "slice_shares", "slice_forward", "slice_rows", "sharp_volume", "volume"];
+    assert_eq!(slots[..8], expected);
+    assert_eq!(slots[8..], ["picture", "screen"]);
+    assert_eq!(plan.bytes(&scene), 48 * 4 + 5 * 48 * 4 + 2 * 240 * 2 + 20 * 8 + 20 * 4);
+}
+
+#[test]
+fn a_plan_explains_itself() {
+    let scene = scene(voxels([6, 8, 5]), FILTERED);
+    let text = Plan::new(&scene).explain(&scene);
+    let headings: Vec<_> = text.lines().filter(|l| l.starts_with("stage ")).collect();
+    assert_eq!(headings, ["stage 1: preprocess", "stage 2: raycast", "stage 3: shade", "stage 4: postprocess"]);
+    let line = |start: &str| {
+        let found: Vec<_> = text.lines().filter(|l| l.trim_start().starts_with(start)).collect();
+        assert_eq!(found.len(), 1, "{start}: {found:?}");
+        found[0].split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    // Runs of four slices: 5 of them in 2 invocations.
+    assert_eq!(line("+ gaussian_elevation"), "+ gaussian_elevation 6 x 8 x 2, each volume: asked for");
+    assert_eq!(line("+ aos_slice"), "+ aos_slice 8 x 1 x 1, each frame, 8 times: asked for");
+    assert_eq!(line("+ tone"), "+ tone 5 x 4 x 1, each picture: every picture ends in 8 bits");
+    assert_eq!(line("- sigma_slice"), "- sigma_slice not asked for");
+    // Eight dispatches of three shaders, each told once.
+    assert_eq!(line("filter/aos_forward.plane"), "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward");
+    assert_eq!(line("filter/aos_backward.rows"), "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows");
+    assert!(line("samples of the volume").contains("fastest"));
+    assert_eq!(
+        line("seen"),
+        "seen: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
+    );
+    assert_eq!(line("in all"), "in all 2352 bytes");
+}
+
+#[test]
+fn runs_of_slices_end_where_the_volume_does() {
+    let changed = |which: &[usize]| (0..6).map(|i| which.contains(&i)).collect::<Vec<_>>();
+    assert_eq!(affected(&changed(&[1]), 3), vec![0..5; 1]);
+    assert_eq!(affected(&changed(&[4]), 3), vec![1..6; 1]);
+    assert_eq!(affected(&changed(&[0, 2, 5]), 0), [0..1, 2..3, 5..6]);
+    // Side by side and not upon one another: one run all the same.
+    assert_eq!(affected(&changed(&[0, 3]), 1), vec![0..5; 1]);
+    assert_eq!(affected(&changed(&[1, 2]), 0), vec![1..3; 1]);
+}

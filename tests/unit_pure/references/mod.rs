@@ -1,0 +1,140 @@
+//! The f64 references of the filters, held to answers that owe them nothing: hands, counts, sums that have to stay, equations that have
+//! to be fulfilled. What the shaders do is held to the references (tests/gpu); this is why that proves something. Needs no GPU.
+
+mod declared;
+mod diffusion;
+mod estimators;
+mod growing;
+mod smoothing;
+
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{self, FLOATS};
+use echolume::passes::{Arrays, DispatchArgs, MISS, Pass, Texels, by_name};
+use echolume::probe::{Geometry, Grid};
+use echolume::scene::Scene;
+
+fn scene(size: [usize; 3], toml: &str) -> Scene {
+    scenes::scene(voxels(size), FLOATS, toml)
+}
+
+/// A scene whose slices go through these filters.
+fn slices(size: [usize; 2], filters: &str) -> Scene {
+    scene([size[0], size[1], 3], &format!("slices = {{ {filters} }}"))
+}
+
+/// A scene whose distance map does.
+fn distances(size: [usize; 2], filters: &str) -> Scene {
+    scene([8; 3], &format!("mode = 'sr'\npicture = {{ size = {size:?} }}\ndistance = {{ {filters} }}"))
+}
+
+/// A scene whose picture does.
+fn picture(size: [usize; 2], filters: &str) -> Scene {
+    scene([8; 3], &format!("mode = 'mip'\npicture = {{ size = {size:?} }}\npost = {{ {filters} }}"))
+}
+
+fn pass(name: &str) -> &'static Pass {
+    by_name(name).unwrap_or_else(|| panic!("no pass {name}"))
+}
+
+/// What one dispatch makes of `source` in a target of so many slices; what it leaves alone is NaN.
+fn dispatched(scene: &Scene, name: &str, source: &Texels, args: DispatchArgs, depth: usize) -> Texels {
+    let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
+    reads.insert("source", source.clone());
+    writes.insert("target", Texels::untouched([source.size[0], source.size[1], depth], source.channels));
+    (pass(name).reference)(scene, &args, &reads, &mut writes);
+    writes.get("target").clone()
+}
+
+/// The first dispatch of a pass, in a plane.
+fn filtered(scene: &Scene, name: &str, source: &Texels) -> Texels {
+    dispatched(scene, name, source, DispatchArgs::default(), 1)
+}
+
+fn plane(size: [usize; 2], f: impl Fn(usize, usize) -> f64) -> Texels {
+    Texels::from_fn([size[0], size[1], 1], 1, |[x, y, _], _| f(x, y))
+}
+
+/// Rows of numbers, as they are read.
+fn rows<const W: usize, const H: usize>(rows: [[f64; W]; H]) -> Texels {
+    plane([W, H], |x, y| rows[y][x])
+}
+
+/// A number in 0..1 that goes with its seed.
+fn hash(seed: usize) -> f64 {
+    let mut z = (seed as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+fn noise(size: [usize; 2], seed: usize) -> Texels {
+    plane(size, |x, y| hash(seed * 10_000 + y * size[0] + x))
+}
+
+/// Distances near 40 mm, and here and there a miss.
+fn holed(size: [usize; 2], seed: usize) -> Texels {
+    let rough = noise(size, seed);
+    plane(size, |x, y| match rough.one(x, y, 0) {
+        share if share < 0.3 => MISS,
+        share => 40.0 + 3.0 * share,
+    })
+}
+
+/// Values of a picture whose channels have nothing in common.
+fn colours(size: [usize; 2], seed: usize) -> Texels {
+    Texels::from_fn([size[0], size[1], 1], 4, |[x, y, _], c| hash(seed * 10_000 + (y * size[0] + x) * 4 + c))
+}
+
+fn channel(texels: &Texels, c: usize) -> Texels {
+    Texels::from_fn(texels.size, 1, |at, _| texels.get(at)[c])
+}
+
+/// Pixels whose row and column lie within `radius`, the picture's border cut off.
+fn window(size: [usize; 3], x: usize, y: usize, radius: usize) -> impl Iterator<Item = (usize, usize)> {
+    let all = (0..size[1]).flat_map(move |j| (0..size[0]).map(move |i| (i, j)));
+    all.filter(move |(i, j)| i.abs_diff(x) <= radius && j.abs_diff(y) <= radius)
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[track_caller]
+fn same(got: &Texels, expected: &Texels, what: &str) {
+    assert_eq!((got.size, got.channels), (expected.size, expected.channels), "{what}");
+    for (i, (a, b)) in got.values.iter().zip(&expected.values).enumerate() {
+        let near = (a - b).abs() <= 1e-11 * b.abs().max(1.0);
+        assert!(
+            near,
+            "{what}: {a} in place of {b} at {}, {}",
+            i / got.channels % got.size[0],
+            i / got.channels / got.size[0]
+        );
+    }
+}
+
+/// What a pass makes of slice 2 of 3 goes there and nowhere else; into a plane, which has no slices, it goes as well.
+#[test]
+fn a_filtered_slice_goes_where_it_belongs() {
+    let source = noise([6, 5], 1);
+    for (name, filter) in [
+        ("median_slice", "median = true"),
+        ("estimator_slice", "estimator = 'gradient-inverse'"),
+        ("sigma_slice", "sigma = {}"),
+        ("enhanced_sigma_slice", "enhanced_sigma = {}"),
+        ("perona_malik_slice", "perona_malik = {}"),
+        ("gaussian_lateral", "smooth = { lateral = 1.0 }"),
+        ("gaussian_depth", "smooth = { depth = 1.0 }"),
+    ] {
+        let scene = slices([6, 5], filter);
+        let args = DispatchArgs { slice: 2, ..DispatchArgs::default() };
+        let flat = dispatched(&scene, name, &source, args, 1);
+        assert!(flat.values.iter().all(|v| v.is_finite()), "{name}");
+        assert!(flat.values.iter().zip(&source.values).any(|(a, b)| a != b), "{name} changes something");
+        let volume = dispatched(&scene, name, &source, args, 3);
+        for (x, y) in window(source.size, 0, 0, 9) {
+            assert_eq!(volume.one(x, y, 2), flat.one(x, y, 0), "{name}");
+            assert!(volume.one(x, y, 0).is_nan() && volume.one(x, y, 1).is_nan(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
+//! Needs no GPU.
+
+use crate::common::files::repository;
+use crate::common::probes::{voxels, wobbler};
+use crate::common::scenes::{BYTES, scene};
+use echolume::passes::{DispatchArgs, PASSES, Pass, interface_check, measure};
+use echolume::probe::{Advance, Axis, Geometry, Motion, Probe};
+use echolume::scene::Scene;
+use echolume::shader_source;
+use echolume::spirv;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Not as it stands: this file is looked at, too.
+const UNSAFE: &str = concat!("unsafe", " {");
+
+/// Every Rust file below a folder, with its path from the top.
+fn sources(folder: &str) -> Vec<(String, String)> {
+    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("folder").map(|e| e.expect("entry").path()) {
+            match entry.is_dir() {
+                true => walk(&entry, found),
+                false if entry.extension().is_some_and(|e| e == "rs") => found.push(entry),
+                false => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk(&repository(folder), &mut found);
+    found.sort();
+    let name = |p: &PathBuf| p.strip_prefix(repository("")).expect("below the top").to_string_lossy().into_owned();
+    found.iter().map(|p| (name(p), std::fs::read_to_string(p).expect("source"))).collect()
+}
+
+/// Code without comments: a doc comment may name what the code may not use.
+fn code(text: &str) -> String {
+    text.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn layers_hold() {
+    // A folder or file, and what it must not name.
+    let rules: &[(&str, &[&str])] = &[
+        ("src/scene", &["crate::gpu", "crate::passes", "crate::plan", "crate::barriers", "ash::vk"]),
+        ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
+        ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
+        ("src/plan", &["crate::gpu", "ash::vk"]),
+        ("src/barriers", &["crate::gpu", "ash::vk"]),
+        ("src/queues.rs", &["crate::gpu", "ash::vk"]),
+        ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
+        ("src/shader_source.rs", &["crate::", "ash::vk"]),
+        ("src/files", &["crate::", "ash::vk"]),
+        ("src/passes", &["crate::gpu", "crate::plan", "crate::barriers", "crate::profile", "crate::verify", "ash::vk"]),
+        ("src/verify/report", &["crate::gpu", "ash::vk"]),
+        ("src/gpu", &["crate::profile", "crate::error_report", "crate::thesis_tables", "crate::verify"]),
+        ("src/verify", &["ash::", "crate::live", "crate::ui", "crate::kiosk"]),
+        ("src/profile", &["crate::verify", "crate::error_report", "ash::vk"]),
+        ("src/error_report", &["crate::verify", "ash::vk"]),
+        ("src/thesis_tables", &["crate::verify", "ash::vk"]),
+        ("src/reference", &["crate::gpu", "ash::vk"]),
+        ("src/live", &["crate::profile", "crate::error_report", "crate::verify", "ash::vk"]),
+        ("src/kiosk", &["crate::gpu", "crate::profile", "crate::verify", "ash::", "winit::", "egui::"]),
+        ("src/cli", &["ash::vk", "use ash"]),
+    ];
+    let all = sources("src");
+    for (place, forbidden) in rules {
+        let within: Vec<_> = all.iter().filter(|(name, _)| name.starts_with(place)).collect();
+        assert!(!within.is_empty(), "{place} is gone");
+        for (name, text) in within {
+            for word in *forbidden {
+                assert!(!code(text).contains(word), "{name} names {word}, which its layer does not know");
+            }
+        }
+    }
+    // A crate, and where alone it is known.
+    let motor = "src/probe/motor/";
+    let crates: &[(&str, &[&str])] = &[
+        ("serialport::", &[motor]),
+        ("signal_hook::", &["src/files/signals.rs"]),
+        ("tempfile::", &["src/files/"]),
+        // Both wait for what the kernel says of several files at once, which the standard library cannot.
+        ("rustix::", &[motor, "src/ui/devices/"]),
+        ("evdev::", &["src/ui/devices/"]),
+        ("winit::", &["src/ui/window.rs"]),
+        ("egui::", &["src/ui/panels/", "src/gpu/window/"]),
+    ];
+    for (name, text) in &all {
+        let text = code(text);
+        let in_gpu = name.starts_with("src/gpu/");
+        assert!(in_gpu || !text.contains("use ash"), "{name} imports ash");
+        assert!(in_gpu || !text.contains(UNSAFE), "{name} has unsafe code");
+        for (word, homes) in crates {
+            let at_home = homes.iter().any(|home| name.starts_with(home));
+            assert!(at_home || !text.contains(word), "{name} names {word}, which only {homes:?} knows");
+        }
+        assert!(
+            !text.contains(".unwrap()") || name.contains("test") || text.contains("#[cfg(test)]"),
+            "{name} unwraps"
+        );
+    }
+}
+
+/// The compiler holds what these two lines of walls say; here is that they stay: a module without its `forbid`, a lint that is allowed.
+#[test]
+fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() {
+    let read = |name: &str| std::fs::read_to_string(repository(name)).expect(name);
+    let lib = read("src/lib.rs");
+    let lines: Vec<&str> = lib.lines().collect();
+    let modules = lines.iter().enumerate().filter(|(_, l)| l.ends_with(';') && code(l).contains("mod "));
+    for (i, line) in modules {
+        let wall = if *line == "pub mod gpu;" { "#[allow(unsafe_code)]" } else { "#[forbid(unsafe_code)]" };
+        assert!(i > 0 && lines[i - 1] == wall, "src/lib.rs:{}: {line} stands without {wall}", i + 1);
+    }
+    assert!(read("src/main.rs").contains("#![forbid(unsafe_code)]"), "src/main.rs forbids nothing");
+    let manifest: toml::Table = toml::from_str(&read("Cargo.toml")).expect("Cargo.toml");
+    let lint = &manifest["lints"]["clippy"]["undocumented_unsafe_blocks"];
+    assert_eq!(lint.as_str(), Some("deny"), "clippy is not asked for the reasons");
+    for (name, text) in sources("src/gpu").into_iter().chain(sources("tests")).chain(sources("benches")) {
+        assert!(!text.contains(concat!("undocumented_", "unsafe_blocks)")), "{name} allows unsafe without a reason");
+        let lines: Vec<&str> = text.lines().collect();
+        let blocks = lines.iter().enumerate().filter(|(_, l)| code(l).contains(UNSAFE));
+        for (i, line) in blocks {
+            let reasoned = (i.saturating_sub(6)..=i).any(|j| lines[j].contains("// SAFETY:"));
+            assert!(reasoned, "{name}:{}: {}", i + 1, line.trim());
+        }
+    }
+}
+
+/// What `tools/mutants` makes a crate of is a crate: nothing in it names a module that it leaves behind.
+#[test]
+fn what_mutants_are_planted_in_stands_alone() {
+    let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");
+    let list = tool.split("\npure=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its list");
+    let copied: Vec<String> = list.split_whitespace().map(|path| format!("src/{path}")).collect();
+    let stands = |name: &str| copied.iter().any(|path| name == path || name.starts_with(&format!("{path}/")));
+    let all = sources("src");
+    for (name, text) in all.iter().filter(|(name, _)| stands(name)) {
+        for module in code(text)
+            .split("crate::")
+            .skip(1)
+            .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next())
+        {
+            let there = |path: &String| path.trim_end_matches(".rs").split('/').nth(1) == Some(module);
+            assert!(copied.iter().any(there), "{name} names crate::{module}, which tools/mutants does not copy");
+        }
+        let folder = format!("{}/", name.trim_end_matches(".rs"));
+        let mut below = all.iter().filter(|(other, _)| other.starts_with(&folder));
+        assert!(below.all(|(other, _)| stands(other)), "{name} is copied by tools/mutants without {folder}");
+    }
+}
+
+#[test]
+fn the_embedded_shaders_are_what_their_sources_say() {
+    let text = std::fs::read_to_string(repository("spirv/SOURCES")).expect("spirv/SOURCES");
+    let known: BTreeMap<&str, &str> = text.lines().filter_map(|l| l.split_once("  ")).map(|(h, n)| (n, h)).collect();
+    let sources = shader_source::sources(&repository("glsl")).expect("glsl");
+    for source in &sources {
+        let hash: String = Sha256::digest(source.fingerprint()).iter().map(|b| format!("{b:02x}")).collect();
+        assert_eq!(known.get(source.name.as_str()), Some(&hash.as_str()), "{}: run tools/shaders", source.name);
+        assert!(spirv::embedded(&source.name).is_some(), "{} is not embedded", source.name);
+    }
+    assert_eq!(known.len(), sources.len(), "spirv/ has shaders that glsl/ has not");
+    assert_eq!(spirv::EMBEDDED.len(), sources.len());
+}
+
+fn scenes() -> Vec<Scene> {
+    let fan = Probe { lines: Axis::centred(0.05, 16), slices: Axis::centred(0.05, 8), ..wobbler() };
+    let uneven = Axis::from_table((0..8).map(|k| 0.05 * k as f64 + 0.01 * (k as f64).sin()).collect());
+    let advance = Advance::Same(0.02);
+    let geometries = [
+        Geometry::Sweep(fan.clone()),
+        Geometry::Sweep(Probe { advance: advance.clone(), ..fan.clone() }),
+        Geometry::Sweep(Probe { slices: uneven.clone(), ..fan.clone() }),
+        Geometry::Sweep(Probe { slices: uneven, advance, ..fan.clone() }),
+        Geometry::Sweep(Probe { motion: Motion::Still { thickness: 1.0 }, slices: Axis::centred(1.0, 1), ..fan }),
+        voxels([8, 8, 8]),
+    ];
+    let filters = [
+        "",
+        "slices = { median = true, sigma = {}, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\n\
+         distance = { median = 3, sigma = {}, bilateral = { pixels = 2.0, distance = 1.0 } }\npost = { sigma = {}, enhanced_sigma = {} }\n\
+         light = { shadow = {}, occlusion = {}, skin = {} }",
+        "light = { shadow = {} }",
+        "light = { occlusion = {} }",
+        "conditioning = { samples = 16, dynamic_range = 60 }",
+        "conditioning = { tgc = [{ depth = 5, gain = -3 }] }",
+        "slices = { median = true }",
+        "slices = { sigma = {} }",
+        "slices = { estimator = 'median' }",
+        "slices = { estimator = 'median', enhanced_sigma = { growth = true }, perona_malik = {}, smooth = { lateral = 1.0 } }\n\
+         distance = { enhanced_sigma = {}, perona_malik = {} }\npost = { perona_malik = {} }",
+        "slices = { enhanced_sigma = {} }",
+        "slices = { perona_malik = {} }",
+        "slices = { perona_malik = { scheme = 'aos', repeat = 2 } }\npost = { perona_malik = { scheme = 'aos' } }",
+        "slices = { smooth = { lateral = 1.0 } }",
+        "ray = { rays = 2 }",
+        "ray = { sampling = 'quads' }",
+    ];
+    let mut scenes = Vec::new();
+    for geometry in &geometries {
+        for filters in filters {
+            if filters.contains("conditioning") && matches!(geometry, Geometry::Cartesian(_)) {
+                continue; // has no lines
+            }
+            for mode in [
+                "'vr'",
+                "'sr'",
+                "'mip'",
+                "'mixed'",
+                "'vr'\nvolume = { shading = 'first-hit' }",
+                "'vr'\nlayout = 'four'",
+            ] {
+                scenes.push(scene(geometry.clone(), BYTES, &format!("mode = {mode}\n{filters}")));
+            }
+        }
+        for sections in [
+            "mode = 'plane'",
+            "mode = 'orthogonal'",
+            "mode = 'plane'\npost = { floats = true }",
+            "mode = 'tomography'\nplanes = { lines = false, thickness = 3, slab = 'max' }",
+            "mode = 'cube'\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]",
+        ] {
+            scenes.push(scene(geometry.clone(), BYTES, sections));
+        }
+    }
+    scenes
+}
+
+#[test]
+fn every_pass_agrees_with_every_shader_it_may_use() {
+    let mut used = Vec::new();
+    for scene in scenes() {
+        for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
+            for iteration in 0..(pass.repeat)(&scene) {
+                let args = DispatchArgs { iteration, ..DispatchArgs::default() };
+                let shader = (pass.shader)(&scene, &args);
+                let bytes =
+                    spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
+                // As it is compiled, and with its textures as storage images.
+                let words = interface_check::for_scene(pass, &scene, &args, &spirv::words(bytes)).expect("the scene's");
+                let stored = interface_check::for_cpu(pass, &scene, &args, &words, |_| true);
+                let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                for words in [&words, &stored] {
+                    let module = spirv::reflect(words).expect("reflection");
+                    let agreed = interface_check::check(pass, &scene, &args, &module);
+                    agreed.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
+                }
+                let left = spirv::reflect(&stored).expect("reflection").bindings;
+                let textures = left.iter().filter(|b| b.kind == spirv::Kind::Sampled).count();
+                assert_eq!(textures, 0, "{shader} still fetches from a texture");
+                used.push(shader);
+            }
+        }
+    }
+    let scene = measure::scene(8, 8).expect("scene");
+    for pass in measure::MEASURES {
+        let shader = (pass.shader)(&scene, &DispatchArgs::default());
+        let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
+        interface_check::check(pass, &scene, &DispatchArgs::default(), &module).expect("agreement");
+        used.push(shader);
+    }
+    for (name, _) in spirv::EMBEDDED {
+        assert!(used.contains(name), "no scene uses {name}");
+    }
+}
+
+#[test]
+fn a_disagreement_names_both_sides() {
+    let scene = scenes().swap_remove(1);
+    let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone.plain").unwrap())).unwrap();
+    let tone = echolume::passes::by_name("tone").unwrap();
+    let changed = |change: fn(&mut Pass)| {
+        let mut pass = Pass { ..*tone };
+        change(&mut pass);
+        interface_check::check(&pass, &scene, &DispatchArgs::default(), &module).unwrap_err()
+    };
+    let error = changed(|p| p.reads = |_, _| vec![echolume::passes::whole("pictur", echolume::passes::Slot::Picture)]);
+    assert!(error.contains("pictur") && error.contains("reads"), "{error}");
+    let error = changed(|p| p.params = |_, _| echolume::passes::Params::default().i32("brightness", 1));
+    assert!(error.contains("brightness") && error.contains("float"), "{error}");
+    let error = changed(|p| p.constants = |_, _| vec![("COLOUR", 1)]);
+    assert!(error.contains("COLOUR"), "{error}");
+    let error = changed(|p| p.writes = |_, _| vec![echolume::passes::whole("screen", echolume::passes::Slot::Volume)]);
+    assert!(error.contains("Three") && error.contains("Two"), "{error}");
+}
+
+#[test]
+fn pass_names_are_unique_and_stages_in_order() {
+    let mut names: Vec<_> = PASSES.iter().map(|p| p.name).collect();
+    assert!(PASSES.windows(2).all(|w| w[0].stage <= w[1].stage), "a pass runs before its stage");
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), PASSES.len());
+}

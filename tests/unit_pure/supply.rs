@@ -1,0 +1,98 @@
+//! Where the crates that are built in come from, and under which licences: what deny.toml says, held without cargo-deny. Known faults
+//! are looked for by tools/deny, where there is a network.
+
+use crate::common::files::repository;
+use serde::Deserialize;
+use spdx::{Expression, LicenseReq, ParseMode};
+use std::collections::BTreeMap;
+use std::process::Command;
+
+const CRATES_IO: &str = "registry+https://github.com/rust-lang/crates.io-index";
+
+#[derive(Deserialize)]
+struct Lock {
+    package: Vec<Locked>,
+}
+
+#[derive(Deserialize)]
+struct Locked {
+    name: String,
+    source: Option<String>,
+    checksum: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Package>,
+}
+
+#[derive(Deserialize)]
+struct Package {
+    name: String,
+    source: Option<String>,
+    license: Option<String>,
+}
+
+fn toml<T: for<'de> Deserialize<'de>>(name: &str) -> T {
+    toml::from_str(&std::fs::read_to_string(repository(name)).expect(name)).expect(name)
+}
+
+fn words(value: &toml::Value) -> Vec<String> {
+    value.as_array().expect("a list").iter().map(|word| word.as_str().expect("a word").to_string()).collect()
+}
+
+/// Of the crates that this machine builds: of others nothing is here.
+fn packages() -> Vec<Package> {
+    let asked = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(repository("")).output();
+        let output = output.expect("it can be started");
+        assert!(output.status.success(), "{program}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let version = asked("rustc", &["-vV"]);
+    let host = version.lines().find_map(|line| line.strip_prefix("host: ")).expect("a host");
+    let about = ["metadata", "--format-version", "1", "--offline", "--locked", "--filter-platform", host];
+    serde_json::from_str::<Metadata>(&asked(env!("CARGO"), &about)).expect("metadata").packages
+}
+
+#[test]
+fn every_crate_is_from_one_registry_and_its_bytes_are_known() {
+    for lock in ["Cargo.lock", "tools/fuzz/Cargo.lock", "tools/shaders/Cargo.lock"] {
+        let locked: Lock = toml(lock);
+        assert!(locked.package.len() > 10, "{lock}");
+        for Locked { name, source, checksum } in locked.package {
+            let is_ours = name.starts_with("echolume") && source.is_none();
+            let is_known = checksum.is_some_and(|sum| sum.len() == 64 && sum.bytes().all(|b| b.is_ascii_hexdigit()));
+            assert!(is_ours || source.as_deref() == Some(CRATES_IO), "{lock}: {name} comes from {source:?}");
+            assert!(is_ours || is_known, "{lock}: {name} has no checksum");
+        }
+    }
+    let deny: toml::Table = toml("deny.toml");
+    let allowed = words(&deny["sources"]["allow-registry"]);
+    assert_eq!(allowed, [CRATES_IO.trim_start_matches("registry+")], "deny.toml allows other registries");
+}
+
+#[test]
+fn every_crate_has_a_licence_that_is_allowed() {
+    let deny: toml::Table = toml("deny.toml");
+    let allowed = words(&deny["licenses"]["allow"]);
+    let exceptions = deny["licenses"]["exceptions"].as_array().expect("exceptions");
+    let mut also: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for exception in exceptions {
+        also.insert(exception["crate"].as_str().expect("a crate"), words(&exception["allow"]));
+    }
+    let packages = packages();
+    assert!(packages.len() > 100, "{} crates", packages.len());
+    for Package { name, license, .. } in packages.iter().filter(|package| package.source.is_some()) {
+        let license = license.as_deref().unwrap_or_else(|| panic!("{name} has no licence"));
+        let parsed = Expression::parse_mode(license, ParseMode::LAX);
+        let parsed = parsed.unwrap_or_else(|e| panic!("{name}: {license}: {e}"));
+        let more = also.remove(name.as_str()).unwrap_or_default();
+        let is_allowed = |asked: &LicenseReq| {
+            let asked = asked.to_string();
+            allowed.contains(&asked) || more.contains(&asked)
+        };
+        assert!(parsed.evaluate(is_allowed), "{name}: {license} is none of deny.toml's licences");
+    }
+    assert!(also.is_empty(), "exceptions for crates that are not there: {also:?}");
+}

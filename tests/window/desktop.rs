@@ -1,0 +1,308 @@
+//! A server, a program on it, and what can be seen and done there.
+
+pub use crate::common::files::*;
+pub use crate::common::program::PROGRAM;
+pub use crate::common::wait::*;
+
+use echolume::picture::Picture;
+use std::io::{BufRead, BufReader, Read};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    AtomEnum, ConfigureWindowAux, ConnectionExt, ImageFormat, InputFocus, MapState, Window, WindowClass,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
+
+/// X keysyms of the keys that are pressed here; letters and digits are their own.
+pub const TAB: u32 = 0xff09;
+pub const ESCAPE: u32 = 0xff1b;
+pub const F1: u32 = 0xffbe;
+pub const CONTROL: u32 = 0xffe3;
+pub const ALT: u32 = 0xffe9;
+
+/// A server of its own, so that tests run side by side, with a window manager where shapes of windows matter.
+pub struct Desk {
+    server: Child,
+    manager: Option<Child>,
+    display: String,
+    pub connection: RustConnection,
+    pub root: Window,
+}
+
+impl Desk {
+    pub fn new(managed: bool) -> Desk {
+        let arguments = ["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp", "-noreset"];
+        let mut server = Command::new("Xvfb")
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb is installed (Debian: apt-get install xvfb)");
+        let mut number = String::new();
+        let said = server.stdout.as_mut().expect("piped");
+        BufReader::new(said).read_line(&mut number).expect("the number of the display");
+        let display = format!(":{}", number.trim());
+        let (connection, screen) = RustConnection::connect(Some(&display)).expect("connect to Xvfb");
+        let root = connection.setup().roots[screen].root;
+        let manager = managed.then(|| {
+            let mut openbox = Command::new("openbox");
+            openbox.env("DISPLAY", &display).stdout(Stdio::null()).stderr(Stdio::null());
+            openbox.spawn().expect("openbox is installed (Debian: apt-get install openbox)")
+        });
+        let desk = Desk { server, manager, display, connection, root };
+        if managed {
+            until("the window manager", || desk.is_managed().then_some(()));
+        }
+        desk
+    }
+
+    /// Whether the window manager shows a window that asks for it. openbox says that it is there before it is, and what asks in
+    /// between is never shown.
+    fn is_managed(&self) -> bool {
+        let (connection, setup) = (&self.connection, self.connection.setup());
+        let window = connection.generate_id().expect("a name for a window");
+        let class = WindowClass::INPUT_OUTPUT;
+        let (depth, visual) = (setup.roots[0].root_depth, setup.roots[0].root_visual);
+        let made =
+            connection.create_window(depth, window, self.root, 0, 0, 9, 9, 0, class, visual, &Default::default());
+        made.expect("a window");
+        connection.map_window(window).expect("map");
+        let begun = Instant::now();
+        let mut framed = false;
+        while !framed && begun.elapsed() < Duration::from_secs(1) {
+            std::thread::sleep(Duration::from_millis(20));
+            let tree = connection.query_tree(window).expect("ask").reply().expect("the window is there");
+            let attributes = connection.get_window_attributes(window).expect("ask").reply().expect("it is there");
+            framed = tree.parent != self.root && attributes.map_state == MapState::VIEWABLE;
+        }
+        connection.destroy_window(window).expect("destroy");
+        connection.flush().expect("flush");
+        framed
+    }
+
+    /// `echolume view` with these arguments, its window there.
+    pub fn view(&self, arguments: &[&str]) -> View<'_> {
+        let mut command = Command::new(PROGRAM);
+        command.args(["view", "--validate"]).args(arguments).env("DISPLAY", &self.display);
+        command.env_remove("WAYLAND_DISPLAY").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut program = command.spawn().expect("start the program");
+        let window = until("a window", || {
+            let ended = program.try_wait().expect("look after the program");
+            assert!(ended.is_none(), "{arguments:?}: it ended without a window: {}", rest(&mut program));
+            self.window(self.root)
+        });
+        // Without a window manager nobody gives it the keys.
+        self.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).expect("focus");
+        let view = View { desk: self, program: Some(program), window };
+        view.hover(20, 20);
+        view
+    }
+
+    /// The first that can be seen and is called Echolume, under any frames.
+    pub fn window(&self, at: Window) -> Option<Window> {
+        let tree = self.connection.query_tree(at).ok()?.reply().ok()?;
+        tree.children.into_iter().find_map(|child| {
+            let name = self.connection.get_property(false, child, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 32);
+            let is_it = name.ok()?.reply().is_ok_and(|name| name.value == b"Echolume");
+            let seen = self.connection.get_window_attributes(child).ok()?.reply();
+            let seen = seen.is_ok_and(|a| a.map_state == MapState::VIEWABLE);
+            if is_it && seen { Some(child) } else { self.window(child) }
+        })
+    }
+
+    fn fake(&self, kind: u8, detail: u8, at: [i16; 2]) {
+        self.connection.xtest_fake_input(kind, detail, 0, self.root, at[0], at[1], 0).expect("XTEST");
+        self.connection.flush().expect("flush");
+    }
+
+    pub fn press(&self, keysym: u32, down: bool) {
+        let setup = self.connection.setup();
+        let (low, count) = (setup.min_keycode, setup.max_keycode - setup.min_keycode + 1);
+        let map = self.connection.get_keyboard_mapping(low, count).expect("keys").reply().expect("keys");
+        let width = map.keysyms_per_keycode as usize;
+        let at = map.keysyms.chunks(width).position(|syms| syms.first() == Some(&keysym));
+        let code = low + at.unwrap_or_else(|| panic!("no key for {keysym:#x}")) as u8;
+        self.fake(if down { 2 } else { 3 }, code, [0, 0]);
+    }
+
+    pub fn tap(&self, keysym: impl Into<u32>) {
+        let keysym = keysym.into();
+        self.press(keysym, true);
+        self.press(keysym, false);
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        for child in self.manager.iter_mut().chain([&mut self.server]) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// What a program that ended had to say.
+fn rest(program: &mut Child) -> String {
+    let mut said = String::new();
+    for mut pipe in program
+        .stdout
+        .take()
+        .map(|p| Box::new(p) as Box<dyn Read>)
+        .into_iter()
+        .chain(program.stderr.take().map(|p| Box::new(p) as Box<dyn Read>))
+    {
+        let _ = pipe.read_to_string(&mut said);
+    }
+    said
+}
+
+/// A program with its window.
+pub struct View<'a> {
+    pub desk: &'a Desk,
+    program: Option<Child>,
+    pub window: Window,
+}
+
+impl View<'_> {
+    /// Where its upper left corner lies, and its width and height, pixels.
+    pub fn place(&self) -> ([i16; 2], [u16; 2]) {
+        let connection = &self.desk.connection;
+        let size = connection.get_geometry(self.window).expect("ask").reply().expect("the window is there");
+        let at = connection.translate_coordinates(self.window, self.desk.root, 0, 0).expect("ask").reply();
+        let at = at.expect("the window is there");
+        ([at.dst_x, at.dst_y], [size.width, size.height])
+    }
+
+    /// What is seen of it now; none while it has another size than it had, or is not there.
+    pub fn look(&self) -> Option<Picture> {
+        let (_, [w, h]) = self.place();
+        let image = self.desk.connection.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, w, h, !0).ok()?;
+        let bytes = image.reply().ok()?.data;
+        // Blue first, as every server on this byte order has it at 24 bits.
+        let rgba = bytes.chunks_exact(4).flat_map(|p| [p[2], p[1], p[0], 255]).collect();
+        Some(Picture { width: w.into(), height: h.into(), rgba })
+    }
+
+    /// Waits until it shows exactly this.
+    pub fn shows(&self, wanted: &Picture, what: &str) {
+        self.shows_part(wanted, [0, 0], [wanted.width, wanted.height], what);
+    }
+
+    /// Waits until the part of the window that begins `corner` shows exactly what the wanted picture has from `from` on.
+    pub fn shows_part(&self, wanted: &Picture, from: [u32; 2], size: [u32; 2], what: &str) {
+        self.shows_at(wanted, from, from, size, what);
+    }
+
+    pub fn shows_at(&self, wanted: &Picture, corner: [u32; 2], from: [u32; 2], size: [u32; 2], what: &str) {
+        let wanted = crop(wanted, from, size).expect("a part of the wanted picture");
+        let begun = Instant::now();
+        let mut seen = None;
+        while begun.elapsed() < PATIENCE {
+            seen = self.look().and_then(|seen| crop(&seen, corner, size));
+            if seen.as_ref() == Some(&wanted) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let folder = std::env::temp_dir();
+        let save = |picture: &Picture, name: &str| drop(picture.save(&folder.join(format!("window-{name}.png"))));
+        save(&wanted, "expected");
+        seen.iter().for_each(|seen| save(seen, "actual"));
+        panic!("{what}: the window never showed it; see window-expected.png and window-actual.png in {folder:?}");
+    }
+
+    /// The pointer over a pixel of the window.
+    pub fn hover(&self, x: i16, y: i16) {
+        let ([left, top], _) = self.place();
+        self.desk.fake(6, 0, [left + x, top + y]);
+    }
+
+    pub fn button(&self, number: u8, down: bool) {
+        self.desk.fake(if down { 4 } else { 5 }, number, [0, 0]);
+    }
+
+    pub fn click(&self, x: i16, y: i16) {
+        self.hover(x, y);
+        self.button(1, true);
+        self.button(1, false);
+    }
+
+    pub fn drag(&self, from: [i16; 2], to: [i16; 2]) {
+        self.hover(from[0], from[1]);
+        self.button(1, true);
+        for step in 1..=10 {
+            let between = |a: usize| from[a] + (to[a] - from[a]) * step / 10;
+            self.hover(between(0), between(1));
+            std::thread::sleep(Duration::from_millis(15));
+        }
+        self.button(1, false);
+    }
+
+    pub fn resize(&self, width: u32, height: u32) {
+        let shape = ConfigureWindowAux::new().width(width).height(height);
+        self.desk.connection.configure_window(self.window, &shape).expect("resize");
+        self.desk.connection.flush().expect("flush");
+    }
+
+    pub fn is_running(&mut self) -> bool {
+        self.program.as_mut().is_some_and(|program| program.try_wait().expect("look").is_none())
+    }
+
+    /// Waits for its end: what it said, which it must have ended well with.
+    pub fn ended(mut self) -> String {
+        let mut program = self.program.take().expect("it ends once");
+        let code = until("the end", || program.try_wait().expect("look after the program"));
+        let said = rest(&mut program);
+        assert!(code.success(), "{code}: {said}");
+        said
+    }
+
+    /// Leaves by its key.
+    pub fn leave(self) -> String {
+        self.desk.tap('q');
+        self.ended()
+    }
+}
+
+impl Drop for View<'_> {
+    fn drop(&mut self) {
+        if let Some(mut program) = self.program.take() {
+            let _ = program.kill();
+            let _ = program.wait();
+            if std::thread::panicking() {
+                eprintln!("{}", rest(&mut program));
+            }
+        }
+    }
+}
+
+/// A part of a picture; none beyond its edges.
+pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture> {
+    if from[0] + size[0] > picture.width || from[1] + size[1] > picture.height {
+        return None;
+    }
+    let row = |y: u32| {
+        let start = 4 * ((from[1] + y) * picture.width + from[0]) as usize;
+        &picture.rgba[start..start + 4 * size[0] as usize]
+    };
+    let rgba = (0..size[1]).flat_map(row).copied().collect();
+    Some(Picture { width: size[0], height: size[1], rgba })
+}
+
+/// What `echolume render` makes of a recording.
+pub fn headless(size: [u32; 2], more: &[&str]) -> Picture {
+    let folder = Folder::new(&format!("headless-{}x{}-{}", size[0], size[1], more.concat().replace('/', "")));
+    let file = folder.path("picture.png");
+    let size = format!("{}x{}", size[0], size[1]);
+    let output = Command::new(PROGRAM)
+        .args(["render", SWEEP, "-o", &file, "--size", &size])
+        .args(more)
+        .output()
+        .expect("start the program");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Picture::load(&PathBuf::from(file)).expect("the picture")
+}
