@@ -46,7 +46,7 @@ pub struct Render {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Compile the shaders from this folder instead of using the built-in ones
+    /// Compile the shaders from this folder instead of using the built-in ones (needs glslc or glslangValidator)
     #[arg(long, value_name = "DIR")]
     glsl: Option<PathBuf>,
 }

@@ -6,6 +6,7 @@ use super::report_error::{nanoseconds, read};
 use super::shown::{Place, Wanted};
 use super::turns::Turns;
 use super::{Failure, failed, input, say};
+use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
@@ -89,6 +90,10 @@ pub struct View {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
+    /// Compile the shaders from this folder instead of using the built-in ones, and again whenever a file there changes; what does not
+    /// compile is reported over the picture (needs glslc or glslangValidator)
+    #[arg(long, value_name = "DIR")]
+    glsl: Option<PathBuf>,
 }
 
 impl View {
@@ -127,6 +132,7 @@ impl View {
             // Before a window opens: what cannot be opened now is told where it was typed.
             false => Some(self.wanted()?.opened()?),
         };
+        let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
         let view = Arc::new(self);
         let make = move |context: &Arc<Context>, size: [u32; 2], factor: f32, wake: Wake| {
             let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
@@ -141,7 +147,7 @@ impl View {
                 }
             };
             let (open, options) = wanted.options(factor, wake, amiss);
-            Console::new(context, open, options, size)
+            Console::new(context, open, Options { shaders: shaders.clone(), ..options }, size)
         };
         let ran = place.run(Box::new(make)).map_err(|e| match e {
             GpuError::NoSuchDevice { .. } => input(e),

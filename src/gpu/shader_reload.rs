@@ -34,6 +34,8 @@ struct State {
     faults: BTreeMap<String, String>,
     /// Why the folder cannot be read.
     unreadable: Option<String>,
+    /// Why no pipelines can be made of what compiles.
+    refused: Option<String>,
 }
 
 impl ShaderFolder {
@@ -100,12 +102,21 @@ impl ShaderFolder {
     /// Why the sources as they are now are not what is shown: the first fault, several lines; none where all is well.
     pub fn fault(&self) -> Option<String> {
         let state = self.state();
-        state.unreadable.iter().chain(state.faults.values()).next().cloned()
+        state.unreadable.iter().chain(state.faults.values()).chain(&state.refused).next().cloned()
     }
 
-    /// The shaders that were compiled anew since the last call: pipelines of them are out of date.
-    pub fn take_changed(&self) -> HashSet<String> {
-        std::mem::take(&mut self.state().changed)
+    /// The shaders that were compiled anew since the last call, if any: pipelines of them are out of date.
+    pub fn take_changed(&self) -> Option<HashSet<String>> {
+        let changed = &mut self.state().changed;
+        (!changed.is_empty()).then(|| std::mem::take(changed))
+    }
+
+    /// Why no pipelines can be made of what compiles.
+    pub fn set_refused(&self, fault: Option<String>) {
+        if let Some(fault) = &fault {
+            tracing::warn!("{fault}");
+        }
+        self.state().refused = fault;
     }
 
     /// Reads the folder again and compiles what is different: first what is in use, then the rest, so that its faults are known.

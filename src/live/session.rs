@@ -6,6 +6,7 @@ use super::views::Views;
 use super::volume_pool::VolumePool;
 use crate::gpu::{GpuError, Renderer};
 use crate::plan::Rerun;
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 /// What follows from a geometry.
@@ -90,6 +91,18 @@ impl Session {
         if let Some(next) = self.next.take() {
             self.views = next;
         }
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    /// Makes pipelines anew of shaders that are other ones now, and draws with them.
+    pub fn renew_shaders(&mut self, shaders: &HashSet<String>) -> Result<(), GpuError> {
+        let rerun = self.renderer.renew_shaders(shaders)?;
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    fn run_again(&mut self, rerun: &Rerun) {
         self.redraw = self.volume.is_some();
         if !matches!(rerun, Rerun::Steps { .. }) {
             (self.lost, self.anew) = (self.seen(), true);
@@ -99,7 +112,6 @@ impl Session {
                 (self.volume, self.redraw) = (None, false);
             }
         }
-        Ok(())
     }
 
     /// The volume that is shown, or will be next.

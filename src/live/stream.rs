@@ -7,6 +7,8 @@ use super::session::Session;
 use super::statistics::Statistics;
 use super::views::Views;
 use super::volume_pool::{Update, VolumePool};
+use crate::gpu::pipelines::embedded;
+use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
 use crate::picture::Picture;
 use crate::scene::{SceneError, Settings};
@@ -29,11 +31,21 @@ pub struct Options {
     pub cine: Room,
     /// Called when there is something to look at: a source said something, something was made beside the drawing.
     pub wake: Option<Wake>,
+    /// Shaders to use instead of the embedded ones; what changes there is drawn with from then on.
+    pub shaders: Option<Arc<ShaderFolder>>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { update: Update::Whole, images: 3, queues: None, readback: true, cine: Room::default(), wake: None }
+        Options {
+            update: Update::Whole,
+            images: 3,
+            queues: None,
+            readback: true,
+            cine: Room::default(),
+            wake: None,
+            shaders: None,
+        }
     }
 }
 
@@ -159,6 +171,16 @@ impl Stream {
                 now.behind = 0;
                 return Ok(Step::Went);
             } else {
+                if let Some(folder) = &self.options.shaders
+                    && let Some(changed) = folder.take_changed()
+                {
+                    match now.renew_shaders(&changed) {
+                        Ok(()) => folder.set_refused(None),
+                        Err(error) if error.is_device_lost() => return Err(error.into()),
+                        // What was drawn before stays.
+                        Err(error) => folder.set_refused(Some(error.to_string())),
+                    }
+                }
                 let begun = now.begin()?;
                 // What was sent of a volume went through stage 1 as it was before.
                 if std::mem::take(&mut now.anew)
@@ -264,6 +286,7 @@ impl Stream {
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
+            shaders: self.options.shaders.as_ref().map_or_else(embedded, ShaderFolder::shaders_or_embedded),
             ..gpu::Options::default()
         };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;

@@ -69,6 +69,24 @@ impl Renderer {
         self.timelines.of(0).wait(self.presented)
     }
 
+    /// Makes pipelines anew of shaders that are other ones now, by name. Says what has to run again, as [`Renderer::change`].
+    ///
+    /// # Errors
+    /// A shader that is not there, or that disagrees with its pass's declaration: the pipelines before stay.
+    pub fn renew_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
+        if let Some(fault) = &self.broken {
+            return Err(GpuError::Broken(fault.clone()));
+        }
+        // It may be making some of the old ones.
+        self.beside = None;
+        self.wait_presented()?;
+        self.collect()?;
+        self.steps = self.pipelines.renew(shaders, &self.plan, &self.scene)?;
+        let rerun = self.plan.rerun_shaders(&self.scene, |shader| shaders.contains(shader));
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
     fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
         let refilled = match rerun {
             Rerun::Steps { steps, slots } => {

@@ -26,6 +26,7 @@ use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::queues::{Queues, Work as Task};
 use crate::scene::{Scene, VisibleBounds};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 #[derive(Clone)]

@@ -13,6 +13,8 @@ const PATIENCE: Duration = Duration::from_millis(400);
 const NOWHERE: Duration = Duration::from_millis(100);
 /// The help is shown in windows that are higher, points.
 const HELP: f32 = 200.0;
+/// Of a compiler's message, at most.
+const SHADER_LINES: usize = 12;
 
 impl Console {
     pub(super) fn show(&mut self, now: Instant) -> Result<(), ConsoleError> {
@@ -123,6 +125,11 @@ impl Console {
         let banner = |title: &str, text: &str, is_fault| Banner { title: title.into(), text: text.into(), is_fault };
         if let Some((amiss, _)) = &self.amiss {
             return Some(banner(&amiss.title, &amiss.why, true));
+        }
+        if let Some(fault) = &self.shader_fault {
+            // A compiler may complain of every line.
+            let text: String = fault.lines().take(SHADER_LINES).map(|line| format!("{line}\n")).collect();
+            return Some(banner("A shader has a fault: the last good one is shown", text.trim_end(), true));
         }
         let silent = now.saturating_duration_since(self.heard) >= SILENCE && !self.stream.is_frozen();
         match self.supply.condition() {

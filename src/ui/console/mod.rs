@@ -17,6 +17,7 @@ use super::picture::Picture;
 use super::quality_ladder::Rung;
 use super::source_supervisor::{Open, SourceSupervisor};
 use super::times::Times;
+use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
@@ -63,6 +64,8 @@ pub struct Options {
     pub wake: Wake,
     /// Nothing of this can be right: only why is shown.
     pub amiss: Option<Amiss>,
+    /// Shaders to use instead of the embedded ones; the folder is watched, and what changes there is shown.
+    pub shaders: Option<Arc<ShaderFolder>>,
 }
 
 impl Options {
@@ -86,6 +89,7 @@ impl Options {
             is_kiosk: false,
             wake: Arc::new(|| ()),
             amiss: None,
+            shaders: None,
         }
     }
 }
@@ -170,6 +174,11 @@ pub struct Console {
     nowhere: Option<Instant>,
     amiss: Option<(Amiss, Instant)>,
     next: Next,
+    shaders: Option<Arc<ShaderFolder>>,
+    /// Why what is shown is not drawn with the shaders as they are written now.
+    shader_fault: Option<String>,
+    /// Keeps `shaders` up to date.
+    _watch: Option<Watch>,
 }
 
 /// What stays as it was given.
@@ -193,9 +202,15 @@ impl Console {
             readback: false,
             cine: options.cine,
             wake: Some(options.wake.clone()),
+            shaders: options.shaders.clone(),
+        };
+        let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone()));
+        let (watch, unwatched) = match watch.transpose() {
+            Ok(watch) => (watch, None),
+            Err(fault) => (None, Some(fault)),
         };
         let shares: Vec<f64> = options.rungs.iter().map(|rung| rung.share).collect();
-        Console {
+        let mut console = Console {
             screen: None,
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), streamed),
             context: context.clone(),
@@ -233,7 +248,14 @@ impl Console {
             nowhere: None,
             amiss: options.amiss.map(|amiss| (amiss, now + LOOK)),
             next: Next::default(),
+            shaders: options.shaders,
+            shader_fault: None,
+            _watch: watch,
+        };
+        if let Some(fault) = unwatched {
+            console.say(&fault, true);
         }
+        console
     }
 
     /// What to show things on.

@@ -38,6 +38,9 @@ impl Console {
         self.play(now);
         self.adjust(now);
         self.run(now)?;
+        let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
+        self.stale |= shader_fault != self.shader_fault;
+        self.shader_fault = shader_fault;
         self.count(now);
         let before = self.notes.len();
         self.notes.retain(|(until, _)| *until > now);
