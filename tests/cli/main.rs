@@ -9,6 +9,7 @@ mod frames;
 mod inputs;
 mod outputs;
 mod service;
+mod shaders;
 mod signals;
 mod stream;
 mod support_bundle;

@@ -384,6 +384,11 @@ impl Console {
         &self.times
     }
 
+    /// Why what is shown is not drawn with the shaders as they are written now.
+    pub fn shader_fault(&self) -> Option<&str> {
+        self.shader_fault.as_deref()
+    }
+
     pub fn screen(&self) -> Option<&Screen> {
         self.screen.as_ref()
     }

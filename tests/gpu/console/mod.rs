@@ -4,6 +4,7 @@ mod failures;
 mod gestures;
 mod idle;
 mod monkey;
+mod shaders;
 
 use crate::common::gpu::*;
 use crate::live::header;
@@ -52,6 +53,7 @@ pub fn options() -> Options {
         is_kiosk: false,
         wake: Arc::new(|| ()),
         amiss: None,
+        shaders: None,
     }
 }
 
