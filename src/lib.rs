@@ -20,6 +20,8 @@
 #![deny(unsafe_code)]
 
 #[forbid(unsafe_code)]
+mod args;
+#[forbid(unsafe_code)]
 pub mod barriers;
 #[forbid(unsafe_code)]
 pub mod cli;
@@ -62,6 +64,8 @@ pub mod shader_tools;
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;
+#[forbid(unsafe_code)]
+mod terminal;
 #[forbid(unsafe_code)]
 pub mod thesis_tables;
 #[cfg(feature = "view")]

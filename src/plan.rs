@@ -129,7 +129,7 @@ impl Plan {
             let slots = slots.chain(chain::copied(scene));
             slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
         };
-        let moved = !old.geometry.is_but_for_advance(&new.geometry);
+        let moved = !old.geometry.equals_except_advance(&new.geometry);
         if stored(&before, old) != stored(self, new) || moved || old.input != new.input {
             return Rerun::Everything;
         }
@@ -272,7 +272,7 @@ fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
         // Follows from the other, which is shorter.
         Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
         Slot::BrickTable => {
-            return !old.geometry.is_but_for_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
+            return !old.geometry.equals_except_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
         }
         Slot::SliceTable => return old.geometry != new.geometry,
         _ => {}
@@ -281,8 +281,8 @@ fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
     // the sweep's span and nothing else.
     let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
     let stays = match slot {
-        Slot::SweepLut => old.geometry.is_but_for_direction(&new.geometry),
-        _ => old.geometry.is_but_for_advance(&new.geometry),
+        Slot::SweepLut => old.geometry.equals_except_direction(&new.geometry),
+        _ => old.geometry.equals_except_advance(&new.geometry),
     };
     !stays || lattice(old) != lattice(new)
 }

@@ -5,7 +5,7 @@ use echolume::probe::Geometry;
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene};
 use echolume::source::StoredType;
-use echolume::source::phantom::{Options, Phantom};
+use echolume::source::phantom::{Phantom, PhantomOptions};
 use std::time::Duration;
 
 /// Bytes of the phantom.
@@ -42,7 +42,7 @@ pub fn criterion() -> Criterion {
 
 /// A sweep of the phantom's head.
 pub fn phantom(frames: usize, lines: usize, samples: usize) -> Result<Phantom, String> {
-    Phantom::new(Options { frames, lines, samples, ..Options::default() }).map_err(|e| e.to_string())
+    Phantom::new(PhantomOptions { frames, lines, samples, ..PhantomOptions::default() }).map_err(|e| e.to_string())
 }
 
 /// A scene of the phantom's preset, as `echolume render` draws it, and what is set beyond it.

@@ -1,17 +1,17 @@
 //! The phantom: what a live view without a probe waits for.
 
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::source::phantom::{Body, Options, Phantom};
+use echolume::source::phantom::{Body, Phantom, PhantomOptions};
 
 pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
     let mut group = criterion.benchmark_group("phantom");
     // Of the slowest a sample is one run.
     group.sampling_mode(SamplingMode::Flat);
     for (name, options) in [
-        ("head, two frames", Options { frames: 2, ..Options::default() }),
-        ("head, a volume of 37 frames", Options::default()),
-        ("head without speckle", Options { speckle: false, ..Options::default() }),
-        ("wires", Options { body: Body::Wires, ..Options::default() }),
+        ("head, two frames", PhantomOptions { frames: 2, ..PhantomOptions::default() }),
+        ("head, a volume of 37 frames", PhantomOptions::default()),
+        ("head without speckle", PhantomOptions { speckle: false, ..PhantomOptions::default() }),
+        ("wires", PhantomOptions { body: Body::Wires, ..PhantomOptions::default() }),
     ] {
         let samples = options.frames * options.lines * options.samples;
         let phantom = Phantom::new(options).map_err(|e| e.to_string())?;

@@ -1,38 +1,38 @@
 //! `echolume convert`.
 
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{Output, check_outputs};
 use crate::files::signals::Writing;
 use crate::probe::Geometry;
 use crate::source::convert::{Volume, VolumeFile, lattice};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::PathBuf;
 
-/// What messages call it.
+/// The name of the output in messages.
 const OUTPUT: &str = "output";
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echolume convert sweep.mha volume.nrrd --spacing 0.5\n  \
                         echolume convert sweep.mha sweep.frames    (checksummed, appended frame by frame; a file that is there is not replaced)\n  \
                         echolume convert sweep.frames sweep.mha --sequence    (frames of whole volumes, for other programs)\n  \
-                        echolume render volume.mha --mode mip -o mip.png    (what was written is read like any recording)")]
+                        echolume render volume.mha --mode mip -o mip.png    (the result is a recording, too)")]
 pub struct Convert {
     /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
     input: PathBuf,
-    /// The volume to write (.mha, .nrrd), or .frames for every frame as it is, or with --sequence .mha
+    /// File to write: .mha or .nrrd for a volume, .frames for every frame unchanged, .mha with --sequence
     output: PathBuf,
-    /// Distance between voxels along every axis, mm [default: between samples of a line]
+    /// Voxel spacing along every axis, mm [default: the sample spacing of a scan line]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     spacing: Option<f64>,
-    /// Which volume of the recording, from 0
+    /// Volume of the recording to use, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     volume: usize,
-    /// Geometry of the probe (TOML); otherwise NAME.probe.toml or probe.toml beside the recording
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Write the frames of all whole volumes as a PLUS sequence, their geometry into NAME.probe.toml beside it
+    /// Write the frames of all complete volumes as a PLUS sequence, and their geometry to NAME.probe.toml next to it
     #[arg(long, conflicts_with_all = ["spacing", "volume"])]
     sequence: bool,
 }
@@ -58,12 +58,12 @@ impl Convert {
             Geometry::Cartesian(grid) => grid.spacing.into_iter().fold(f64::INFINITY, f64::min),
         };
         let grid = lattice(&geometry, self.spacing.unwrap_or(usual)).map_err(|e| input(format!("--spacing {e}")))?;
-        self.check_targets(&[(OUTPUT, Some(&self.output))], &*recording)?;
+        self.check_outputs(&[(OUTPUT, Some(&self.output))], &*recording)?;
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
         let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
         while there < each {
-            // In a file of frames some may be missing, and the next is another volume's.
+            // A .frames file may lack frames: the next one can belong to another volume.
             let next = recording.next_frame().map_err(input)?;
             let Some(frame) = next.filter(|frame| *number.get_or_insert(frame.volume) == frame.volume) else { break };
             volume.take(frame);
@@ -78,19 +78,19 @@ impl Convert {
         Ok(())
     }
 
-    fn check_targets(&self, targets: &[Target], recording: &dyn Source) -> Result<(), Failure> {
+    fn check_outputs(&self, targets: &[Output], recording: &dyn Source) -> Result<(), Failure> {
         let read = recording.files();
-        targets::check(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
+        check_outputs(targets, read.iter().chain(&self.probe).map(PathBuf::as_path))
     }
 
-    /// The frames of all whole volumes.
+    /// Writes the frames of all complete volumes as a PLUS sequence.
     fn sequence(&self) -> Result<(), Failure> {
         if VolumeFile::of(&self.output).map_err(input)? != VolumeFile::MetaImage {
             return Err(input(format!("{}: a sequence must end in .mha", self.output.display())));
         }
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
-        let beside = sequence::beside(&self.output);
-        self.check_targets(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
+        let beside = sequence::probe_file_path(&self.output);
+        self.check_outputs(&[(OUTPUT, Some(&self.output)), (OUTPUT, Some(&beside))], &*recording)?;
         let sequence = Sequence::of(&mut *recording, &self.input).map_err(input)?;
         let (frames, volumes) = (sequence.frames(), sequence.volumes());
         let bar = indicatif::ProgressBar::new(volumes as u64).with_message("volumes");
@@ -104,10 +104,10 @@ impl Convert {
         Ok(())
     }
 
-    /// Every frame of every volume, as they are.
+    /// Writes every frame of every volume unchanged, as .frames.
     fn record(&self) -> Result<(), Failure> {
         if self.spacing.is_some() || self.volume != 0 || self.sequence {
-            return Err(input("--spacing, --volume and --sequence are of .mha; .frames takes every frame as it is"));
+            return Err(input("--spacing, --volume and --sequence apply to .mha; .frames holds every frame unchanged"));
         }
         let mut recording = source::open(&self.input, self.probe.as_deref()).map_err(input)?;
         let first = recording.geometry(0);
@@ -116,7 +116,7 @@ impl Convert {
         let is_backward = frame.as_ref().is_some_and(|frame| frame.backward);
         let (forward, backward) = if is_backward { (second, first) } else { (first, second) };
         let header = Header { forward, backward, stored: recording.stored_type(), range: recording.range() };
-        // The file is gone again before a signal does its work.
+        // A signal ends the process only after the incomplete file is deleted.
         let signals = Writing::begin();
         let mut writer = Writer::create(&self.output, header).map_err(failed)?;
         let bar = indicatif::ProgressBar::new((recording.volumes() * recording.frames_per_volume()) as u64);

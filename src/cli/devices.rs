@@ -1,11 +1,11 @@
 //! `echolume devices`.
 
-use super::{Failure, failed, say};
 use crate::gpu::{Choice, context, select};
+use crate::terminal::{Failure, failed, say};
 
 #[derive(clap::Args)]
 pub struct Devices {
-    /// Say what each is able to, too: queues, and every limit of Vulkan
+    /// Print also the capabilities of each device: queues and every Vulkan limit
     #[arg(long)]
     limits: bool,
 }
@@ -26,18 +26,18 @@ impl Devices {
                 say!("    cannot be used: lacks {}", device.lacks.join(", "));
             }
             for without in &device.without {
-                say!("    does without {without}");
+                say!("    works without {without}");
             }
             match &picked {
                 Ok(n) if *n == i && device.is_software() => {
-                    say!("    picked: nothing else fits. It is software: the same pictures, slowly");
+                    say!("    picked: no other device fits. It is a software device: the same pictures, slowly");
                 }
-                Ok(n) if *n == i => say!("    picked: the best that lacks nothing"),
+                Ok(n) if *n == i => say!("    picked: the best device that lacks nothing"),
                 _ if !device.lacks.is_empty() => {}
                 _ if device.is_software() => {
-                    say!("    not picked: software is the last choice; --device {i} asks for it")
+                    say!("    not picked: a software device is the last choice; --device {i} selects it")
                 }
-                _ => say!("    not picked: another one comes first; --device {i} asks for it"),
+                _ => say!("    not picked: another device is preferred; --device {i} selects it"),
             }
             if self.limits {
                 for queue in &device.queues {

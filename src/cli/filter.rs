@@ -1,6 +1,6 @@
-//! `echolume filter`: the 2D filters of slices on an ordinary picture.
+//! `echolume filter`: applies the 2D slice filters to an ordinary picture.
 
-use super::{Failure, failed, input, say, targets};
+use crate::args::{check_outputs, open_device};
 use crate::gpu::{Choice, Context, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
@@ -8,38 +8,39 @@ use crate::picture::{self, grey::Grey};
 use crate::profile::pass_times;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
+use crate::terminal::{Failure, failed, input, say};
 use crate::thesis_tables::measure_growth::{Row, measure, scene};
 use crate::thesis_tables::window_growth;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A filter of stage 1 under the name that the command line gives it.
-struct Known {
+/// A filter of stage 1 and its name on the command line.
+struct NamedFilter {
     name: &'static str,
     /// The setting that switches it on.
     on: &'static str,
-    /// Keys and the settings that they are; where there are none, keys are those of the table that `on` names.
+    /// Keys of the command line and their settings. If empty, the keys are those of the table that `on` names.
     keys: &'static [(&'static str, &'static str)],
 }
 
-/// In the order in which they run.
-const FILTERS: &[Known] = &[
-    Known { name: "median", on: "slices.median=true", keys: &[] },
-    Known {
+/// The filters in the order in which they run.
+const FILTERS: &[NamedFilter] = &[
+    NamedFilter { name: "median", on: "slices.median=true", keys: &[] },
+    NamedFilter {
         name: "estimator",
         on: "slices.estimator=median",
         keys: &[("kind", "slices.estimator"), ("edge", "slices.estimator_edge")],
     },
-    Known { name: "sigma", on: "slices.sigma={}", keys: &[] },
-    Known { name: ENHANCED, on: "slices.enhanced_sigma={}", keys: &[] },
-    Known { name: "perona-malik", on: "slices.perona_malik={}", keys: &[] },
-    Known { name: "blur", on: "slices.blur=true", keys: &[] },
-    Known { name: "gaussian", on: "slices.smooth={}", keys: &[] },
+    NamedFilter { name: "sigma", on: "slices.sigma={}", keys: &[] },
+    NamedFilter { name: ENHANCED, on: "slices.enhanced_sigma={}", keys: &[] },
+    NamedFilter { name: "perona-malik", on: "slices.perona_malik={}", keys: &[] },
+    NamedFilter { name: "blur", on: "slices.blur=true", keys: &[] },
+    NamedFilter { name: "gaussian", on: "slices.smooth={}", keys: &[] },
 ];
 const ENHANCED: &str = "enhanced-sigma";
 
-impl Known {
-    /// The setting of a key, or what this filter has instead.
+impl NamedFilter {
+    /// The setting of a key, or an error that lists this filter's keys.
     fn setting(&self, key: &str) -> Result<String, String> {
         let (table, value) = self.on.split_once('=').unwrap_or((self.on, ""));
         match self.keys.iter().find(|(name, _)| *name == key) {
@@ -48,7 +49,7 @@ impl Known {
             None if self.keys.is_empty() => Err(format!("{} has no settings", self.name)),
             None => {
                 let there = self.keys.iter().map(|k| k.0).collect::<Vec<_>>().join(", ");
-                Err(format!("{} has no {key:?}; there are: {there}", self.name))
+                Err(format!("{} has no key {key:?}; its keys are: {there}", self.name))
             }
         }
     }
@@ -67,25 +68,25 @@ impl Known {
                         echolume filter scan.png --growth-table --filter enhanced-sigma:sigma=0.1 --csv growth.csv"
 )]
 pub struct Filter {
-    /// PNG, JPEG, PNM or BMP of 8 or 16 bits; colour becomes grey
+    /// PNG, JPEG, PNM or BMP of 8 or 16 bits. Colour is converted to grey
     image: PathBuf,
-    /// The picture to write (PNG, grey, 16 bits where the input has 16)
+    /// The picture to write (PNG, grey; 16 bits if the input has 16)
     #[arg(short, long, value_name = "FILE", required_unless_present = "growth_table")]
     output: Option<PathBuf>,
-    /// A filter and its settings; may be given again for another kind
+    /// A filter and its settings; may be repeated for other filters
     #[arg(long, value_name = "NAME[:KEY=VALUE,...]", required_unless_present = "growth_table")]
     filter: Vec<String>,
     /// Print mean, standard deviation and signal-to-noise ratio of this rectangle before and after, pixels
     #[arg(long, value_name = "X,Y,W,H")]
     region: Option<String>,
-    /// ... and its contrast-to-noise ratio against this one
+    /// Print also its contrast-to-noise ratio against this rectangle, pixels
     #[arg(long, value_name = "X,Y,W,H", requires = "region")]
     background: Option<String>,
-    /// Print how far the windows of the enhanced sigma filter grow (thesis Tables 7-9): for windows from 3 to 13 pixels and
-    /// sigmas of 0.03, 0.1 and 0.17, or the ones given with --filter enhanced-sigma
+    /// Print how far the windows of the enhanced sigma filter grow (thesis Tables 7-9), for windows of 3 to 13 pixels and
+    /// sigmas of 0.03, 0.1 and 0.17, or for those given with --filter enhanced-sigma
     #[arg(long)]
     growth_table: bool,
-    /// Write that table to this file, too
+    /// Write that table also to this file (CSV)
     #[arg(long, value_name = "FILE", requires = "growth_table")]
     csv: Option<PathBuf>,
     /// Vulkan device, by number or part of its name (see `echolume devices`)
@@ -107,11 +108,11 @@ impl Filter {
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
         let scene = scene(&grey, settings).map_err(input)?;
-        targets::check(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
+        check_outputs(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
 
-        let context = super::look::open_device(self.device.clone(), self.validate)?;
+        let context = open_device(self.device.clone(), self.validate)?;
         let bits = if grey.sixteen { 16 } else { 8 };
-        let colour = if grey.from_colour { ", colour became grey by the weights of Rec. 709" } else { "" };
+        let colour = if grey.from_colour { ", converted from colour with the weights of Rec. 709" } else { "" };
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
 
         if let Some(output) = &self.output {
@@ -138,10 +139,10 @@ impl Filter {
         }
     }
 
-    /// The filters as given, and `more` settings over them.
+    /// The settings of the given filters, with the assignments `more` on top.
     fn settings(&self, more: &[String]) -> Result<Settings, Failure> {
         let mut layers = Layers::default();
-        // Nothing is rendered: the picture is the slice, a plane.
+        // Nothing is rendered: the output is the filtered slice.
         for set in ["mode=plane", "picture.size=[1,1]", "slices.format=r32f"] {
             layers.set(set).map_err(input)?;
         }
@@ -151,10 +152,10 @@ impl Filter {
             let (name, keys) = text.split_once(':').unwrap_or((text, ""));
             let Some(known) = FILTERS.iter().find(|f| f.name == name) else {
                 let names = FILTERS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ");
-                return Err(input(format!("{flag}: no filter is called {name:?}; there are: {names}")));
+                return Err(input(format!("{flag}: there is no filter {name:?}; the filters are: {names}")));
             };
             if seen.contains(&name) {
-                return Err(input(format!("{flag}: {name} is given twice; give its keys in one --filter")));
+                return Err(input(format!("{flag}: {name} is given twice; put all of its keys into one --filter")));
             }
             seen.push(name);
             layers.set_by(&flag, known.on).map_err(input)?;
@@ -172,12 +173,14 @@ impl Filter {
         let settings = layers.finish().map_err(input)?;
         match settings.slices.smooth {
             Some(smooth) if smooth.elevation > 0.0 || smooth.kernel.is_some() => Err(input(
-                "--filter gaussian: elevation and kernel reach across slices, and a picture is one; give lateral and depth",
+                "--filter gaussian: elevation and kernel need several slices, and a picture is one; give lateral and depth",
             )),
             Some(smooth) if smooth.lateral == 0.0 && smooth.depth == 0.0 => {
                 Err(input("--filter gaussian: give lateral, depth or both, standard deviations in pixels"))
             }
-            Some(_) if settings.slices.blur => Err(input("--filter blur: a gaussian blurs already; leave one out")),
+            Some(_) if settings.slices.blur => {
+                Err(input("--filter blur: cannot be combined with gaussian, which blurs already"))
+            }
             _ => Ok(settings),
         }
     }
@@ -189,7 +192,7 @@ impl Filter {
         Ok(Some(region))
     }
 
-    /// The rows of the growth table: the thesis', unless the filter was given its own.
+    /// The rows of the growth table: those of the filter if it has values of its own, else the thesis'.
     fn growth_rows(&self) -> Result<Vec<Row>, Failure> {
         let keys = self.filter.iter().filter_map(|f| f.split_once(':')).filter(|f| f.0 == ENHANCED);
         let keys: Vec<&str> = keys.flat_map(|f| f.1.split(',')).filter_map(|k| k.split('=').next()).collect();
@@ -197,9 +200,7 @@ impl Filter {
         let asked = self.settings(&[])?.slices.enhanced_sigma.unwrap_or_default();
         let sigmas = if given("sigma") { vec![asked.sigma] } else { window_growth::SIGMAS.to_vec() };
         if asked.sigma <= 0.0 {
-            return Err(input(
-                "--growth-table: with a sigma of 0 no pixel is like another and the filter does nothing",
-            ));
+            return Err(input("--growth-table: sigma must be above 0; at 0 the filter changes nothing"));
         }
         let is_one = given("window") || given("largest");
         let windows = if is_one { vec![[asked.window, asked.largest]] } else { window_growth::WINDOWS.to_vec() };

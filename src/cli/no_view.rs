@@ -1,6 +1,6 @@
 //! `echolume view` in a build without the feature `view`: says how to have it.
 
-use super::{Failure, input};
+use crate::terminal::{Failure, input};
 use std::ffi::OsString;
 use std::path::PathBuf;
 

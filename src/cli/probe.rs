@@ -1,10 +1,10 @@
-//! `echolume probe`: the motor.
+//! `echolume probe`: drives the motor of a probe.
 
-use super::serial::{Serial, fault, table};
-use super::{Failure, failed, input, say, targets};
+use crate::args::{SerialArgs, check_outputs, motor_failure, motor_table};
 use crate::files::replace;
 use crate::files::signals::Held;
-use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, Position, Settings, Sweep, port};
+use crate::probe::motor::{Drive, Fault, MotorError, MotorTable, PortSettings, Position, Sweep, port};
+use crate::terminal::{Failure, failed, input, say};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime};
@@ -26,53 +26,53 @@ pub struct Probe {
 enum Action {
     /// List the serial ports
     Ports,
-    /// Say which module is there, where the motor is, and its switches; nothing moves
+    /// Print the module, the motor's position and its switches; nothing moves
     #[command(after_help = KILLED)]
     Status(Line),
-    /// Find home, from where angles count
+    /// Find the home position, the origin of angles
     #[command(after_help = KILLED)]
     Home(Line),
-    /// Find home, then go back and forth over an angle
+    /// Find the home position, then sweep back and forth over an angle
     #[command(after_help = KILLED)]
     Sweep(SweepArguments),
     /// Stop the motor
     #[command(after_help = KILLED)]
     Stop(Line),
-    /// Simulate a module on a pseudo-terminal, whose path is printed; until SIGINT
+    /// Simulate a module on a pseudo-terminal until SIGINT; prints its path
     #[cfg(target_os = "linux")]
     Simulate(Simulate),
 }
 
-/// How to reach the module, and what hangs on it.
+/// The serial port of the module, and the motor behind it.
 #[derive(Args)]
 struct Line {
-    /// The serial port: /dev/ttyUSB0; `echolume probe ports` lists them
+    /// Serial port, such as /dev/ttyUSB0; `echolume probe ports` lists all
     #[arg(long, value_name = "PORT")]
     port: String,
-    /// The probe file, whose [motor] table says what hangs on the module; home and sweep need it
+    /// Probe file whose [motor] table describes the motor; home and sweep need it
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     #[command(flatten)]
-    serial: Serial,
+    serial: SerialArgs,
 }
 
 #[derive(Args)]
 struct SweepArguments {
     #[command(flatten)]
     line: Line,
-    /// From end to end, degrees
+    /// Sweep from end to end, degrees
     #[arg(long, value_name = "DEG")]
     angle: f64,
-    /// Passes over the angle, and so volumes, a second
+    /// Sweeps, and so volumes, per second
     #[arg(long, value_name = "RATE")]
     rate: f64,
-    /// Passes [default: until SIGINT]
+    /// Number of sweeps [default: until SIGINT]
     #[arg(long, value_name = "N")]
     volumes: Option<usize>,
-    /// Write when the array was where: time in s since the sweep was begun, angle in degrees, direction
+    /// Write the array's positions: time in s since the sweep began, angle in degrees, direction
     #[arg(long, value_name = "FILE.csv")]
     positions: Option<PathBuf>,
-    /// Home was found before and the module has not been off since: do not look for it
+    /// Skip homing: the home position is known and the module has stayed on since
     #[arg(long)]
     homed: bool,
 }
@@ -80,14 +80,14 @@ struct SweepArguments {
 #[cfg(target_os = "linux")]
 #[derive(Args)]
 struct Simulate {
-    /// The probe file, whose [motor] table the simulated module is to fit [default: a motor of 200 steps, geared 12 to 1]
+    /// Probe file whose [motor] table describes the simulated module [default: a motor of 200 steps, geared 12 to 1]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// What goes wrong: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS so long after
-    /// the sweep's begin
+    /// Fault to inject: mute, checksum, limit-switch, stall, unplugged, wrong-module, noise, slow; with @SECONDS that long after
+    /// the sweep began
     #[arg(long, value_name = "NAME[@SECONDS]")]
-    fault: Option<crate::probe::motor::simulate::Injected>,
-    /// A module without a watchdog
+    fault: Option<crate::probe::motor::simulate::SimulatedFault>,
+    /// Simulate a module without a watchdog
     #[arg(long)]
     no_watchdog: bool,
 }
@@ -107,17 +107,17 @@ impl Probe {
 }
 
 impl Line {
-    fn settings(&self) -> Settings {
+    fn settings(&self) -> PortSettings {
         self.serial.settings(&self.port)
     }
 
-    /// The table of the probe file, or where nothing is moved any module's at the usual address.
+    /// The table of the probe file. Commands that move nothing accept any module at the default address.
     fn any_table(&self) -> Result<MotorTable, Failure> {
-        Ok(table(self.probe.as_ref())?.unwrap_or(MotorTable { module: None, ..MotorTable::default() }))
+        Ok(motor_table(self.probe.as_ref())?.unwrap_or(MotorTable { module: None, ..MotorTable::default() }))
     }
 
     fn table(&self) -> Result<MotorTable, Failure> {
-        table(self.probe.as_ref())?
+        motor_table(self.probe.as_ref())?
             .ok_or_else(|| input("--probe FILE is needed: its [motor] table says how far to turn"))
     }
 }
@@ -135,11 +135,11 @@ fn ports() -> Result<(), Failure> {
 
 fn status(line: &Line) -> Result<(), Failure> {
     let table = line.any_table()?;
-    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
-    let status = drive.status().map_err(fault)?;
+    let mut drive = Drive::open(&line.settings(), &table).map_err(motor_failure)?;
+    let status = drive.status().map_err(motor_failure)?;
     say!("module: {}", status.module);
     if line.probe.is_some() {
-        say!("angle: {:.3} deg, if home was found since it is on", status.angle);
+        say!("angle: {:.3} deg, if home was found since power-on", status.angle);
         say!("speed: {:.3} deg/s", status.speed);
     } else {
         say!("motor: {}; its angle needs --probe", if status.speed == 0.0 { "at rest" } else { "turning" });
@@ -161,14 +161,14 @@ fn status(line: &Line) -> Result<(), Failure> {
 
 fn home(line: &Line) -> Result<(), Failure> {
     let table = line.table()?;
-    let mut drive = Drive::open(&line.settings(), &table).map_err(fault)?;
-    drive.home().map_err(fault)?;
-    say!("home: found; the array is at {:.3} deg", drive.status().map_err(fault)?.angle);
+    let mut drive = Drive::open(&line.settings(), &table).map_err(motor_failure)?;
+    drive.home().map_err(motor_failure)?;
+    say!("home: found; the array is at {:.3} deg", drive.status().map_err(motor_failure)?.angle);
     Ok(())
 }
 
 fn stop(line: &Line) -> Result<(), Failure> {
-    Drive::stop_at(&line.settings(), &line.any_table()?).map_err(fault)?;
+    Drive::stop_at(&line.settings(), &line.any_table()?).map_err(motor_failure)?;
     say!("stopped");
     Ok(())
 }
@@ -177,12 +177,12 @@ impl SweepArguments {
     fn run(&self) -> Result<(), Failure> {
         let (table, settings) = (self.line.table()?, self.line.settings());
         let sweep = Sweep { angle: self.angle, rate: self.rate, volumes: self.volumes };
-        // Before the port is touched.
+        // Check before the port is opened.
         let speed = sweep.speed(&table, settings.round_trip()).map_err(input)?;
-        targets::check(&[("--positions", self.positions.as_deref())], self.line.probe.as_deref())?;
-        let mut drive = Drive::open(&settings, &table).map_err(fault)?;
+        check_outputs(&[("--positions", self.positions.as_deref())], self.line.probe.as_deref())?;
+        let mut drive = Drive::open(&settings, &table).map_err(motor_failure)?;
         if !self.homed {
-            drive.home().map_err(fault)?;
+            drive.home().map_err(motor_failure)?;
         }
         say!("sweep: {} deg at {} volumes/s, {speed:.1} deg/s at most", self.angle, self.rate);
         let (mut positions, mut passes, start) = (Vec::new(), 0, Instant::now());
@@ -195,17 +195,17 @@ impl SweepArguments {
                 positions.push(position);
             }
         });
-        // What was seen until a fault is worth keeping too.
+        // Keep the positions up to a fault, too.
         let kept = self.positions.as_ref().map_or(Ok(()), |file| replace(file, csv(&positions).as_bytes()));
         match swept {
             Ok(volumes) => say!("swept: {volumes} volumes"),
-            // Without a number of volumes this is how it ends.
+            // Without --volumes a signal is the normal end.
             Err(MotorError { fault: Fault::Interrupted(signal), stopped, .. })
                 if self.volumes.is_none() && stopped == crate::probe::motor::Stopped::Confirmed =>
             {
                 say!("swept: {passes} volumes; the motor was stopped by {signal}");
             }
-            Err(error) => return Err(fault(error)),
+            Err(error) => return Err(motor_failure(error)),
         }
         kept.map_err(failed)
     }
@@ -222,14 +222,14 @@ fn csv(positions: &[Position]) -> String {
 #[cfg(target_os = "linux")]
 impl Simulate {
     fn run(&self) -> Result<(), Failure> {
-        use crate::probe::motor::simulate::{Options, Simulator};
+        use crate::probe::motor::simulate::{Simulator, SimulatorOptions};
         let held = Held::take();
-        let options = Options {
-            table: table(self.probe.as_ref())?.unwrap_or_default(),
+        let options = SimulatorOptions {
+            table: motor_table(self.probe.as_ref())?.unwrap_or_default(),
             fault: self.fault,
             no_watchdog: self.no_watchdog,
         };
-        let simulator = Simulator::start(options).map_err(|e| failed(format!("no pseudo-terminal can be had: {e}")))?;
+        let simulator = Simulator::start(options).map_err(|e| failed(format!("cannot open a pseudo-terminal: {e}")))?;
         say!("{}", simulator.path().display());
         while held.signal().is_none() && !simulator.ended() {
             std::thread::sleep(Duration::from_millis(20));

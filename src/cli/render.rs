@@ -1,10 +1,8 @@
 //! `echolume render`.
 
-use super::asked::Asked;
-use super::report_error::{nanoseconds, read};
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
+use crate::error_report::command::{nanoseconds, read};
 use crate::error_report::{Measure, choose};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{GpuError, Options, Renderer};
@@ -12,6 +10,7 @@ use crate::plan::Plan;
 use crate::profile::pass_times;
 use crate::scene::Scene;
 use crate::source::{Frame, Source};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -24,20 +23,20 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Render {
     #[command(flatten)]
-    asked: Asked,
+    input: InputArgs,
     /// The picture to write (PNG)
     #[arg(short, long, value_name = "FILE", default_value = "picture.png")]
     output: PathBuf,
-    /// Print the plan: passes, bytes, and why each is there or not; render nothing
+    /// Print the plan without rendering: passes, bytes, and the reason for each pass
     #[arg(long)]
     explain: bool,
-    /// Write every slot as a picture into this folder
+    /// Write every slot (GPU resource) as a picture into this folder
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
-    /// Take the most accurate settings that a report of errors found to need less time, such as 16ms; flags and --set override
+    /// Use the most accurate settings that take less time, such as 16ms, by an error report; flags and --set override
     #[arg(long, value_name = "TIME", requires = "report")]
     budget: Option<String>,
-    /// The error.json that `echolume report error -o DIR` wrote of this recording on this device
+    /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
     /// Print the time of every pass
@@ -55,26 +54,26 @@ impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let (mut source, scene) = self.open()?;
         if self.explain {
-            let scene = self.asked.suited(scene);
+            let scene = self.input.resolve_sampling(scene);
             let plan = Plan::new(&scene);
             say!("{}", plan.explain(&scene).trim_end());
             return Ok(());
         }
 
-        let target: Target = ("-o", Some(&self.output));
-        self.asked.check_targets(&[target], &*source)?;
-        targets::check(&[target], self.report.as_deref())?;
+        let target: Output = ("-o", Some(&self.output));
+        self.input.check_outputs(&[target], &*source)?;
+        check_outputs(&[target], self.report.as_deref())?;
         if let Some(folder) = &self.dump {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
-        let context = self.asked.device(self.validate)?;
+        let context = self.input.open_device(self.validate)?;
         let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(|e| match e {
             GpuError::Shader { .. } if self.glsl.is_some() => input(e),
             e => failed(e),
         })?;
         let send = |frame: Frame| renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed);
-        self.asked.frames(&mut *source, send)?;
+        self.input.for_each_frame(&mut *source, send)?;
         renderer.show(0).map_err(failed)?;
         let picture = renderer.picture().map_err(failed)?;
         picture.save(&self.output).map_err(failed)?;
@@ -93,17 +92,17 @@ impl Render {
         }
     }
 
-    /// The recording and its scene, within the budget if one is set.
+    /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
-        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.asked.open() };
+        let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open() };
         let time = nanoseconds("--budget", budget)?;
         let report = read(file)?;
-        let (_, scene) = self.asked.open()?;
+        let (_, scene) = self.input.open()?;
         let (there, here) = (report.sizes.volume, scene.volume_size());
         if there != here {
             let shown = |[x, y, z]: [u32; 3]| format!("{x}x{y}x{z}");
             let fault = format!(
-                "--report {}: is of a volume of {}, this one has {}",
+                "--report {}: is for a volume of {}, this one has {}",
                 file.display(),
                 shown(there),
                 shown(here)
@@ -114,7 +113,7 @@ impl Render {
         let choice = choose::most_accurate_under(&report, measure, time, 0.1)
             .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
         say!("budget {budget}: {}, measured on {}", choice.say(measure), report.device);
-        self.asked.open_over(&choice.set)
+        self.input.open_with(&choice.set)
     }
 
     fn options(&self) -> Result<Options, Failure> {

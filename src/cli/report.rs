@@ -1,6 +1,8 @@
 //! `echolume report`: its kinds.
 
-use super::{Failure, report_error, report_tables};
+use crate::error_report;
+use crate::terminal::Failure;
+use crate::thesis_tables;
 use clap::Subcommand;
 
 #[derive(clap::Args)]
@@ -11,10 +13,10 @@ pub struct Report {
 
 #[derive(Subcommand)]
 enum Kind {
-    /// What each saving costs in error: every dial turned, rendered, timed, and held against its best
-    Error(Box<report_error::Error>),
-    /// The thesis' tables of times under its conditions, beside its figures
-    Tables(report_tables::Tables),
+    /// Measure error against run time: renders and times every setting of each dial and compares it with the reference
+    Error(Box<error_report::command::ErrorReport>),
+    /// Measure the thesis' tables of times under its conditions, and print them with its figures
+    Tables(thesis_tables::command::ThesisTables),
 }
 
 impl Report {

@@ -1,24 +1,22 @@
 //! `echolume stream`.
 
-use super::arriving::Arriving;
-use super::look::Look;
-use super::turns::Turns;
-use super::{Failure, failed, input, say, unheard};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::files::signals::Held;
 use crate::gpu::Context;
-use crate::live::{Feed, Options, Shown, Statistics, Step, Stream as Live, StreamError, Update};
+use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::picture;
+use crate::terminal::{Failure, failed, input, is_closed, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time between two lines of statistics.
-const EVERY: Duration = Duration::from_secs(1);
+/// Interval of the statistics lines.
+const INTERVAL: Duration = Duration::from_secs(1);
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Each second one line: frames, volumes and pictures a second, volumes dropped, latency from the arrival of a frame to \
-                        the pixels that show it, and the mean time and runs of every pass.\n\nExamples:\n  \
+    after_help = "One line per second: frames, volumes and pictures per second, dropped volumes, latency from the arrival of a frame to \
+                        the pixels that show it, and the mean time and number of runs of every pass.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
@@ -28,24 +26,24 @@ const EVERY: Duration = Duration::from_secs(1);
 )]
 pub struct Stream {
     #[command(flatten)]
-    source: Arriving,
+    source: SourceArgs,
     #[command(flatten)]
-    look: Look,
+    scene: SceneArgs,
     #[command(flatten)]
-    turns: Turns,
-    /// Write each picture into this folder (PNG, named by its volume; rolling: by its number)
+    stream: StreamArgs,
+    /// Write each picture into this folder (PNG, named by volume number; with --update rolling by picture number)
     #[arg(long, value_name = "DIR", conflicts_with = "null", required_unless_present = "null")]
     out: Option<PathBuf>,
-    /// Draw the pictures and keep none
+    /// Render the pictures without writing them
     #[arg(long)]
     null: bool,
     /// Write every frame that arrives to this file (.frames)
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// End after so many volumes
+    /// End after this number of volumes
     #[arg(long, value_name = "N")]
     volumes: Option<u64>,
-    /// End after so long, such as 90s or 10m
+    /// End after this time, such as 90s or 10m
     #[arg(long = "for", value_name = "TIME")]
     time: Option<humantime::Duration>,
     /// Run with Vulkan validation; any message is a failure
@@ -55,8 +53,8 @@ pub struct Stream {
 
 impl Stream {
     pub fn run(&self) -> Result<(), Failure> {
-        let update = self.turns.update()?;
-        let settings = self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
+        let update = self.stream.update()?;
+        let settings = self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?;
         if let Some(folder) = &self.out {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
@@ -65,13 +63,13 @@ impl Stream {
             check_record(file, self.source.path())?;
         }
         let source = self.source.open()?;
-        let mut context = self.look.device(self.validate)?;
+        let mut context = self.scene.open_device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let (images, queues) = (self.turns.images, self.turns.queues());
-        let options = Options { update, images, queues, ..Options::default() };
+        let (images, queues) = (self.stream.images, self.stream.queues());
+        let options = StreamOptions { update, images, queues, ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
-        let done = self.go(&mut stream, update, &mut context);
+        let done = self.run_stream(&mut stream, update, &mut context);
         drop(stream);
         done?;
         match context.messages().first() {
@@ -80,20 +78,20 @@ impl Stream {
         }
     }
 
-    /// `context`: another one after its device was lost.
-    fn go(&self, stream: &mut Live, update: Update, context: &mut Arc<Context>) -> Result<(), Failure> {
-        // The end of a stream like any other: the recording gets its index. A second signal does not wait for it.
+    /// Runs the stream to its end. `context` is replaced when its device is lost.
+    fn run_stream(&self, stream: &mut Live, update: Update, context: &mut Arc<Context>) -> Result<(), Failure> {
+        // A signal ends the stream normally, so that the recording gets its index. A second signal ends the process at once.
         let signals = Held::first();
         let began = Instant::now();
         let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
         let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
-                // A device that is lost again before it drew anything is not the device's fault.
+                // A device that is lost again before its first picture is given up.
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() && lost_at != Some(pictures) => {
-                    tracing::warn!("{lost}; going on with the next volume on the device opened anew");
+                    tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume");
                     lost_at = Some(pictures);
-                    *context = self.look.device(self.validate)?;
+                    *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
                     continue;
                 }
@@ -102,24 +100,24 @@ impl Stream {
             let drew = matches!(step, Step::Picture(_));
             match step {
                 Step::Picture(shown) => {
-                    self.keep(&shown, update, pictures)?;
+                    self.write_picture(&shown, update, pictures)?;
                     pictures += 1;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
-                Step::Went => {}
+                Step::Progress => {}
                 Step::End(why) => break why,
             }
-            if told.elapsed() >= EVERY {
+            if told.elapsed() >= INTERVAL {
                 told = Instant::now();
                 let since = stream.take_statistics().map_err(fault)?;
                 say!("{:>6.1} s  {}", began.elapsed().as_secs_f64(), since.line(stream.acquisition_time()));
                 all.add(&since);
-                // After the first seconds everything that is kept is there.
-                if memory.is_none() && began.elapsed() > 5 * EVERY {
+                // After a few seconds all buffers are allocated.
+                if memory.is_none() && began.elapsed() > 5 * INTERVAL {
                     memory = resident();
                 }
             }
-            // A volume counts when its picture begins; rolling when its last frame has come, which the picture after may show.
+            // A volume counts when its picture begins; with rolling updates when its last frame arrived, which the next picture may show.
             if self.volumes.is_some_and(|n| stream.volumes_shown() >= n) {
                 enough_at.get_or_insert(pictures);
             }
@@ -128,9 +126,9 @@ impl Stream {
             if enough || self.time.is_some_and(|t| began.elapsed() >= *t) {
                 break None;
             }
-            // Whoever read the lines has gone, and nothing else is kept.
-            let is_for_nobody = self.null && self.record.is_none() && unheard();
-            if is_for_nobody || signals.signal().is_some() {
+            // Nobody reads the lines, and nothing else is written.
+            let has_no_output = self.null && self.record.is_none() && is_closed();
+            if has_no_output || signals.signal().is_some() {
                 break None;
             }
         };
@@ -154,11 +152,12 @@ impl Stream {
         }
         match end {
             None => Ok(()),
-            Some(why) => Err(failed(format!("{}: {why}", self.source.shown()))),
+            Some(why) => Err(failed(format!("{}: {why}", self.source.name()))),
         }
     }
 
-    fn keep(&self, shown: &Shown, update: Update, number: u64) -> Result<(), Failure> {
+    /// Writes a picture, if `--out` is given.
+    fn write_picture(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
         let name = match update {
             Update::Whole => format!("volume-{:06}.png", shown.volume),
@@ -169,7 +168,7 @@ impl Stream {
     }
 }
 
-/// Refuses to write over anything that is there, or that is being played.
+/// Refuses a recording that would replace an existing file or the recording that is played.
 pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
     let refuse = |why: &str| Err(input(format!("--record {}: {why}", file.display())));
     if file.extension().is_none_or(|e| e != "frames") {
@@ -177,10 +176,10 @@ pub fn check_record(file: &Path, played: &Path) -> Result<(), Failure> {
     }
     let same = |other: &Path| other.canonicalize().is_ok_and(|o| file.canonicalize().is_ok_and(|f| f == o));
     if same(played) {
-        return refuse("would replace what is played");
+        return refuse("would replace the recording that is played");
     }
     match file.exists() {
-        true => refuse("is there already and is not written over; give another name"),
+        true => refuse("exists already and is not replaced; give another name"),
         false => picture::check_target(file).map_err(failed),
     }
 }
@@ -192,10 +191,10 @@ fn fault(error: StreamError) -> Failure {
     }
 }
 
-/// Memory of this process that is in use, MiB; none where the system does not say.
+/// Resident memory of this process, MiB. None if the system does not report it.
 fn resident() -> Option<u64> {
     let statm = std::fs::read_to_string("/proc/self/statm").ok()?;
     let pages: u64 = statm.split_whitespace().nth(1)?.parse().ok()?;
-    // Of 4 KiB on every system that has this file and that this runs on.
+    // Pages have 4 KiB on every supported system that has this file.
     Some((pages * 4096) >> 20)
 }

@@ -1,18 +1,18 @@
 //! `echolume support-bundle`.
 
-use super::arriving::Arriving;
-use super::{Failure, failed, input, say};
+use crate::args::SourceArgs;
 use crate::kiosk::bundle::Bundle;
 use crate::kiosk::config::Config;
 use crate::picture;
+use crate::terminal::{Failure, failed, input, say};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant, SystemTime};
 
-/// A driver that takes longer than this to say what devices there are is itself the answer.
+/// Time-out for listing the devices. A driver that takes longer is itself a finding.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Of what is said about devices, bytes.
+/// Longest text about devices, bytes.
 const LONGEST: u64 = 1 << 20;
 
 #[derive(clap::Args)]
@@ -22,10 +22,10 @@ const LONGEST: u64 = 1 << 20;
                         Example:\n  echolume support-bundle --config /etc/echolume/echolume.toml -o /media/stick/cart.tar.gz"
 )]
 pub struct SupportBundle {
-    /// The archive to write (.tar.gz); nothing is written over [default: echolume-support-TIME.tar.gz here]
+    /// Archive to write (.tar.gz); an existing file is not replaced [default: echolume-support-TIME.tar.gz in this folder]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The configuration of the cart, which also says where the logs are [default: /etc/echolume/echolume.toml]
+    /// Configuration of the kiosk, which names the log file [default: /etc/echolume/echolume.toml]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -46,35 +46,32 @@ impl SupportBundle {
         }
         let is_there = || std::fs::symlink_metadata(&output).is_ok();
         if is_there() {
-            return Err(input(format!(
-                "--output {shown}: is there already and is not written over; give another name"
-            )));
+            return Err(input(format!("--output {shown}: exists already and is not replaced; give another name")));
         }
         picture::check_target(&output).map_err(failed)?;
-        // What was asked for by name and is not there is a mistake; what is wrong with it is told inside.
+        // A missing file is an error. Faults inside the file are noted in the bundle.
         if let Some(config) = self.config.as_ref().filter(|config| !config.is_file()) {
-            return Err(input(format!("--config {}: is no file", config.display())));
+            return Err(input(format!("--config {}: is not a file", config.display())));
         }
         let mut bundle = Bundle::new(self.config.as_deref());
         let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::USUAL));
-        if let Some(Err(Failure::Input(fault))) = Config::read(config).ok().map(|config| Arriving::configured(&config))
+        if let Some(Err(Failure::Input(fault))) =
+            Config::read(config).ok().map(|config| SourceArgs::from_config(&config))
         {
             bundle.note(&format!("configuration: {fault}"));
         }
         bundle.add("devices.txt", "what `echolume devices --limits` says here", &devices());
         let bytes = bundle.pack().map_err(|e| failed(format!("{shown}: {e}")))?;
         if is_there() {
-            return Err(input(format!(
-                "--output {shown}: is there already and is not written over; give another name"
-            )));
+            return Err(input(format!("--output {shown}: exists already and is not replaced; give another name")));
         }
         picture::replace(&output, &bytes).map_err(failed)?;
-        say!("{shown}: {} KiB; have a look before you pass it on", bytes.len().div_ceil(1024));
+        say!("{shown}: {} KiB; review it before you pass it on", bytes.len().div_ceil(1024));
         Ok(())
     }
 }
 
-/// By another process: a driver that crashes or hangs must not take the rest with it.
+/// Lists the devices in a child process: a driver that crashes or hangs must not end this one.
 fn devices() -> String {
     let asked = std::env::current_exe().and_then(|program| {
         let mut command = Command::new(program);
@@ -88,7 +85,7 @@ fn devices() -> String {
 }
 
 fn answer(mut child: Child) -> String {
-    // Read beside it, so that a full pipe does not stop it.
+    // Read in threads: a full pipe would block the child.
     fn read(stream: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();

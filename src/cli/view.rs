@@ -1,16 +1,14 @@
 //! `echolume view`.
 
-use super::arriving::Arriving;
-use super::look::Look;
-use super::report_error::{nanoseconds, read};
-use super::shown::{Place, Wanted};
-use super::turns::Turns;
-use super::{Failure, failed, input, say};
+use super::view_config::{ConsoleConfig, WindowConfig};
+use crate::args::{SceneArgs, SourceArgs, StreamArgs};
+use crate::error_report::command::{nanoseconds, read};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
+use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
@@ -19,7 +17,7 @@ use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Drag turns, the wheel comes closer, H lists every key. Settings come in layers: defaults, --preset, --scene, then flags and \
+    after_help = "Drag rotates the view, the wheel zooms, H lists every key. Settings come in layers: defaults, --preset, --scene, then flags and \
                   --set, each overriding the one before.\n\nExamples:\n  \
                   echolume view\n  \
                   echolume view --source sweep.frames --real-time --rounds 100\n  \
@@ -30,61 +28,61 @@ use std::time::Duration;
 )]
 pub struct View {
     #[command(flatten)]
-    source: Arriving,
+    source: SourceArgs,
     #[command(flatten)]
-    look: Look,
-    /// No way out but the configured keys (Ctrl+Alt+Q); a source or a configuration that fails is tried again for ever, and why is shown
+    scene: SceneArgs,
+    /// Kiosk mode: only the configured keys (Ctrl+Alt+Q) end it. A failing source or configuration is shown and retried for ever
     #[arg(long)]
     kiosk: bool,
-    /// Source, screen, keys and files from one file of TOML (tools/kiosk/echolume.toml shows all of it) [default with --kiosk:
-    /// /etc/echolume/echolume.toml, where it is there]
+    /// Read source, screen, keys and files from a TOML file (tools/kiosk/echolume.toml shows every key) [default with --kiosk:
+    /// /etc/echolume/echolume.toml, if it exists]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["source", "probe", "rate", "real_time", "rounds", "tool", "clip", "spacing", "hole", "motor"])]
     config: Option<PathBuf>,
-    /// Fill a monitor
+    /// Fill the screen
     #[arg(long)]
     full_screen: bool,
-    /// The monitor to fill, by part of its name
+    /// Monitor to fill, by part of its name
     #[arg(long, value_name = "NAME")]
     monitor: Option<String>,
-    /// On a monitor that no desktop holds, with keys, mice and touch screens straight from the kernel (needs the group input)
+    /// Use a monitor without a desktop (VK_KHR_display); keys, mice and touch screens come from the kernel (needs the group input)
     #[arg(long, conflicts_with = "full_screen")]
     direct: bool,
-    /// Refreshes of the monitor a second [default: the most at its size; --size gives another]
+    /// Refresh rate of the monitor [default: the highest at its size; --size selects a size]
     #[arg(long, value_name = "HZ", requires = "direct")]
     refresh: Option<f64>,
-    /// fifo: each picture with a refresh of the monitor; mailbox: the newest, with less latency
+    /// fifo: every picture, at the monitor's refresh; mailbox: only the newest picture, with less latency
     #[arg(long, value_name = "HOW", default_value = "fifo")]
     present: PresentMode,
-    /// The picture alone: no panels, no marks, nothing over it
+    /// Show the picture alone: no panels, no marks
     #[arg(long)]
     no_ui: bool,
-    /// Begin without sliders and buttons (F3 brings them)
+    /// Start without sliders and buttons (F3 shows them)
     #[arg(long)]
     no_panels: bool,
-    /// Size of letters and buttons, 0.5 to 4
+    /// Scale of text and buttons, 0.5 to 4
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     scale: f32,
     #[command(flatten)]
-    turns: Turns,
-    /// Time of a picture that is held while the view moves, such as 16ms; none: full quality always
+    stream: StreamArgs,
+    /// Frame budget while the view moves, such as 16ms; none: always full quality
     #[arg(long, value_name = "TIME", default_value = "33ms")]
     budget: String,
-    /// The dials to hold it with: an error.json of `echolume report error` [default: built in]
+    /// Quality steps that hold the budget: an error.json of `echolume report error` [default: built in]
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Volumes that are kept for looking back, at most 1000
+    /// Number of volumes in the cine loop, at most 1000
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=1000))]
     cine: u32,
-    /// MiB of them at most
+    /// Memory limit of the cine loop, MiB
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=65536))]
     cine_memory: u32,
     /// Write every frame that arrives to this file (.frames)
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Folder for pictures and loops that are saved
+    /// Folder for saved pictures and loops
     #[arg(long, value_name = "DIR", default_value = ".")]
     save_to: PathBuf,
-    /// End after so long, such as 90s or 10m
+    /// End after this time, such as 90s or 10m
     #[arg(long = "for", value_name = "TIME")]
     time: Option<humantime::Duration>,
     /// Run with Vulkan validation; any message is a failure
@@ -102,23 +100,23 @@ impl View {
             self.config = Some(config::USUAL.into());
         }
         if self.kiosk {
-            // What breaks a cart down is to be read in its log, where the support bundle finds it.
+            // Panics go to the log, where the support bundle finds them.
             let usual = std::panic::take_hook();
             std::panic::set_hook(Box::new(move |why| {
                 tracing::error!("{why}");
                 usual(why);
             }));
         }
-        let (kiosk, device) = (self.kiosk, self.look.device.clone());
+        let (kiosk, device) = (self.kiosk, self.scene.device.clone());
         let mut place = match self.config() {
             None => self.place()?,
-            Some(Ok(config)) => Place::configured(&config)?,
-            // Why is shown on the screen.
-            Some(Err(_)) if kiosk => Place::configured(&Config::default())?,
+            Some(Ok(config)) => WindowConfig::configured(&config)?,
+            // The console shows the fault.
+            Some(Err(_)) if kiosk => WindowConfig::configured(&Config::default())?,
             Some(Err(fault)) => return Err(input(fault)),
         };
         if self.direct || place.direct.is_some() {
-            place.direct = Some(self.on_monitor(place.direct)?);
+            place.direct = Some(self.monitor_request(place.direct)?);
         }
         place.shape.full_screen |= self.full_screen;
         place.shape.stays = kiosk;
@@ -129,21 +127,21 @@ impl View {
         }
         let mut first = match kiosk {
             true => None,
-            // Before a window opens: what cannot be opened now is told where it was typed.
-            false => Some(self.wanted()?.opened()?),
+            // Open the source before the window: a fault is then reported in the terminal.
+            false => Some(self.console_config()?.opened()?),
         };
         let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
         let view = Arc::new(self);
         let make = move |context: &Arc<Context>, size: [u32; 2], factor: f32, wake: Wake| {
             let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
             say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
-            let wanted = first.take().map_or_else(|| view.wanted(), Ok);
+            let wanted = first.take().map_or_else(|| view.console_config(), Ok);
             let (wanted, amiss) = match wanted {
                 Ok(wanted) => (wanted, None),
                 Err(failure) => {
                     let why = failure.message();
                     tracing::error!("{why}");
-                    (Wanted::nothing(), Some(view.amiss(why)))
+                    (ConsoleConfig::nothing(), Some(view.amiss(why)))
                 }
             };
             let (open, options) = wanted.options(factor, wake, amiss);
@@ -156,7 +154,7 @@ impl View {
         finish(ran?)
     }
 
-    /// Where the log goes, if the configuration says.
+    /// The log of the configuration: path, bytes per file, number of files.
     pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
         let files = self.config()?.ok()?.files;
         Some((files.log?, u64::from(files.log_size_mb) << 20, files.log_files))
@@ -166,35 +164,35 @@ impl View {
         self.config.as_deref().map(Config::read)
     }
 
-    /// Everything that is wanted, as it is written now.
-    fn wanted(&self) -> Result<Wanted, Failure> {
+    /// The configuration of the console, read anew from the file and the flags.
+    fn console_config(&self) -> Result<ConsoleConfig, Failure> {
         let usual = Config::default();
         let (mut wanted, exit) = match self.config() {
             Some(config) => {
                 let config = config.map_err(input)?;
-                (Wanted::configured(&config, &self.look)?, config.keys.exit)
+                (ConsoleConfig::configured(&config, &self.scene)?, config.keys.exit)
             }
-            None => (self.flagged()?, usual.keys.exit),
+            None => (self.config_from_flags()?, usual.keys.exit),
         };
         let options = &mut wanted.options;
         options.is_kiosk = self.kiosk;
         options.exit = exit.filter(|_| self.kiosk);
-        // Without a kiosk the end of the source is the end.
+        // Only a kiosk reopens a source that ends.
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
-        (options.images, options.queues) = (self.turns.images, self.turns.queues());
+        (options.images, options.queues) = (self.stream.images, self.stream.queues());
         Ok(wanted)
     }
 
-    /// The same from flags alone.
-    fn flagged(&self) -> Result<Wanted, Failure> {
+    /// The configuration of the console from the flags alone.
+    fn config_from_flags(&self) -> Result<ConsoleConfig, Failure> {
         if let Some(file) = &self.record {
             super::stream::check_record(file, self.source.path())?;
         }
         let options = Options {
-            settings: self.look.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
-            update: self.turns.update()?,
-            cine: Room { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
+            settings: self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
+            update: self.stream.update()?,
+            cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
             budget: self.budget()?,
             rungs: rungs(self.report.as_deref())?,
             record: self.record.clone(),
@@ -203,16 +201,16 @@ impl View {
             scale: self.scale,
             ..Options::usual()
         };
-        Ok(Wanted { source: Some(self.source.clone()), first: None, options })
+        Ok(ConsoleConfig { source: Some(self.source.clone()), first: None, options })
     }
 
-    fn place(&self) -> Result<Place, Failure> {
+    fn place(&self) -> Result<WindowConfig, Failure> {
         if !(0.5..=4.0).contains(&self.scale) {
             return Err(input(format!("--scale {}: must lie in 0.5..=4", self.scale)));
         }
-        let mut place = Place::usual();
-        if self.look.has_size() {
-            place.shape.size = self.look.layers(false, &[])?.finish().map_err(input)?.picture.size;
+        let mut place = WindowConfig::usual();
+        if self.scene.has_size() {
+            place.shape.size = self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size;
         }
         place.shape.full_screen = self.kiosk || self.monitor.is_some();
         place.shape.monitor = self.monitor.clone();
@@ -220,14 +218,14 @@ impl View {
         Ok(place)
     }
 
-    /// The monitor and its mode, as flags say over the configuration.
-    fn on_monitor(&self, configured: Option<display::Wanted>) -> Result<display::Wanted, Failure> {
+    /// The monitor and its mode. Flags override the configuration.
+    fn monitor_request(&self, configured: Option<display::Wanted>) -> Result<display::Wanted, Failure> {
         if let Some(hz) = self.refresh.filter(|hz| !(1.0..=1000.0).contains(hz)) {
             return Err(input(format!("--refresh {hz}: must lie in 1..=1000")));
         }
         let configured = configured.unwrap_or_default();
-        let size = match self.look.has_size() {
-            true => Some(self.look.layers(false, &[])?.finish().map_err(input)?.picture.size),
+        let size = match self.scene.has_size() {
+            true => Some(self.scene.layers(false, &[])?.finish().map_err(input)?.picture.size),
             false => configured.size,
         };
         let monitor = self.monitor.clone().or(configured.monitor);
@@ -241,15 +239,15 @@ impl View {
         }
     }
 
-    /// What is wrong with the configuration, and a way to know when it is not any more.
+    /// The fault of the configuration, and a test for when it is gone.
     fn amiss(self: &Arc<View>, why: String) -> Amiss {
         let view = self.clone();
-        let is_mended = Box::new(move || view.wanted().is_ok());
+        let is_mended = Box::new(move || view.console_config().is_ok());
         Amiss { title: "The configuration cannot be used".into(), why, is_mended }
     }
 }
 
-/// The dials that hold a budget.
+/// The quality steps that hold the frame budget: those of a report, or the built-in ones.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
         None => Ok(quality_ladder::built_in()),
@@ -259,7 +257,7 @@ pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     }
 }
 
-/// What came of it, in a line; and whether validation was silent.
+/// Prints the summary. Fails on lost recordings and on validation messages.
 fn finish((mut console, context): (Console, Arc<Context>)) -> Result<(), Failure> {
     let line = console.summary();
     let unrecorded = console.stream().unrecorded();

@@ -4,6 +4,7 @@
 pub mod analytic;
 mod canvas;
 pub mod choose;
+pub(crate) mod command;
 pub mod dials;
 pub mod measure;
 pub mod metrics;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// A volume whose frames have all come.
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct CineVolume {
     pub volume: u32,
     /// By slice.
     pub frames: Vec<Arc<Frame>>,
@@ -16,7 +16,7 @@ pub struct Kept {
 
 /// How much is kept at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Room {
+pub struct CineLimits {
     /// 0: none is.
     pub volumes: usize,
     /// The newest volume is kept also where it alone has more.
@@ -31,9 +31,9 @@ struct Filling {
 
 /// The cine loop.
 pub struct Cine {
-    room: Room,
+    room: CineLimits,
     slices: usize,
-    kept: VecDeque<Kept>,
+    kept: VecDeque<CineVolume>,
     filling: Option<Filling>,
     /// A frame whose lines are arriving.
     lines: Option<Frame>,
@@ -42,7 +42,7 @@ pub struct Cine {
 
 impl Cine {
     /// `slices`: frames of a volume.
-    pub fn new(room: Room, slices: usize) -> Cine {
+    pub fn new(room: CineLimits, slices: usize) -> Cine {
         Cine { room, slices, kept: VecDeque::new(), filling: None, lines: None, bytes: 0 }
     }
 
@@ -52,7 +52,7 @@ impl Cine {
     }
 
     /// From the oldest to the newest.
-    pub fn kept(&self) -> &VecDeque<Kept> {
+    pub fn volumes(&self) -> &VecDeque<CineVolume> {
         &self.kept
     }
 
@@ -110,7 +110,7 @@ impl Cine {
             let frames: Vec<_> = frames.into_iter().flatten().collect();
             let bytes = frames.iter().map(|f| f.bytes.len()).sum();
             self.bytes += bytes;
-            self.kept.push_back(Kept { volume, frames, bytes });
+            self.kept.push_back(CineVolume { volume, frames, bytes });
         }
         while self.kept.len() > self.room.volumes || (self.bytes > self.room.bytes && self.kept.len() > 1) {
             let gone = self.kept.pop_front();
@@ -128,46 +128,46 @@ mod tests {
     }
 
     fn numbers(cine: &Cine) -> Vec<u32> {
-        cine.kept().iter().map(|kept| kept.volume).collect()
+        cine.volumes().iter().map(|kept| kept.volume).collect()
     }
 
     #[test]
     fn whole_volumes_are_kept_and_the_oldest_go() {
-        let mut cine = Cine::new(Room { volumes: 3, bytes: 1000 }, 4);
+        let mut cine = Cine::new(CineLimits { volumes: 3, bytes: 1000 }, 4);
         for volume in 0..6 {
             // Of volume 2 a frame is missing.
             (0..4).filter(|slice| (volume, *slice) != (2, 1)).for_each(|s| cine.frame(frame(volume, s, vec![0; 10])));
         }
         assert_eq!(numbers(&cine), [3, 4, 5]);
         assert_eq!(cine.bytes(), 120);
-        assert!(cine.kept().iter().all(|k| k.frames.iter().enumerate().all(|(s, f)| f.slice == s)));
+        assert!(cine.volumes().iter().all(|k| k.frames.iter().enumerate().all(|(s, f)| f.slice == s)));
     }
 
     #[test]
     fn bytes_bound_it_too_but_the_newest_stays() {
-        let mut cine = Cine::new(Room { volumes: 9, bytes: 100 }, 2);
+        let mut cine = Cine::new(CineLimits { volumes: 9, bytes: 100 }, 2);
         for (volume, bytes) in [(0, 30), (1, 30), (2, 10), (3, 200)] {
             (0..2).for_each(|s| cine.frame(frame(volume, s, vec![0; bytes])));
-            assert!(cine.bytes() <= 100 || cine.kept().len() == 1);
+            assert!(cine.bytes() <= 100 || cine.volumes().len() == 1);
         }
         assert_eq!(numbers(&cine), [3]);
     }
 
     #[test]
     fn a_frame_sent_again_counts_once_and_one_beyond_the_volume_not_at_all() {
-        let mut cine = Cine::new(Room { volumes: 2, bytes: 100 }, 2);
+        let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 2);
         [0, 0, 7].into_iter().for_each(|s| cine.frame(frame(1, s, vec![1])));
-        assert!(cine.kept().is_empty());
+        assert!(cine.volumes().is_empty());
         cine.frame(frame(1, 1, vec![2]));
         assert_eq!(numbers(&cine), [1]);
     }
 
     #[test]
     fn lines_make_frames_and_a_gap_makes_none() {
-        let mut cine = Cine::new(Room { volumes: 2, bytes: 100 }, 1);
+        let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 1);
         cine.lines(frame(0, 0, vec![1, 2]), 0, 4);
         cine.lines(frame(0, 0, vec![3, 4]), 2, 4);
-        assert_eq!(cine.kept()[0].frames[0].bytes, [1, 2, 3, 4]);
+        assert_eq!(cine.volumes()[0].frames[0].bytes, [1, 2, 3, 4]);
         cine.lines(frame(1, 0, vec![1]), 0, 4);
         cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
         cine.lines(frame(1, 0, vec![3, 4]), 2, 4);
@@ -176,9 +176,9 @@ mod tests {
 
     #[test]
     fn without_room_nothing_is_kept() {
-        let mut cine = Cine::new(Room::default(), 1);
+        let mut cine = Cine::new(CineLimits::default(), 1);
         cine.frame(frame(0, 0, vec![1]));
         cine.lines(frame(1, 0, vec![1]), 0, 1);
-        assert!(cine.kept().is_empty() && cine.bytes() == 0);
+        assert!(cine.volumes().is_empty() && cine.bytes() == 0);
     }
 }

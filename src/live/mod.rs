@@ -16,5 +16,5 @@ pub mod volume_pool;
 
 pub use feed::Feed;
 pub use statistics::Statistics;
-pub use stream::{Options, Shown, Step, Stream, StreamError};
+pub use stream::{FinishedPicture, Step, Stream, StreamError, StreamOptions};
 pub use volume_pool::Update;

@@ -1,6 +1,6 @@
 //! Looking back: the stream frozen, volumes of the cine loop sent once more, and another source in the place of one that ended.
 
-use super::cine::{Cine, Kept};
+use super::cine::{Cine, CineVolume};
 use super::feed::Feed;
 use super::stream::{Stream, StreamError};
 
@@ -9,7 +9,7 @@ const AT_ONCE: usize = 8;
 
 /// A volume on its way to the device once more.
 pub struct Replay {
-    pub(super) kept: Kept,
+    pub(super) kept: CineVolume,
     sent: usize,
     image: u32,
 }
@@ -38,18 +38,18 @@ impl Stream {
     }
 
     /// The place of what is shown in the cine loop, from 0, where it is in it.
-    pub fn cine_place(&self) -> Option<usize> {
+    pub fn cine_position(&self) -> Option<usize> {
         let volume = match (&self.replay, &self.now) {
             (Some(replay), _) => replay.kept.volume,
             (None, Some(now)) => now.volume?,
             (None, None) => return None,
         };
-        self.cine.kept().iter().position(|kept| kept.volume == volume)
+        self.cine.volumes().iter().position(|kept| kept.volume == volume)
     }
 
     /// Shows the volume at a place of the cine loop, 0 the oldest; one that is not there changes nothing.
-    pub fn show_kept(&mut self, place: usize) {
-        let (Some(kept), Some(now)) = (self.cine.kept().get(place).cloned(), &mut self.now) else { return };
+    pub fn show_cine_volume(&mut self, place: usize) {
+        let (Some(kept), Some(now)) = (self.cine.volumes().get(place).cloned(), &mut self.now) else { return };
         let image = match &self.replay {
             // What was being sent gives way.
             Some(replay) => Some(replay.image),
@@ -60,8 +60,8 @@ impl Stream {
 
     /// A volume that other settings or another device took away, where it was kept; else the newest.
     pub(super) fn show_again(&mut self, volume: u32) {
-        if let Some(newest) = self.cine.kept().len().checked_sub(1) {
-            self.show_kept(self.cine.kept().iter().position(|kept| kept.volume == volume).unwrap_or(newest));
+        if let Some(newest) = self.cine.volumes().len().checked_sub(1) {
+            self.show_cine_volume(self.cine.volumes().iter().position(|kept| kept.volume == volume).unwrap_or(newest));
         }
     }
 
@@ -82,7 +82,7 @@ impl Stream {
     }
 
     /// Goes on with another source, whose volumes are numbered on from those before; what is shown stays until it has something to show.
-    pub fn listen_to(&mut self, feed: Feed) {
+    pub fn replace_source(&mut self, feed: Feed) {
         (self.feed, self.end) = (feed, None);
         self.cine.cut();
         // A number of two volumes would lead to the wrong one of them.

@@ -1,7 +1,7 @@
 //! What follows from a geometry: the renderer, whose volume images are filled and shown in turns, and the picture on its way.
 
 use super::statistics::Statistics;
-use super::stream::Shown;
+use super::stream::FinishedPicture;
 use super::views::Views;
 use super::volume_pool::VolumePool;
 use crate::gpu::{GpuError, Renderer};
@@ -152,13 +152,13 @@ impl Session {
         Ok(true)
     }
 
-    pub fn finish(&mut self, statistics: &mut Statistics) -> Result<Shown, GpuError> {
+    pub fn finish(&mut self, statistics: &mut Statistics) -> Result<FinishedPicture, GpuError> {
         let picture = self.renderer.end_drawing()?;
         let (volume, arrived) = self.drawing.take().unwrap_or_default();
         let now = Instant::now();
         arrived.iter().for_each(|at| statistics.seen_after(now.saturating_duration_since(*at)));
         statistics.pictures += 1;
         let latency = arrived.iter().max().map_or(Duration::ZERO, |at| now.saturating_duration_since(*at));
-        Ok(Shown { volume, picture, latency, took: now.saturating_duration_since(self.begun) })
+        Ok(FinishedPicture { volume, picture, latency, took: now.saturating_duration_since(self.begun) })
     }
 }

@@ -1,6 +1,6 @@
 //! What a stream did: counts, and how long frames took from their arrival to the pixels that show them.
 
-use super::volume_pool::Counts;
+use super::volume_pool::VolumeCounts;
 use crate::passes::PassTime;
 use hdrhistogram::Histogram;
 use std::fmt::Write as _;
@@ -21,7 +21,7 @@ pub struct Statistics {
     /// Frames that the renderer could not take, as those of the wrong size.
     pub refused: u64,
     pub pictures: u64,
-    pub volumes: Counts,
+    pub volumes: VolumeCounts,
     /// From the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
     pub passes: Vec<PassTime>,
@@ -37,7 +37,7 @@ impl Default for Statistics {
             lost: 0,
             refused: 0,
             pictures: 0,
-            volumes: Counts::default(),
+            volumes: VolumeCounts::default(),
             latency,
             passes: Vec::new(),
         }
@@ -56,7 +56,7 @@ impl Statistics {
 
     /// Since `before`, which these go on from. Latencies and passes are those since then already.
     pub fn since(&self, before: &Statistics) -> Statistics {
-        let counts = |now: Counts, then: Counts| Counts {
+        let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
             shown: now.shown.saturating_sub(then.shown),
             dropped: now.dropped.saturating_sub(then.dropped),
             incomplete: now.incomplete.saturating_sub(then.incomplete),
@@ -101,7 +101,7 @@ impl Statistics {
     pub fn line(&self, floor: Option<f64>) -> String {
         let seconds = self.time.as_secs_f64().max(1e-9);
         let rate = |n: u64| n as f64 / seconds;
-        let Counts { shown, dropped, incomplete, .. } = self.volumes;
+        let VolumeCounts { shown, dropped, incomplete, .. } = self.volumes;
         let mut line = format!(
             "frames {:.1}/s  volumes {:.2}/s  pictures {:.1}/s",
             rate(self.frames),
@@ -146,7 +146,7 @@ mod tests {
     fn a_line_says_rates_drops_and_percentiles() {
         let mut statistics = Statistics { time: Duration::from_secs(2), frames: 74, pictures: 4, ..Default::default() };
         (1..=100).for_each(|n| statistics.seen_after(Duration::from_millis(n)));
-        statistics.volumes = Counts { shown: 2, dropped: 1, incomplete: 3, left_out: 0 };
+        statistics.volumes = VolumeCounts { shown: 2, dropped: 1, incomplete: 3, left_out: 0 };
         statistics.passes = vec![PassTime { name: "scan_convert", runs: 74, total: 74e6 }];
         let line = statistics.line(Some(0.25));
         for part in [

@@ -2,7 +2,7 @@
 
 use super::statistics::Statistics;
 use super::stream::{Stream, StreamError};
-use super::volume_pool::{Counts, VolumePool};
+use super::volume_pool::{VolumeCounts, VolumePool};
 use crate::gpu::Renderer;
 use crate::scene::Scene;
 use crate::source::recorder::Header;
@@ -11,7 +11,7 @@ use std::time::Instant;
 
 impl Stream {
     /// A volume of the cine loop is on its way to the device.
-    pub fn is_looking_back(&self) -> bool {
+    pub fn is_replaying(&self) -> bool {
         self.replay.is_some()
     }
 
@@ -46,7 +46,7 @@ impl Stream {
         self.statistics.time = self.began.elapsed();
         self.statistics.lost = self.feed.lost();
         self.statistics.passes = self.now.as_mut().map_or(Vec::new(), |now| now.renderer.times_so_far());
-        self.statistics.volumes = self.turns().map_or(Counts::default(), VolumePool::counts);
+        self.statistics.volumes = self.turns().map_or(VolumeCounts::default(), VolumePool::counts);
         Ok(self.statistics.clone())
     }
 

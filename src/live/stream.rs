@@ -1,6 +1,6 @@
 //! The loop between a feed and a renderer, one step at a time.
 
-use super::cine::{Cine, Room};
+use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed};
 use super::replay::Replay;
 use super::session::Session;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 #[derive(Clone)]
-pub struct Options {
+pub struct StreamOptions {
     pub update: Update,
     /// Volume images that take turns where volumes are whole: 2, or 3 so that a volume need not wait for a picture.
     pub images: u32,
@@ -28,21 +28,21 @@ pub struct Options {
     /// Bring every picture back; otherwise it stays on the device, where it is shown.
     pub readback: bool,
     /// How much of what came last is kept for looking back.
-    pub cine: Room,
+    pub cine: CineLimits,
     /// Called when there is something to look at: a source said something, something was made beside the drawing.
     pub wake: Option<Wake>,
     /// Shaders to use instead of the embedded ones; what changes there is drawn with from then on.
     pub shaders: Option<Arc<ShaderFolder>>,
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options {
+impl Default for StreamOptions {
+    fn default() -> StreamOptions {
+        StreamOptions {
             update: Update::Whole,
             images: 3,
             queues: None,
             readback: true,
-            cine: Room::default(),
+            cine: CineLimits::default(),
             wake: None,
             shaders: None,
         }
@@ -53,18 +53,18 @@ impl Default for Options {
 #[derive(Debug)]
 pub enum Step {
     /// A picture is done.
-    Picture(Shown),
+    Picture(FinishedPicture),
     /// Something was left out, and why; the stream goes on.
     Fault(String),
     /// Something else was done, or nothing.
-    Went,
+    Progress,
     /// No more frames will come, and why if that was not to be expected; all that came is in the last picture.
     End(Option<String>),
 }
 
 /// A picture, and what it is of.
 #[derive(Debug)]
-pub struct Shown {
+pub struct FinishedPicture {
     /// The volume that is shown; rolling: the newest that has a slice in it.
     pub volume: u32,
     /// None where pictures stay on the device.
@@ -88,7 +88,7 @@ pub struct Stream {
     pub(super) context: Arc<Context>,
     pub(super) feed: Feed,
     settings: Settings,
-    options: Options,
+    options: StreamOptions,
     pub(super) now: Option<Session>,
     pub(super) cine: Cine,
     /// A volume of the cine loop that is being sent once more.
@@ -111,14 +111,14 @@ pub struct Stream {
 }
 
 impl Stream {
-    pub fn new(context: &Arc<Context>, feed: Feed, settings: Settings, options: Options) -> Stream {
+    pub fn new(context: &Arc<Context>, feed: Feed, settings: Settings, options: StreamOptions) -> Stream {
         Stream {
             context: context.clone(),
             feed,
             settings,
             options,
             now: None,
-            cine: Cine::new(Room::default(), 0),
+            cine: Cine::new(CineLimits::default(), 0),
             replay: None,
             frozen: false,
             header: None,
@@ -161,7 +161,7 @@ impl Stream {
                 if self.feed.can_wait() && now.turns.is_waiting() {
                     // Another volume would take its place.
                     std::thread::sleep(patience);
-                    return Ok(Step::Went);
+                    return Ok(Step::Progress);
                 }
             } else if now.behind > 0 && !over {
                 now.behind -= 1;
@@ -169,7 +169,7 @@ impl Stream {
                     return self.take(event, at);
                 }
                 now.behind = 0;
-                return Ok(Step::Went);
+                return Ok(Step::Progress);
             } else {
                 if let Some(folder) = &self.options.shaders
                     && let Some(changed) = folder.take_changed()
@@ -189,7 +189,7 @@ impl Stream {
                     now.lost = Some(replay.kept.volume);
                 }
                 if begun {
-                    return Ok(Step::Went);
+                    return Ok(Step::Progress);
                 } else if let Some(fault) = now.fault.take() {
                     // What could not be drawn is not to be made of another geometry or device either.
                     if now.next.is_none() {
@@ -202,19 +202,19 @@ impl Stream {
             }
         }
         if self.replay.is_some() {
-            return self.send_again().map(|()| Step::Went);
+            return self.send_again().map(|()| Step::Progress);
         }
         // A geometry that begins would take what is frozen away.
         let shows = self.frozen && self.now.is_some();
         if let Some(header) = self.next.take_if(|_| !shows) {
-            return self.make(header).map(|()| Step::Went);
+            return self.make(header).map(|()| Step::Progress);
         }
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
         }
         match self.feed.next(patience) {
             Some(Arrived { event, at }) => self.take(event, at),
-            None => Ok(Step::Went),
+            None => Ok(Step::Progress),
         }
     }
 
@@ -227,7 +227,7 @@ impl Stream {
             Event::Frame(mut frame) => {
                 frame.volume = frame.volume.saturating_add(self.first);
                 let went = self.lines(&frame, None, at);
-                if matches!(went, Ok(Step::Went)) {
+                if matches!(went, Ok(Step::Progress)) {
                     self.cine.frame(frame);
                 }
                 return went;
@@ -235,7 +235,7 @@ impl Stream {
             Event::Lines { mut frame, first } => {
                 frame.volume = frame.volume.saturating_add(self.first);
                 let went = self.lines(&frame, Some(first), at);
-                if let (Ok(Step::Went), Some(now)) = (&went, &self.now) {
+                if let (Ok(Step::Progress), Some(now)) = (&went, &self.now) {
                     let (whole, lines) = (now.renderer.frame_bytes(), now.renderer.scene().frame_size()[1] as usize);
                     self.cine.lines(frame, first * (whole / lines), whole);
                 }
@@ -248,7 +248,7 @@ impl Stream {
             }
             Event::Idle => {}
         }
-        Ok(Step::Went)
+        Ok(Step::Progress)
     }
 
     /// Goes on with another device, or the same one anew after it was lost: with the volume that begins next.
@@ -268,7 +268,7 @@ impl Stream {
         let is_same = self.header.as_ref() == Some(&header);
         let (asked, now) = (self.replay.take().map(|replay| replay.kept.volume), self.now.as_ref());
         let shown = asked.or_else(|| now.and_then(Session::seen));
-        let shown = shown.or_else(|| self.cine.kept().back().map(|kept| kept.volume)).filter(|_| is_same);
+        let shown = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
         self.header = Some(header.clone());
         // Gone before the new one comes: both may not fit the device.
         if let Some(Session { turns, .. }) = self.now.take() {
@@ -344,9 +344,9 @@ impl Stream {
                 now.came(image, frame.volume, at);
                 self.newest = self.newest.max(Some(frame.volume));
                 now.turns.arrived(frame.slice, frame.backward);
-                Ok(Step::Went)
+                Ok(Step::Progress)
             }
-            Ok(None) => Ok(Step::Went),
+            Ok(None) => Ok(Step::Progress),
             Err(error @ (GpuError::FrameSize { .. } | GpuError::FrameLines { .. } | GpuError::FrameSlice { .. })) => {
                 self.statistics.refused += 1;
                 Ok(Step::Fault(error.to_string()))

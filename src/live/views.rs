@@ -38,7 +38,7 @@ impl Views {
     pub fn of(&self, backward: &[bool]) -> Cow<'_, Scene> {
         let back = backward.iter().filter(|b| **b).count();
         let most = 2 * back > backward.len();
-        let mix = |marked: &[bool]| self.forward.geometry.mixed(&self.backward.geometry, marked);
+        let mix = |marked: &[bool]| self.forward.geometry.with_mixed_directions(&self.backward.geometry, marked);
         let mixed = self.mixes.then(|| mix(backward).or_else(|| mix(&vec![most; backward.len()]))).flatten();
         match mixed {
             Some(geometry) => Cow::Owned(Scene { geometry, ..self.forward.clone() }),

@@ -16,7 +16,7 @@ pub enum Update {
 
 /// What became of volumes. Each that was heard of is counted once, when it is over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct VolumeCounts {
     /// Were shown; rolling: all of their frames came.
     pub shown: u64,
     /// Were whole and gave way to a newer one, or found no free image.
@@ -51,7 +51,7 @@ pub struct VolumePool {
     shown: Option<u32>,
     /// The newest volume that is over, whatever became of it.
     over: Option<u32>,
-    counts: Counts,
+    counts: VolumeCounts,
 }
 
 struct Filling {
@@ -76,7 +76,7 @@ impl VolumePool {
             again: None,
             shown: None,
             over: None,
-            counts: Counts::default(),
+            counts: VolumeCounts::default(),
         }
     }
 
@@ -111,7 +111,7 @@ impl VolumePool {
         self.backward.len() as u32
     }
 
-    /// Counts go on from those before another geometry or device; a volume of then that was not shown will not be.
+    /// VolumeCounts go on from those before another geometry or device; a volume of then that was not shown will not be.
     pub fn go_on_from(&mut self, mut before: VolumePool) {
         before.forget();
         (self.counts, self.over) = (before.counts, before.over);
@@ -149,7 +149,7 @@ impl VolumePool {
         (self.again, self.is_again) = (None, true);
     }
 
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> VolumeCounts {
         self.counts
     }
 
@@ -285,7 +285,7 @@ mod tests {
             }
             model.turns.end();
             let waiting = u64::from(model.turns.ready.is_some());
-            let Counts { shown, dropped, incomplete, .. } = model.turns.counts();
+            let VolumeCounts { shown, dropped, incomplete, .. } = model.turns.counts();
             prop_assert_eq!(shown + dropped + incomplete + waiting, heard.len() as u64);
             prop_assert!(model.seen.windows(2).all(|w| w[0] < w[1]), "{:?}", model.seen);
         }
@@ -302,7 +302,7 @@ mod tests {
         assert_eq!(model.draw(), None, "nothing has come since");
         model.frame(0, 1);
         assert_eq!(model.carries, [[0, 0, 0, 1]], "a late frame does not put an old slice beside new ones");
-        assert_eq!(model.turns.counts(), Counts { shown: 1, left_out: 1, ..Counts::default() });
+        assert_eq!(model.turns.counts(), VolumeCounts { shown: 1, left_out: 1, ..VolumeCounts::default() });
     }
 
     #[test]
@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(turns.place(0, || true), None);
         assert_eq!(turns.place(0, || panic!("was asked")), None);
         assert_eq!(turns.place(1, || false), Some(0));
-        assert_eq!(turns.counts(), Counts { dropped: 1, left_out: 2, ..Counts::default() });
+        assert_eq!(turns.counts(), VolumeCounts { dropped: 1, left_out: 2, ..VolumeCounts::default() });
     }
 
     #[test]
@@ -327,7 +327,7 @@ mod tests {
         assert_eq!(model.draw(), None);
         (0..4).for_each(|slice| model.frame(3, slice));
         assert_eq!(model.draw().map(|r| r.volume), Some(3));
-        assert_eq!(model.turns.counts(), Counts { shown: 3, dropped: 1, incomplete: 0, left_out: 4 });
+        assert_eq!(model.turns.counts(), VolumeCounts { shown: 3, dropped: 1, incomplete: 0, left_out: 4 });
     }
 
     #[test]
@@ -349,12 +349,12 @@ mod tests {
         assert!(third != again && third != shown);
         turns.put(again, 0, vec![true; 2]);
         assert_eq!(turns.take(), Some(Ready { image: again, volume: 0, backward: vec![true; 2] }));
-        assert_eq!(turns.counts(), Counts { shown: 1, ..Counts::default() });
+        assert_eq!(turns.counts(), VolumeCounts { shown: 1, ..VolumeCounts::default() });
         (0..2).for_each(|slice| {
             turns.arrived(slice, false);
         });
         assert_eq!(turns.take().map(|r| r.volume), Some(1));
-        assert_eq!(turns.counts(), Counts { shown: 2, ..Counts::default() });
+        assert_eq!(turns.counts(), VolumeCounts { shown: 2, ..VolumeCounts::default() });
     }
 
     #[test]

@@ -148,11 +148,11 @@ impl Probe {
     pub fn to_space(&self, at: Indices) -> DVec3 {
         let (x, y) = self.plane_point(at.sample, at.line);
         let position = self.slice_position(at.line, at.slice);
-        self.swept(x, y, position)
+        self.sweep_map(x, y, position)
     }
 
     /// The sweep map of an in-plane place at a slice position.
-    pub fn swept(&self, x: f64, y: f64, position: f64) -> DVec3 {
+    pub fn sweep_map(&self, x: f64, y: f64, position: f64) -> DVec3 {
         match self.motion {
             Motion::Fan { .. } => {
                 let axis = self.axis_depth();
@@ -163,8 +163,8 @@ impl Probe {
         }
     }
 
-    /// In-plane place (x, y) and slice position of a place in space: the inverse of [`Probe::swept`].
-    pub fn unswept(&self, place: DVec3) -> (f64, f64, f64) {
+    /// In-plane place (x, y) and slice position of a place in space: the inverse of [`Probe::sweep_map`].
+    pub fn inverse_sweep_map(&self, place: DVec3) -> (f64, f64, f64) {
         match self.motion {
             Motion::Fan { .. } => {
                 let beyond = place.y - self.axis_depth();
@@ -177,7 +177,7 @@ impl Probe {
 
     /// Fractional indices of a place in space. Exact, not iterated: the line does not depend on the slice.
     pub fn to_indices(&self, place: DVec3) -> Indices {
-        let (x, y, position) = self.unswept(place);
+        let (x, y, position) = self.inverse_sweep_map(place);
         let (sample, line) = self.plane_indices(x, y);
         Indices { sample, line, slice: self.slice_index(position, line) }
     }

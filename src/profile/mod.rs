@@ -2,6 +2,7 @@
 //! follow from it; nothing here measures.
 
 pub mod ceilings;
+pub(crate) mod command;
 pub mod compare;
 pub mod differences;
 pub mod formats;

@@ -46,7 +46,7 @@ pub enum Playback {
 }
 
 /// A recording or the phantom as a live source. Between two frames it holds none.
-pub struct Paced {
+pub struct PlaybackSource {
     source: Box<dyn Source>,
     pace: Playback,
     /// Times that the whole is played.
@@ -62,10 +62,10 @@ pub struct Paced {
     frames: u64,
 }
 
-impl Paced {
+impl PlaybackSource {
     /// `rounds`: how often to play it; volumes go on being numbered.
-    pub fn new(source: Box<dyn Source>, pace: Playback, rounds: u32) -> Paced {
-        Paced {
+    pub fn new(source: Box<dyn Source>, pace: Playback, rounds: u32) -> PlaybackSource {
+        PlaybackSource {
             source,
             pace,
             rounds,
@@ -116,7 +116,7 @@ impl Paced {
 /// Between the first and the last frame of a recording, s: ten days.
 const LONGEST_WAIT: f64 = 864_000.0;
 
-impl Live for Paced {
+impl Live for PlaybackSource {
     fn next(&mut self, patience: Duration) -> Event {
         if self.header.is_none() {
             let header = self.source.header();

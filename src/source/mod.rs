@@ -63,7 +63,7 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
         kretz::read(path)
     } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
         metaimage::read(path)
-    } else if recorder::Replay::is_one(&start) {
+    } else if recorder::Reader::is_one(&start) {
         Err(InputError::new(path, "file", "holds frames as they arrived, not a recording"))
     } else {
         Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
@@ -73,10 +73,10 @@ fn read_contents(path: &Path) -> Result<Contents, InputError> {
 /// A file of frames or any other recording, by its content.
 ///
 /// # Errors
-/// As of [`recorder::Replay::open`] and [`Recording::open`].
+/// As of [`recorder::Reader::open`] and [`Recording::open`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
     match is_frames(path) {
-        true => Ok(Box::new(recorder::Replay::open(path)?)),
+        true => Ok(Box::new(recorder::Reader::open(path)?)),
         false => Ok(Box::new(Recording::open(path, probe)?)),
     }
 }
@@ -85,10 +85,10 @@ pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputE
 ///
 /// # Errors
 /// As of [`open`], and what cannot be read of a file of frames, all of which is gone through.
-pub fn facts(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, String)>, InputError> {
+pub fn description(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, String)>, InputError> {
     match is_frames(path) {
-        true => recorder::Replay::open(path)?.facts(),
-        false => Ok(Recording::open(path, probe)?.facts()),
+        true => recorder::Reader::open(path)?.description(),
+        false => Ok(Recording::open(path, probe)?.description()),
     }
 }
 
@@ -98,7 +98,7 @@ fn is_frames(path: &Path) -> bool {
     if fs::metadata(path).is_ok_and(|m| m.is_file()) {
         let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
     }
-    recorder::Replay::is_one(&start)
+    recorder::Reader::is_one(&start)
 }
 
 /// Where frames come from, in order of acquisition.

@@ -6,36 +6,36 @@ use super::recorder::Header;
 use super::{Frame, Geometry, InputError, Source, StoredType};
 use std::collections::VecDeque;
 
-pub struct Played {
+pub struct PhantomSource {
     phantom: Phantom,
     /// The volume that is computed when nothing waits.
     next: usize,
     waiting: VecDeque<Frame>,
 }
 
-impl Played {
-    pub fn new(phantom: Phantom) -> Played {
-        Played { phantom, next: 0, waiting: VecDeque::new() }
+impl PhantomSource {
+    pub fn new(phantom: Phantom) -> PhantomSource {
+        PhantomSource { phantom, next: 0, waiting: VecDeque::new() }
     }
 }
 
 /// Volumes of the phantom that were computed once and are given again and again: a source that is never late.
-pub struct Kept {
+pub struct CachedPhantom {
     header: Header,
     /// By volume, in order of acquisition.
     volumes: Vec<Vec<Frame>>,
     next: (usize, usize),
 }
 
-impl Kept {
+impl CachedPhantom {
     /// Computes all volumes of the phantom: as many bytes as they have samples.
-    pub fn new(phantom: Phantom) -> Kept {
+    pub fn new(phantom: Phantom) -> CachedPhantom {
         let volumes = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
-        Kept { header: header_of(&Played::new(phantom)), volumes, next: (0, 0) }
+        CachedPhantom { header: header_of(&PhantomSource::new(phantom)), volumes, next: (0, 0) }
     }
 }
 
-impl Source for Kept {
+impl Source for CachedPhantom {
     fn geometry(&self, volume: usize) -> Geometry {
         let backward = self.volumes.get(volume).and_then(|v| v.first()).is_some_and(|frame| frame.backward);
         if backward { self.header.backward.clone() } else { self.header.forward.clone() }
@@ -70,7 +70,7 @@ impl Source for Kept {
     }
 }
 
-impl Source for Played {
+impl Source for PhantomSource {
     fn geometry(&self, volume: usize) -> Geometry {
         Geometry::Sweep(self.phantom.probe(volume))
     }

@@ -35,7 +35,7 @@ enum Place {
 
 impl Recording {
     /// Opens a file and finds out its geometry: from the `probe` file given, else from one that lies beside the recording
-    /// ([`ProbeFile::beside`]), else from the recording itself. Unless the range of values is known, they are all read.
+    /// ([`ProbeFile::find_for`]), else from the recording itself. Unless the range of values is known, they are all read.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
         let mut contents = super::read_contents(path)?;
         let probe_file = choose_probe_file(path, probe, &mut contents)?;
@@ -189,7 +189,7 @@ impl Recording {
     }
 
     /// What the file is, for people to read: title and value. Never a patient's name or number.
-    pub fn facts(&self) -> Vec<(String, String)> {
+    pub fn description(&self) -> Vec<(String, String)> {
         let mut facts: Vec<(String, String)> = Vec::new();
         let mut say = |title: &str, value: String| facts.push((title.into(), value));
         say("format", self.format().into());
@@ -299,7 +299,7 @@ fn choose_probe_file(
     given: Option<&Path>,
     contents: &mut Contents,
 ) -> Result<Option<ProbeFile>, InputError> {
-    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::beside(path));
+    let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(path));
     let Some(found) = found else { return Ok(None) };
     if let Lines::Pictures(word) = &contents.lines {
         let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");

@@ -21,7 +21,7 @@ pub struct Sequence {
 }
 
 /// Where the geometry of a sequence goes.
-pub fn beside(path: &Path) -> PathBuf {
+pub fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
     path.with_file_name(name)
@@ -47,7 +47,7 @@ impl Sequence {
             first_backward: first.backward,
             ..Volumes::forward(frames, kept.len())
         };
-        let text = ProbeFile::text(&probe, &volumes, source.range()).map_err(|e| fault("geometry", e))?;
+        let text = ProbeFile::to_toml(&probe, &volumes, source.range()).map_err(|e| fault("geometry", e))?;
         let times = kept.iter().flat_map(|v| &v.times).enumerate();
         let times = times.filter_map(|(n, time)| time.map(|t| (n, format!("{t:?}"))));
         let size = [probe.samples, probe.lines.len(), frames * kept.len()];
@@ -189,7 +189,7 @@ pub(super) fn write_both(
     sequence.write_all(header.as_bytes()).map_err(unwritable(path))?;
     samples(&mut sequence)?;
     sequence.finish().map_err(unwritable(path))?;
-    let beside = beside(path);
+    let beside = probe_file_path(path);
     let mut geometry = Unfinished::create(&beside).map_err(unwritable(&beside))?;
     geometry.write_all(probe.as_bytes()).and_then(|()| geometry.finish()).map_err(unwritable(&beside))?;
     // The geometry first: frames never stand there without it.

@@ -2,6 +2,7 @@
 //! under which conditions, and what the thesis measured. Text is made in [`markdown`] and [`csv`]; nothing here
 //! measures.
 
+pub(crate) mod command;
 pub mod csv;
 pub mod markdown;
 pub mod measure;

@@ -1,7 +1,7 @@
 //! What is saved from the view: on threads of their own, under names that say when and never who.
 
 use crate::gpu::Wake;
-use crate::live::cine::Kept;
+use crate::live::cine::CineVolume;
 use crate::picture::Picture;
 use crate::source::recorder::{Header, Writer};
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ impl Exporter {
     ///
     /// # Errors
     /// As of [`Exporter::picture`].
-    pub fn volumes(&mut self, header: Header, volumes: Vec<Kept>) -> Result<(), String> {
+    pub fn volumes(&mut self, header: Header, volumes: Vec<CineVolume>) -> Result<(), String> {
         self.save("frames", move |file| {
             let mut writer = Writer::create(file, header).map_err(|e| e.to_string())?;
             let mut frames = volumes.iter().flat_map(|kept| &kept.frames);

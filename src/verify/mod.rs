@@ -7,6 +7,7 @@
 pub mod against;
 pub mod built_in;
 mod check;
+pub(crate) mod command;
 mod compared;
 pub mod drawn;
 pub mod failing;

@@ -10,7 +10,7 @@ use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
 use crate::reference;
 use crate::scene::{Input, Scene};
-use crate::source::phantom::{Options, Phantom};
+use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::verify::report::{Fault, Figure, Level, Shown, Unit, Worst};
 use glam::DVec3;
 
@@ -157,7 +157,7 @@ fn ball(p: DVec3) -> f64 {
 }
 
 fn head(toml: &str) -> Result<(Scene, Vec<Texels>), String> {
-    let phantom = Phantom::new(Options { frames: 19, lines: 48, samples: 96, ..Options::default() });
+    let phantom = Phantom::new(PhantomOptions { frames: 19, lines: 48, samples: 96, ..PhantomOptions::default() });
     let phantom = phantom.map_err(|e| e.to_string())?;
     let scene = scene(Geometry::Sweep(phantom.probe(0)), Input { ..BYTES }, toml)?;
     let [width, height] = scene.frame_size().map(|n| n as usize);

@@ -93,12 +93,12 @@ fn a_signal_ends_verify_with_what_it_found() {
     let mut error = String::new();
     child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said:?}");
-    assert!(said.iter().any(|line| line.starts_with("SIGINT: ends after this check")), "{said:?}");
+    assert!(said.iter().any(|line| line.starts_with("SIGINT: stopping after this check")), "{said:?}");
     let run = json::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
     let all = run.outcomes.len() - 1;
     let last = &run.outcomes[all];
     assert_eq!((last.name.as_str(), last.verdict), ("every check was run", Verdict::Failed));
-    assert_eq!(error.trim_end(), format!("echolume: SIGINT came before all {all} checks were run"));
+    assert_eq!(error.trim_end(), format!("echolume: SIGINT ended the run before all {all} checks were done"));
     let stopped = run.outcomes.iter().filter(|o| o.verdict == Verdict::LeftOut && o.notes == ["not run: SIGINT"]);
     assert!(stopped.count() > 20, "{:?}", run.outcomes);
     let document = fs::read_to_string(&junit).expect("written");

@@ -158,7 +158,7 @@ fn a_recording_that_cannot_be_made_is_a_failure() {
     let folder = Folder::new("full");
     let there = folder.write("there.frames", "an exam");
     let (code, _, err) = run(&[&["stream", "--source", SWEEP, "--null", "--record", &there], &SMALL[..]].concat());
-    assert!(code == Some(2) && err.contains("is there already"), "{code:?} {err}");
+    assert!(code == Some(2) && err.contains("exists already"), "{code:?} {err}");
     assert_eq!(fs::read_to_string(&there).expect("read"), "an exam");
     // A file may hold 200 kB, four of the sweep's frames.
     let limited = format!(

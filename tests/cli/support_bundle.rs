@@ -123,11 +123,11 @@ fn nothing_is_written_over_and_what_is_asked_for_wrongly_is_refused() {
     let config = folder.write("c.toml", "[files]\nlog = 'none.log'");
     let new = folder.path("new.tar.gz");
     for (output, config, code, named) in [
-        (&there, &config, 2, "is there already"),
+        (&there, &config, 2, "exists already"),
         (&folder.path("new.zip"), &config, 2, "must end in .tar.gz"),
         (&folder.path("none/new.tar.gz"), &config, 1, "no folder"),
-        (&new, &folder.path("none.toml"), 2, "none.toml: is no file"),
-        (&new, &folder.path(""), 2, "is no file"),
+        (&new, &folder.path("none.toml"), 2, "none.toml: is not a file"),
+        (&new, &folder.path(""), 2, "is not a file"),
     ] {
         let arguments = ["support-bundle", "-o", output, "--config", config];
         refuses(&arguments, &run(&arguments), code, &[named]);

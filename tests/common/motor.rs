@@ -2,9 +2,9 @@
 
 use super::files::MOTOR_PROBE;
 use echolume::probe::ProbeFile;
-use echolume::probe::motor::simulate::{Options, Simulator};
+use echolume::probe::motor::simulate::{Simulator, SimulatorOptions};
 use echolume::probe::motor::tmcl::{Request, command};
-use echolume::probe::motor::{MotorTable, Settings};
+use echolume::probe::motor::{MotorTable, PortSettings};
 use std::path::Path;
 use std::time::Duration;
 
@@ -14,12 +14,12 @@ pub fn table() -> MotorTable {
 
 pub fn simulated(fault: Option<&str>) -> Simulator {
     let fault = fault.map(|f| f.parse().expect("a fault's name"));
-    Simulator::start(Options { table: table(), fault, no_watchdog: false }).expect("a pseudo-terminal")
+    Simulator::start(SimulatorOptions { table: table(), fault, no_watchdog: false }).expect("a pseudo-terminal")
 }
 
-pub fn settings(simulator: &Simulator, timeout_ms: u64) -> Settings {
+pub fn settings(simulator: &Simulator, timeout_ms: u64) -> PortSettings {
     let path = simulator.path().to_str().expect("a plain name");
-    Settings { timeout: Duration::from_millis(timeout_ms), ..Settings::new(path) }
+    PortSettings { timeout: Duration::from_millis(timeout_ms), ..PortSettings::new(path) }
 }
 
 /// The module was told to stop after the last thing that moves it.

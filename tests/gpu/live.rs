@@ -99,27 +99,27 @@ pub fn speckled(number: u32) -> Vec<Frame> {
 }
 
 /// Drives a stream to its end; `each` looks at it after each picture.
-pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Shown)) -> Vec<String> {
+pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::FinishedPicture)) -> Vec<String> {
     let (mut faults, begun) = (Vec::new(), Instant::now());
     loop {
         assert!(begun.elapsed() < Duration::from_secs(300), "the stream does not end");
         match stream.step(Duration::from_millis(20)).expect("step") {
             Step::Picture(shown) => each(stream, shown),
             Step::Fault(fault) => faults.push(fault),
-            Step::Went => {}
+            Step::Progress => {}
             Step::End(None) => return faults,
             Step::End(Some(why)) => panic!("{why}"),
         }
     }
 }
 
-pub fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::Options) -> Stream {
+pub fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::StreamOptions) -> Stream {
     // Where each frame is shown there is time for a picture between some of them.
     let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
     stream_of(device, Told(events.into(), pause, true), settings, options)
 }
 
-pub fn stream_of(device: &Device, source: Told, settings: Settings, options: live::Options) -> Stream {
+pub fn stream_of(device: &Device, source: Told, settings: Settings, options: live::StreamOptions) -> Stream {
     let feed = Feed::new(Box::new(source), None).expect("thread");
     Stream::new(device, feed, settings, options)
 }
@@ -138,7 +138,12 @@ fn a_whole_volume_is_never_mixed() {
     for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
         let playing = Playing::new(queues);
         let device = &playing.device;
-        let options = live::Options { update: Update::Whole, images, queues: Some(queues), ..live::Options::default() };
+        let options = live::StreamOptions {
+            update: Update::Whole,
+            images,
+            queues: Some(queues),
+            ..live::StreamOptions::default()
+        };
         let source = Told(events(header(0.3), (0..12).flat_map(stamped)).into(), Duration::ZERO, waits);
         let settings = settings("mode = 'mip'\nslices.everything = true");
         let mut stream = stream_of(device, source, settings, options);
@@ -174,7 +179,7 @@ fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
         (Update::Rolling, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
         (Update::Whole, "mode = 'orthogonal'"),
     ] {
-        let options = live::Options { update, ..live::Options::default() };
+        let options = live::StreamOptions { update, ..live::StreamOptions::default() };
         let mut stream = stream(&device, events(header(0.3), (0..10).flat_map(speckled)), settings(toml), options);
         let count = || {
             let counts = &device.counts;
@@ -199,7 +204,8 @@ fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
         let playing = Playing::new(queues);
         let device = &playing.device;
         let toml = "mode = 'vr'\nslices.smooth = { elevation = 1.0 }";
-        let options = live::Options { update: Update::Rolling, queues: Some(queues), ..live::Options::default() };
+        let options =
+            live::StreamOptions { update: Update::Rolling, queues: Some(queues), ..live::StreamOptions::default() };
         let mut last = None;
         let mut stream = stream(device, events(header(0.3), (0..4).flat_map(speckled)), settings(toml), options);
         run(&mut stream, |_, shown| last = Some((shown.volume, shown.picture)));

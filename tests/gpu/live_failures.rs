@@ -38,7 +38,7 @@ fn what_is_wrong_is_said_and_left_out() {
     let frame =
         |n| Frame { volume: 4, number: n, slice: n as usize, backward: false, time: None, bytes: vec![45; 48 * 20] };
     events.extend((0..7).map(|n| Event::Frame(frame(n))));
-    let mut stream = stream(&device, events, settings("mode = 'mip'"), live::Options::default());
+    let mut stream = stream(&device, events, settings("mode = 'mip'"), live::StreamOptions::default());
     let mut shown = Vec::new();
     let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
     assert_eq!(shown.last(), Some(&4), "{shown:?}: {faults:?}");
@@ -64,7 +64,7 @@ fn what_is_wrong_is_said_and_left_out() {
 fn other_settings_are_drawn_of_the_volume_that_is_there() {
     let device = Device::new();
     let mut stream =
-        stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::Options::default());
+        stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::StreamOptions::default());
     let mut first = None;
     while first.is_none() {
         if let Step::Picture(shown) = stream.step(Duration::from_millis(20)).expect("step") {
@@ -84,7 +84,7 @@ fn other_settings_are_drawn_of_the_volume_that_is_there() {
 fn a_lost_device_costs_a_volume_and_not_the_stream() {
     use echolume::gpu::faults::Seam;
     let (device, other) = (Device::new(), Device::new());
-    let options = live::Options::default();
+    let options = live::StreamOptions::default();
     let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
     let (mut shown, mut lost) = (Vec::new(), 0);
     loop {
@@ -122,7 +122,7 @@ fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
     };
     let mut events = events(header(0.3), []);
     events.extend((0..3).flat_map(stamped).flat_map(lines));
-    let mut stream = stream(&device, events, settings(toml), live::Options::default());
+    let mut stream = stream(&device, events, settings(toml), live::StreamOptions::default());
     let mut shown = Vec::new();
     let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
     assert_eq!((faults, shown), (vec![], vec![0, 1, 2]));
@@ -136,7 +136,7 @@ fn settings_that_need_frames_again_show_whole_volumes_only() {
     for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
         let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));
         let source = Told(events(header(0.0), (0..80).flat_map(speckled)).into(), Duration::from_millis(2), false);
-        let mut stream = stream_of(&device, source, before, live::Options::default());
+        let mut stream = stream_of(&device, source, before, live::StreamOptions::default());
         let (mut pictures, mut frames, mut checked) = (0, 0, 0);
         // On a busy machine most volumes pass while one is drawn.
         while checked < 3 {

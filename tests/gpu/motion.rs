@@ -43,7 +43,7 @@ fn a_linear_field_is_reproduced_in_both_directions_to_1e_12() {
                 slice: noise.range(0.0, (probe.slices.len() - 1) as f64),
             };
             let place = probe.to_space(at);
-            let (_, _, position) = probe.unswept(place);
+            let (_, _, position) = probe.inverse_sweep_map(place);
             let found = probe.to_indices(place);
             let mut sum = 0.0;
             for corner in 0..8u32 {
@@ -151,7 +151,7 @@ fn seen(scene: &Scene, probe: &Probe, value: &dyn Fn(f64) -> f64, x: usize, y: u
     let place = origin + direction * ((scene.low.y + scene.high.y) / 2.0 - origin.y);
     let at = probe.to_indices(place);
     let inside = |i: f64, n: usize| i >= 0.01 && i <= n as f64 - 1.01;
-    let (_, _, position) = probe.unswept(place);
+    let (_, _, position) = probe.inverse_sweep_map(place);
     (inside(at.line, probe.lines.len()) && inside(at.slice, probe.slices.len()) && inside(at.sample, probe.samples))
         .then(|| value(position))
 }
@@ -219,7 +219,7 @@ fn a_ball_swept_both_ways_does_not_move() {
 /// The phantom's ball, swept forth and back with the motor moving: the two distance maps, in one view.
 #[test]
 fn the_phantom_stands_still_between_sweeps_forth_and_back() {
-    use echolume::source::phantom::{Body, Options as Made, Phantom, Truth};
+    use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Truth};
     let device = Device::new();
     let made =
         Made { body: Body::Sphere, volumes: 2, both_ways: true, speckle: false, speed_ratio: 0.9, ..Made::default() };

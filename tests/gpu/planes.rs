@@ -231,7 +231,7 @@ fn echo(scene: &Scene, probe: &Probe, volume: &Texels, p: DVec3) -> Option<f64> 
     let at = probe.to_indices(p);
     let inside = |v: f64, n: usize| v >= 0.0 && v <= (n - 1) as f64;
     let within = p.cmpge(scene.low).all() && p.cmple(scene.high).all();
-    let (x, y, _) = probe.unswept(p);
+    let (x, y, _) = probe.inverse_sweep_map(p);
     let [i, j] = [(x - scene.grid.origin[0]) / scene.grid.pitch[0], (y - scene.grid.origin[1]) / scene.grid.pitch[1]];
     let counts =
         inside(at.sample, probe.samples) && inside(at.line, probe.lines.len()) && inside(at.slice, probe.slices.len());

@@ -133,7 +133,7 @@ pub fn centroid(probe: &Probe, scene: &Scene, volume: &Texels, truth: DVec3) -> 
         for row in 0..volume.size[1] {
             for column in 0..volume.size[0] {
                 let (x, y) = scene.grid.place(column as f64, row as f64);
-                let place = probe.swept(x, y, probe.slices.at(k as f64));
+                let place = probe.sweep_map(x, y, probe.slices.at(k as f64));
                 if place.distance(truth) < 5.0 {
                     // Voxels of a fan grow with the distance from its axis.
                     near.push((place, volume.one(column, row, k), y - probe.axis_depth()));

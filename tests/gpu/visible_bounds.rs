@@ -33,7 +33,7 @@ fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     match &scene.geometry {
         Geometry::Cartesian(grid) => Some(std::array::from_fn(|a| (place[a] - grid.origin[a]) / grid.spacing[a])),
         Geometry::Sweep(probe) => {
-            let (x, y, _) = probe.unswept(place);
+            let (x, y, _) = probe.inverse_sweep_map(place);
             let at = probe.to_indices(place);
             let within = |index: f64, count: usize| index >= 0.0 && index <= (count - 1) as f64;
             let inside = within(at.sample, probe.samples)

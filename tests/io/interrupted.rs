@@ -5,11 +5,11 @@ use crate::common::files::Folder;
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::own_process;
 use echolume::live::Feed;
-use echolume::probe::motor::{Drive, Sweep, Turning};
+use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
 use echolume::source::live::Event;
-use echolume::source::motor_tracking::{self, Clock, FreeRunning, Swept};
+use echolume::source::motor_tracking::{self, Clock, FreeRunning, MotorTracked};
 use echolume::source::phantom;
-use echolume::source::recorder::Replay;
+use echolume::source::recorder::Reader;
 use rustix::process::{Signal, getpid, kill_process};
 use std::time::{Duration, Instant};
 
@@ -25,12 +25,12 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
     let simulator = simulated(None);
     let drive = Drive::open(&settings(&simulator, 2000), &table()).expect("opened");
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
-    let motor = Turning::start(drive, sweep, false).expect("a sweep that it can do");
-    let options = phantom::Options { volumes: 2, lines: 16, samples: 16, ..phantom::Options::default() };
+    let motor = BackgroundSweep::start(drive, sweep, false).expect("a sweep that it can do");
+    let options = phantom::PhantomOptions { volumes: 2, lines: 16, samples: 16, ..phantom::PhantomOptions::default() };
     let phantom = FreeRunning::phantom(options, motor.speed()).expect("a phantom");
     let source = FreeRunning::new(phantom, motor.watch().clone());
-    let options = motor_tracking::Options { clock: Clock::Arrival { delay: 0.0 }, holds: false };
-    let feed = Feed::new(Box::new(Swept::new(Box::new(source), motor, options)), Some(&file)).expect("a thread");
+    let options = motor_tracking::MotorTrackingOptions { clock: Clock::Arrival { delay: 0.0 }, holds: false };
+    let feed = Feed::new(Box::new(MotorTracked::new(Box::new(source), motor, options)), Some(&file)).expect("a thread");
 
     let (begun, mut frames) = (Instant::now(), 0);
     let end = loop {
@@ -49,6 +49,6 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
     assert_eq!(end, None, "nothing has failed");
     assert!(stopped_at_last(&simulator.received()), "the motor was told to stop");
     drop(feed);
-    let replay = Replay::open(&file).expect("a recording");
+    let replay = Reader::open(&file).expect("a recording");
     assert!(!replay.rebuilt() && replay.frames() >= 20, "{} frames", replay.frames());
 }

@@ -4,7 +4,7 @@ use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
 use crate::common::program::run;
 use echolume::probe::{Advance, Axis, Geometry, Grid, Probe};
-use echolume::source::recorder::{Header, Replay, Writer};
+use echolume::source::recorder::{Header, Reader, Writer};
 use echolume::source::{Frame, Source, StoredType};
 use proptest::prelude::*;
 use std::path::Path;
@@ -54,7 +54,7 @@ fn written(path: &Path, finished: bool) {
     }
 }
 
-fn all(replay: &mut Replay) -> Vec<(Frame, f64)> {
+fn all(replay: &mut Reader) -> Vec<(Frame, f64)> {
     let mut all = Vec::new();
     while let Some(frame) = replay.next_frame().expect("read") {
         all.push((frame, replay.arrived()));
@@ -68,7 +68,7 @@ fn every_frame_comes_back_byte_for_byte_with_an_index_and_without() {
     for finished in [true, false] {
         let path = folder.join(&format!("{finished}.frames"));
         written(&path, finished);
-        let mut replay = Replay::open(&path).expect("opened");
+        let mut replay = Reader::open(&path).expect("opened");
         assert_eq!((replay.rebuilt(), replay.damaged(), replay.lost()), (!finished, 0, 0));
         assert_eq!(replay.header(), &header());
         assert_eq!((replay.volumes(), replay.frames_per_volume(), replay.frames()), (3, 5, 15));
@@ -114,7 +114,7 @@ fn wherever_the_writing_stops_every_whole_frame_is_there() {
     let cut = folder.join("cut.frames");
     for length in (0..whole.len()).step_by(7).chain([first, first + record - 1, first + record, whole.len() - 1]) {
         std::fs::write(&cut, &whole[..length]).expect("written");
-        match Replay::open(&cut) {
+        match Reader::open(&cut) {
             Ok(mut replay) => {
                 let there = ((length - first) / record).min(15);
                 assert_eq!(all(&mut replay), frames()[..there], "cut at {length}");
@@ -140,7 +140,7 @@ fn a_damaged_frame_hides_no_other() {
         let first = bytes.len() - if finished { 8 + 12 * 15 + 16 } else { 0 } - 15 * record;
         bytes[first + 6 * record + 100] ^= 4;
         std::fs::write(&path, &bytes).expect("written");
-        let mut replay = Replay::open(&path).expect("opened");
+        let mut replay = Reader::open(&path).expect("opened");
         let mut expected = frames();
         expected.remove(6);
         assert_eq!(all(&mut replay), expected);
@@ -163,7 +163,7 @@ fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
     }
     assert!(Writer::create(&path, header()).is_err_and(|e| e.field() == "file"), "it is there already");
     writer.finish().expect("finished");
-    assert_eq!(Replay::open(&path).expect("opened").frames(), 1);
+    assert_eq!(Reader::open(&path).expect("opened").frames(), 1);
     let grid = |size| Geometry::Cartesian(Grid { size, spacing: [1.0; 3], origin: [0.0; 3] });
     for (header, field) in [
         (Header { range: [1.0, 1.0], ..header() }, "range"),
@@ -207,7 +207,7 @@ proptest! {
         }
         bytes.truncate(bytes.len().saturating_sub(cut % 700));
         std::fs::write(&path, &bytes).expect("written");
-        if let Ok(mut replay) = Replay::open(&path) {
+        if let Ok(mut replay) = Reader::open(&path) {
             let originals = frames();
             for frame in all(&mut replay) {
                 prop_assert!(originals.contains(&frame), "a frame that was never written");

@@ -58,7 +58,7 @@ fn texel(scene: &Scene, p: DVec3) -> ([f64; 3], bool) {
             ([i, j, (p.z - volume.origin[2]) / volume.spacing[2]], true)
         }
         Geometry::Sweep(probe) => {
-            let (x, y, _) = probe.unswept(p);
+            let (x, y, _) = probe.inverse_sweep_map(p);
             let at = probe.to_indices(p);
             let within = |v: f64, count: usize| v >= 0.0 && v <= (count - 1) as f64;
             let inside = within(at.sample, probe.samples)

@@ -17,11 +17,11 @@ fn straight(grid: &Grid, slice: f64) -> DAffine3 {
     DAffine3::from_mat3_translation(scale, first)
 }
 
-fn options() -> Options {
-    Options { widest_hole: 0.0, ..Options::default() }
+fn options() -> CompoundingOptions {
+    CompoundingOptions { widest_hole: 0.0, ..CompoundingOptions::default() }
 }
 
-fn compounder(grid: Grid, stored: StoredType, options: Options) -> Compounder {
+fn compounder(grid: Grid, stored: StoredType, options: CompoundingOptions) -> Compounder {
     Compounder::new(Lattice::straight(grid), stored, options).unwrap()
 }
 
@@ -51,7 +51,7 @@ fn an_untouched_pose_does_not_move_or_blur_a_pixel() {
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     for splat in [Splat::Nearest, Splat::Trilinear] {
         for overlap in [Overlap::Mean, Overlap::Latest, Overlap::Maximum] {
-            let mut compounder = compounder(grid, StoredType::U16, Options { splat, overlap, ..options() });
+            let mut compounder = compounder(grid, StoredType::U16, CompoundingOptions { splat, overlap, ..options() });
             let pushed = compounder.push(&frame(straight(&grid, 3.0), [5, 4], StoredType::U16, &bytes));
             assert_eq!(pushed, Ok(20));
             for (n, value) in volume(&mut compounder).into_iter().enumerate() {
@@ -181,7 +181,8 @@ fn holes_up_to_the_width_are_bridged_and_wider_ones_stay_empty() {
     for (stored, low, high) in [(StoredType::U8, 40.0, 200.0), (StoredType::F32, -8.0, 8.0)] {
         for gap in 1..=5usize {
             let grid = grid([4, 4, 12], 0.5);
-            let mut compounder = compounder(grid, stored, Options { widest_hole: 1.5, ..Options::default() });
+            let mut compounder =
+                compounder(grid, stored, CompoundingOptions { widest_hole: 1.5, ..CompoundingOptions::default() });
             for (slice, value) in [(2, low), (3 + gap, high)] {
                 let values = floats(&[value; 16]);
                 compounder.push(&frame(straight(&grid, slice as f64), [4, 4], StoredType::F32, &values)).unwrap();
@@ -205,7 +206,8 @@ fn holes_up_to_the_width_are_bridged_and_wider_ones_stay_empty() {
 #[test]
 fn only_slices_near_a_frame_are_given_out_again() {
     let grid = grid([4, 3, 20], 1.0);
-    let mut compounder = compounder(grid, StoredType::U8, Options { widest_hole: 2.0, ..Options::default() });
+    let mut compounder =
+        compounder(grid, StoredType::U8, CompoundingOptions { widest_hole: 2.0, ..CompoundingOptions::default() });
     assert!(compounder.changed_slices().is_empty());
     let push = |compounder: &mut Compounder, slice: f64, value: u8| {
         compounder.push(&frame(straight(&grid, slice), [4, 3], StoredType::U8, &[value; 12])).unwrap()
@@ -229,14 +231,14 @@ fn only_slices_near_a_frame_are_given_out_again() {
 fn the_latest_and_the_largest_are_not_the_mean() {
     let grid = grid([2, 2, 2], 1.0);
     for (overlap, expected) in [(Overlap::Mean, 20.0), (Overlap::Latest, 10.0), (Overlap::Maximum, 30.0)] {
-        let mut compounder = compounder(grid, StoredType::U8, Options { overlap, ..options() });
+        let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { overlap, ..options() });
         for value in [20, 30, 10] {
             compounder.push(&frame(straight(&grid, 0.0), [2, 2], StoredType::U8, &[value; 4])).unwrap();
         }
         assert_eq!(volume(&mut compounder)[..4], [expected; 4], "{overlap:?}");
     }
     // Half way between two slices: within a frame it is still the mean.
-    let mut compounder = compounder(grid, StoredType::U8, Options { overlap: Overlap::Latest, ..options() });
+    let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { overlap: Overlap::Latest, ..options() });
     for value in [80, 10] {
         compounder.push(&frame(straight(&grid, 0.5), [2, 2], StoredType::U8, &[value; 4])).unwrap();
     }
@@ -285,7 +287,7 @@ fn no_unusable_frame_changes_the_volume_or_goes_uncounted() {
     for (size, count) in [([0, 4], 0), ([4, 4], 15), ([4, 4], 17), ([1 << 40, 1 << 40], 16)] {
         assert!(compounder.push(&frame(good, size, StoredType::U8, &vec![9; count])).is_err());
     }
-    let counts = Counts { refused: 13, ..Counts::default() };
+    let counts = CompoundingCounts { refused: 13, ..CompoundingCounts::default() };
     assert_eq!(compounder.counts(), counts);
     assert!(volume(&mut compounder).iter().all(|v| *v == 0.0));
     // AsyncPipelineCompiler the volume, and back in it with pixels that are no numbers.
@@ -293,7 +295,7 @@ fn no_unusable_frame_changes_the_volume_or_goes_uncounted() {
     assert_eq!(compounder.push(&frame(away, [4, 4], StoredType::U8, &[9; 16])), Ok(0));
     let bytes = floats(&[1.0, f32::NAN, f32::INFINITY, -1e31]);
     assert_eq!(compounder.push(&frame(good, [2, 2], StoredType::F32, &bytes)), Ok(1));
-    assert_eq!(compounder.counts(), Counts { frames: 2, outside: 1, pixels: 3, ..counts });
+    assert_eq!(compounder.counts(), CompoundingCounts { frames: 2, outside: 1, pixels: 3, ..counts });
     assert_eq!(volume(&mut compounder).iter().sum::<f32>(), 1.0);
     // A pixel alone.
     let one = with(&|p| p.translation += 0.5);
@@ -309,7 +311,7 @@ fn what_is_clipped_off_is_not_compounded() {
         ([4, 0, 1, 1], None),
         ([0, 0, 0, 4], None),
     ] {
-        let mut compounder = compounder(grid, StoredType::U8, Options { clip: Some(clip), ..options() });
+        let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { clip: Some(clip), ..options() });
         let bytes: Vec<u8> = (0..16).collect();
         let pushed = compounder.push(&frame(straight(&grid, 0.0), [4, 4], StoredType::U8, &bytes));
         assert_eq!(pushed.is_ok(), expected.is_some(), "{pushed:?}");
@@ -327,7 +329,7 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
         Pose { to_space: DAffine3::from_mat3_translation(scaled, start), size: [101, 201] }
     };
     let poses: Vec<Pose> = (0..11).map(|k| pose(f64::from(k))).collect();
-    let options = Options { margin: 1.0, ..Options::default() };
+    let options = CompoundingOptions { margin: 1.0, ..CompoundingOptions::default() };
     let lattice = Lattice::around(&poses, &options).unwrap();
     let grid = lattice.grid;
     // 20 x 20 x 10 mm and 1 mm on either side.
@@ -346,12 +348,12 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     }
     // Coarser until it fits, and not much coarser than that.
     for most in [100_000, 1000, 1] {
-        let options = Options { most_voxels: most, spacing: Some(0.05), ..options.clone() };
+        let options = CompoundingOptions { most_voxels: most, spacing: Some(0.05), ..options.clone() };
         let Grid { size, spacing, .. } = Lattice::around(&poses, &options).unwrap().grid;
         let count: usize = size.iter().product();
         assert!(count <= most && spacing[0] == spacing[2] && (most == 1 || count > most / 3), "{size:?}");
     }
-    let clipped = Options { clip: Some([50, 100, 1, 1]), margin: 0.0, ..options.clone() };
+    let clipped = CompoundingOptions { clip: Some([50, 100, 1, 1]), margin: 0.0, ..options.clone() };
     assert_eq!(Lattice::around(&poses[..1], &clipped).unwrap().grid.size, [1; 3]);
     let none = Pose { to_space: DAffine3::NAN, size: [4, 4] };
     assert!(Lattice::around(&[none], &options).unwrap_err().contains("none of 1 poses"));
@@ -362,11 +364,11 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     let (both, first) = (Lattice::around(&[poses[0], back], &options), Lattice::around(&poses[..1], &options));
     assert!((both.unwrap().to_volume.matrix3 - first.unwrap().to_volume.matrix3).abs_diff_eq(DMat3::ZERO, 1e-9));
     for wrong in [
-        Options { margin: -1.0, ..options.clone() },
-        Options { margin: f64::NAN, ..options.clone() },
-        Options { spacing: Some(0.0), ..options.clone() },
-        Options { spacing: Some(f64::INFINITY), ..options.clone() },
-        Options { clip: Some([500, 0, 1, 1]), ..options.clone() },
+        CompoundingOptions { margin: -1.0, ..options.clone() },
+        CompoundingOptions { margin: f64::NAN, ..options.clone() },
+        CompoundingOptions { spacing: Some(0.0), ..options.clone() },
+        CompoundingOptions { spacing: Some(f64::INFINITY), ..options.clone() },
+        CompoundingOptions { clip: Some([500, 0, 1, 1]), ..options.clone() },
     ] {
         assert!(Lattice::around(&poses, &wrong).is_err(), "{wrong:?}");
     }
@@ -377,11 +379,15 @@ fn a_volume_that_is_too_large_is_refused_before_anything_is_allocated() {
     let huge = usize::MAX;
     for (grid, options, named) in [
         (grid([1 << 21, 1 << 21, 1 << 21], 1.0), options(), "at most 33554432"),
-        (grid([1 << 12, 1 << 12, 1 << 12], 1.0), Options { most_voxels: huge, ..options() }, "at most 2147483648"),
+        (
+            grid([1 << 12, 1 << 12, 1 << 12], 1.0),
+            CompoundingOptions { most_voxels: huge, ..options() },
+            "at most 2147483648",
+        ),
         (grid([4, 0, 4], 1.0), options(), "size"),
         (grid([4, 4, 4], f64::NAN), options(), "spacing"),
-        (grid([4, 4, 4], 1.0), Options { widest_hole: 65.0, ..options() }, "widest hole"),
-        (grid([4, 4, 4], 1.0), Options { widest_hole: f64::NAN, ..options() }, "widest hole"),
+        (grid([4, 4, 4], 1.0), CompoundingOptions { widest_hole: 65.0, ..options() }, "widest hole"),
+        (grid([4, 4, 4], 1.0), CompoundingOptions { widest_hole: f64::NAN, ..options() }, "widest hole"),
     ] {
         let refused = Compounder::new(Lattice::straight(grid), StoredType::U8, options).err().unwrap();
         assert!(refused.contains(named) && refused.lines().count() == 1, "{refused}");
@@ -403,7 +409,7 @@ proptest! {
         values in prop::collection::vec(any::<f32>(), 64),
     ) {
         let grid = Grid { size: [5, 6, 7], spacing: [1.0; 3], origin: [-2.0; 3] };
-        let options = Options { splat, overlap, clip, most_voxels: 20_000, ..Options::default() };
+        let options = CompoundingOptions { splat, overlap, clip, most_voxels: 20_000, ..CompoundingOptions::default() };
         let mut compounder = compounder(grid, StoredType::F32, options.clone());
         let mut poses = Vec::new();
         for numbers in numbers.chunks(12) {

@@ -3,20 +3,20 @@
 
 use crate::common::files::Folder;
 use echolume::probe::{Advance, Geometry, Indices, Probe};
-use echolume::source::phantom::{Body, DYNAMIC_RANGE, Options, Phantom, Truth};
+use echolume::source::phantom::{Body, DYNAMIC_RANGE, Phantom, PhantomOptions, Truth};
 use echolume::source::{Frame, Recording};
 use std::fs;
 
 /// A small sweep: the tests need no more.
-fn small(body: Body) -> Options {
-    Options { body, frames: 9, lines: 48, samples: 256, ..Options::default() }
+fn small(body: Body) -> PhantomOptions {
+    PhantomOptions { body, frames: 9, lines: 48, samples: 256, ..PhantomOptions::default() }
 }
 
-fn phantom(options: Options) -> Phantom {
+fn phantom(options: PhantomOptions) -> Phantom {
     Phantom::new(options).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn bytes(options: Options) -> Vec<u8> {
+fn bytes(options: PhantomOptions) -> Vec<u8> {
     phantom(options).volume(0).into_iter().flat_map(|frame| frame.bytes).collect()
 }
 
@@ -36,8 +36,8 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     for body in Body::ALL {
         let first = bytes(small(body));
         assert!(first == bytes(small(body)), "{body}");
-        assert!(first != bytes(Options { seed: 2, ..small(body) }), "{body}");
-        let bare = |seed| bytes(Options { seed, speckle: false, ..small(body) });
+        assert!(first != bytes(PhantomOptions { seed: 2, ..small(body) }), "{body}");
+        let bare = |seed| bytes(PhantomOptions { seed, speckle: false, ..small(body) });
         assert!(bare(1) == bare(2), "{body}: the seed is the speckle's alone");
     }
 }
@@ -55,7 +55,7 @@ fn the_number_of_threads_does_not_show() {
 /// Rayleigh in amplitude, Fisher-Tippett in dB; the mean is 15 dB below full scale, so that neither end clips.
 #[test]
 fn speckle_is_fully_developed() {
-    let full = phantom(Options { body: Body::Constant, ..Options::default() });
+    let full = phantom(PhantomOptions { body: Body::Constant, ..PhantomOptions::default() });
     let frames = full.volume(0);
     for slice in [0, 18, 36] {
         // One frame has 512 x 128 samples: over 3000 cells of 2 pi x 1.5 x 2 samples.
@@ -82,7 +82,7 @@ const ROUNDING: f64 = 0.501;
 #[test]
 fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
     for body in [Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp] {
-        let options = Options { speckle: false, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
+        let options = PhantomOptions { speckle: false, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
         let phantom = phantom(options);
         let truth = phantom.truth();
         let mut shown = [255.0f64, 0.0];
@@ -122,7 +122,7 @@ fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
 /// With speckle too: bright where bright, dark where dark, in the mean.
 #[test]
 fn speckle_leaves_the_body_where_it_is() {
-    let phantom = phantom(Options { body: Body::Sphere, ..Options::default() });
+    let phantom = phantom(PhantomOptions { body: Body::Sphere, ..PhantomOptions::default() });
     let Truth::Sphere { centre, radius, inside, outside } = phantom.truth() else { panic!("is a sphere") };
     let mut sums = [(0.0, 0.0); 2];
     each_sample(&phantom, 0, |probe, at, grey| {
@@ -142,7 +142,7 @@ fn speckle_leaves_the_body_where_it_is() {
 /// The head moves: between volumes by more than its speckle's seed alone would show, and without speckle too.
 #[test]
 fn the_head_is_bright_in_dark_fluid_and_moves() {
-    let phantom = phantom(Options { speckle: false, volumes: 6, ..small(Body::Head) });
+    let phantom = phantom(PhantomOptions { speckle: false, volumes: 6, ..small(Body::Head) });
     let grey_at = |volume: usize, place: [f64; 3]| {
         let probe = phantom.probe(volume);
         let at = probe.to_indices(place.into());
@@ -166,7 +166,7 @@ fn read_back(recording: &mut Recording) -> Vec<Frame> {
 fn a_written_sweep_reads_back_as_it_was_made() {
     let folder = Folder::new("both-ways");
     let path = folder.join("sweep.mha");
-    let made = phantom(Options { volumes: 3, both_ways: true, speed_ratio: 0.5, ..small(Body::Head) });
+    let made = phantom(PhantomOptions { volumes: 3, both_ways: true, speed_ratio: 0.5, ..small(Body::Head) });
     made.write(&path).unwrap();
     assert!(folder.names().iter().eq(["sweep.mha", "sweep.probe.toml"]));
 
@@ -203,7 +203,7 @@ fn a_single_volume_stands_alone() {
 
 #[test]
 fn every_second_volume_goes_backwards() {
-    let options = Options { volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(Body::Constant) };
+    let options = PhantomOptions { volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(Body::Constant) };
     let phantom = phantom(options);
     let pitch = phantom.probe(0).slices.pitch();
     for (volume, sign) in [(0, 1.0), (1, -1.0)] {
@@ -225,14 +225,14 @@ fn every_second_volume_goes_backwards() {
 fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
     let ok = small(Body::Sphere);
     let wrong = [
-        (Options { volumes: 0, ..ok.clone() }, "volumes"),
-        (Options { frames: 1, ..ok.clone() }, "frames"),
-        (Options { lines: 1, ..ok.clone() }, "lines"),
-        (Options { samples: 2, ..ok.clone() }, "samples"),
-        (Options { frames: 1024, lines: 1024, samples: 8192, ..ok.clone() }, "samples"),
-        (Options { samples: usize::MAX, ..ok.clone() }, "samples"),
-        (Options { speed_ratio: 1.5, ..ok.clone() }, "speed_ratio"),
-        (Options { speed_ratio: f64::NAN, ..ok.clone() }, "speed_ratio"),
+        (PhantomOptions { volumes: 0, ..ok.clone() }, "volumes"),
+        (PhantomOptions { frames: 1, ..ok.clone() }, "frames"),
+        (PhantomOptions { lines: 1, ..ok.clone() }, "lines"),
+        (PhantomOptions { samples: 2, ..ok.clone() }, "samples"),
+        (PhantomOptions { frames: 1024, lines: 1024, samples: 8192, ..ok.clone() }, "samples"),
+        (PhantomOptions { samples: usize::MAX, ..ok.clone() }, "samples"),
+        (PhantomOptions { speed_ratio: 1.5, ..ok.clone() }, "speed_ratio"),
+        (PhantomOptions { speed_ratio: f64::NAN, ..ok.clone() }, "speed_ratio"),
     ];
     for (options, field) in wrong {
         let Err(error) = Phantom::new(options) else { panic!("{field}") };
@@ -252,7 +252,7 @@ fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
         let error = made.write(&folder.join(name)).unwrap_err().to_string();
         assert!(error.lines().count() == 1 && error.contains(name), "{error}");
     }
-    let long = phantom(Options { volumes: 10_000, ..ok });
+    let long = phantom(PhantomOptions { volumes: 10_000, ..ok });
     assert!(long.write(&folder.join("long.mha")).unwrap_err().to_string().contains("volumes"));
     assert!(folder.names().iter().eq(["folder.mha"]), "something half done is left: {:?}", folder.names());
 }

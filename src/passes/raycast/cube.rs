@@ -151,7 +151,7 @@ fn edge(scene: &Scene, others: impl Iterator<Item = Side>, normal: DVec3, place:
 /// First and last range, line and slice of the sector as seen from a place. (The motor's way over the lines of a frame turns
 /// the slices by less than a degree and is left out of their normals.)
 fn borders(probe: &Probe, place: DVec3) -> Vec<Side> {
-    let (x, y, position) = probe.unswept(place);
+    let (x, y, position) = probe.inverse_sweep_map(place);
     let (depth, sweep, mm) = match probe.motion {
         Motion::Fan { .. } => {
             let (sin, cos) = position.sin_cos();

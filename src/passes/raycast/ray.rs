@@ -266,7 +266,7 @@ impl<'a> Ray<'a> {
 /// How much longer than the scene's step a step is at a place: in proportion to the range from the array's apex.
 fn wider(scene: &Scene, place: DVec3) -> f64 {
     let Some(probe) = scene.probe() else { return 1.0 };
-    let (x, y, _) = probe.unswept(place);
+    let (x, y, _) = probe.inverse_sweep_map(place);
     1.0 + scene.settings.ray.spread * ((x.hypot(y) / spread_range(probe)).clamp(1.0, 8.0) - 1.0)
 }
 
@@ -313,7 +313,7 @@ pub(super) fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
             Some([i, j, (place.z - volume.origin[2]) / volume.spacing[2]])
         }
         Geometry::Sweep(probe) => {
-            let (x, y, _) = probe.unswept(place);
+            let (x, y, _) = probe.inverse_sweep_map(place);
             let at = probe.to_indices(place);
             let [i, j] = column(x, y);
             inside(probe, at).then_some([i, j, at.slice])

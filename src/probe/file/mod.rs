@@ -56,7 +56,7 @@ impl ProbeFile {
 
     /// The probe file beside a recording: `<stem>.probe.toml`, which is for this recording alone, or else `probe.toml`,
     /// which is for all in its folder.
-    pub fn beside(recording: &Path) -> Option<PathBuf> {
+    pub fn find_for(recording: &Path) -> Option<PathBuf> {
         let own = recording.file_stem().map(|stem| {
             let mut name = stem.to_os_string();
             name.push(".probe.toml");

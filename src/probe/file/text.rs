@@ -14,7 +14,7 @@ impl ProbeFile {
     ///
     /// # Errors
     /// A probe that no file can say: an advance that is not the motor's at an even speed, tables longer than a file may be; in words.
-    pub fn text(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
+    pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
         let gap = probe.slices.at(1.0) - probe.slices.at(0.0);
         let advance = probe.slice_position(probe.lines.len() as f64, 0.0) - probe.slice_position(0.0, 0.0);
         let speed_ratio = if probe.slices.len() > 1 { (advance / gap).abs() } else { 0.0 };
@@ -155,7 +155,7 @@ mod tests {
                 Volumes::forward(1, 3),
             ),
         ] {
-            let text = ProbeFile::text(&probe, &volumes, [3.0, 250.0]).unwrap();
+            let text = ProbeFile::to_toml(&probe, &volumes, [3.0, 250.0]).unwrap();
             let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
             let (read, there) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
             assert!(is_same(&Probe { advance: there.advance(0, &read.slices), ..read }, &probe), "{text}");
@@ -164,6 +164,6 @@ mod tests {
         }
         let astray =
             Probe { advance: crate::probe::Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
-        assert!(ProbeFile::text(&astray, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
+        assert!(ProbeFile::to_toml(&astray, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
     }
 }

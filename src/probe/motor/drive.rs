@@ -3,7 +3,7 @@
 
 use super::fault::{Fault, MotorError, Stopped};
 use super::guard::{Guard, Interrupter};
-use super::port::{Answer, Port, Settings};
+use super::port::{Answer, Port, PortSettings};
 use super::sweep::{Direction, Position, Sweep};
 use super::table::{MotorTable, Side};
 use super::tmcl::{self, Request, axis};
@@ -18,7 +18,7 @@ const LOOK_AHEAD: usize = 8;
 
 /// What the module says of itself.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Status {
+pub struct MotorStatus {
     /// Number and firmware, `TMCM-1140 firmware 1.16`.
     pub module: String,
     /// Degrees; true only after home.
@@ -44,17 +44,17 @@ impl Drive {
     ///
     /// # Errors
     /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that already turns is then stopped if it can be.
-    pub fn open(settings: &Settings, table: &MotorTable) -> Result<Drive, MotorError> {
+    pub fn open(settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let mut drive = Drive::connect("open", settings, table)?;
         let module = drive.identify();
         drive.module = drive.done("open", module)?;
         Ok(drive)
     }
 
-    fn connect(doing: &'static str, settings: &Settings, table: &MotorTable) -> Result<Drive, MotorError> {
+    fn connect(operation: &'static str, settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let path = settings.path.clone();
         let port = Port::open(settings);
-        let port = port.map_err(|fault| MotorError { port: path, doing, fault, stopped: Stopped::NotMoved })?;
+        let port = port.map_err(|fault| MotorError { port: path, operation, fault, stopped: Stopped::NotMoved })?;
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
 
@@ -62,7 +62,7 @@ impl Drive {
     ///
     /// # Errors
     /// Any [`Fault`] of the port.
-    pub fn status(&mut self) -> Result<Status, MotorError> {
+    pub fn status(&mut self) -> Result<MotorStatus, MotorError> {
         let status = self.read_status();
         self.done("status", status)
     }
@@ -102,7 +102,7 @@ impl Drive {
     ///
     /// # Errors
     /// As [`Drive::stop`], and [`Fault::NotOpened`].
-    pub fn stop_at(settings: &Settings, table: &MotorTable) -> Result<(), MotorError> {
+    pub fn stop_at(settings: &PortSettings, table: &MotorTable) -> Result<(), MotorError> {
         Drive::connect("stop", settings, table)?.stop()
     }
 
@@ -115,14 +115,14 @@ impl Drive {
         let path = self.guard.port().settings().path.clone();
         if stopped != Stopped::Confirmed {
             let fault = Fault::NoReply { request: "MST".into(), timeout: self.guard.port().settings().timeout };
-            return Err(MotorError { port: path, doing: "stop", fault, stopped });
+            return Err(MotorError { port: path, operation: "stop", fault, stopped });
         }
         let stands = self.wait_still();
         self.done("stop", stands)
     }
 
-    fn done<T>(&mut self, doing: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
-        result.map_err(|fault| self.guard.fail(doing, fault))
+    fn done<T>(&mut self, operation: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
+        result.map_err(|fault| self.guard.fail(operation, fault))
     }
 
     pub(super) fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
@@ -154,9 +154,9 @@ impl Drive {
         }
     }
 
-    fn read_status(&mut self) -> Result<Status, Fault> {
+    fn read_status(&mut self) -> Result<MotorStatus, Fault> {
         let (position, velocity) = (self.get(axis::POSITION)?, self.get(axis::SPEED)?);
-        Ok(Status {
+        Ok(MotorStatus {
             module: self.module.clone(),
             angle: self.table.angle(position),
             speed: self.table.speed(velocity),

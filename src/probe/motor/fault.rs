@@ -54,7 +54,7 @@ pub enum Stopped {
 pub struct MotorError {
     pub port: String,
     /// What was being done: "sweep", "home" ...
-    pub doing: &'static str,
+    pub operation: &'static str,
     pub fault: Fault,
     pub stopped: Stopped,
 }
@@ -63,7 +63,7 @@ impl std::error::Error for MotorError {}
 
 impl std::fmt::Display for MotorError {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}: {}: {}", self.port, self.doing, self.fault)?;
+        write!(f, "{}: {}: {}", self.port, self.operation, self.fault)?;
         match &self.stopped {
             Stopped::NotMoved => Ok(()),
             Stopped::Confirmed => write!(f, ". The motor was stopped"),

@@ -116,13 +116,13 @@ impl Guard {
     }
 
     /// Stops the motor after a fault and says so.
-    pub fn fail(&mut self, doing: &'static str, fault: Fault) -> MotorError {
+    pub fn fail(&mut self, operation: &'static str, fault: Fault) -> MotorError {
         // A motor that was not moved from here is stopped all the same: another program may have left it turning.
         let harmless = matches!(fault, Fault::OutOfRange(_)) && !self.moving;
         let stopped = if harmless { Stopped::NotMoved } else { self.stop() };
         // It was tried three times: once more on drop would only take longer.
         self.moving = false;
-        MotorError { port: self.port.settings().path.clone(), doing, fault, stopped }
+        MotorError { port: self.port.settings().path.clone(), operation, fault, stopped }
     }
 }
 

@@ -17,7 +17,7 @@ const TRIES: usize = 3;
 
 /// How to reach the module. TMCL modules come with 9600 baud, no parity, one stop bit.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct PortSettings {
     /// `/dev/ttyUSB0`, `COM3`.
     pub path: String,
     /// Bits a second.
@@ -28,9 +28,9 @@ pub struct Settings {
     pub timeout: Duration,
 }
 
-impl Settings {
-    pub fn new(path: impl Into<String>) -> Settings {
-        Settings {
+impl PortSettings {
+    pub fn new(path: impl Into<String>) -> PortSettings {
+        PortSettings {
             path: path.into(),
             baud: 9600,
             parity: Parity::None,
@@ -60,7 +60,7 @@ pub struct Answer {
 /// An open serial port.
 pub struct Port {
     serial: Box<dyn SerialPort>,
-    settings: Settings,
+    settings: PortSettings,
     /// An earlier reply may still be on its way.
     late: bool,
 }
@@ -70,7 +70,7 @@ impl Port {
     ///
     /// # Errors
     /// [`Fault::NotOpened`].
-    pub fn open(settings: &Settings) -> Result<Port, Fault> {
+    pub fn open(settings: &PortSettings) -> Result<Port, Fault> {
         let builder = serialport::new(&settings.path, settings.baud)
             .parity(settings.parity)
             .stop_bits(settings.stop_bits)
@@ -79,7 +79,7 @@ impl Port {
         Ok(Port { serial, settings: settings.clone(), late: false })
     }
 
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &PortSettings {
         &self.settings
     }
 

@@ -102,13 +102,13 @@ pub struct Position {
 
 /// Where a frame lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
+pub enum ArrayState {
     /// Within a pass.
-    Pass { angle: f64, direction: Direction, pass: usize },
+    Sweeping { angle: f64, direction: Direction, pass: usize },
     /// Near a turning point: the angle is between those of two passes, the direction is not known.
-    Turning { angle: f64 },
+    Reversing { angle: f64 },
     /// Before the first or after the last position, or within a gap.
-    Outside,
+    Unknown,
 }
 
 /// Positions over time.
@@ -159,24 +159,24 @@ impl Track {
 
     /// Where the array was at a time, linearly between the two positions around it. The error is at most a dt^2 / 8 for an
     /// acceleration a and positions dt apart: 0.1 deg for 8000 deg/s2 and 10 ms.
-    pub fn at(&self, time: f64) -> Place {
+    pub fn at(&self, time: f64) -> ArrayState {
         let after = self.positions.partition_point(|p| p.time < time);
-        let Some(b) = self.positions.get(after) else { return Place::Outside };
+        let Some(b) = self.positions.get(after) else { return ArrayState::Unknown };
         if b.time == time {
-            return Place::Pass { angle: b.angle, direction: b.direction, pass: b.pass };
+            return ArrayState::Sweeping { angle: b.angle, direction: b.direction, pass: b.pass };
         }
-        let Some(a) = after.checked_sub(1).and_then(|i| self.positions.get(i)) else { return Place::Outside };
+        let Some(a) = after.checked_sub(1).and_then(|i| self.positions.get(i)) else { return ArrayState::Unknown };
         let gap = b.time - a.time;
         if gap.is_nan() || gap > self.longest_gap || time.is_nan() {
-            return Place::Outside;
+            return ArrayState::Unknown;
         }
         let angle = a.angle + (b.angle - a.angle) * ((time - a.time) / gap);
         // Against the direction of its pass the array only swings.
         let along = (b.angle - a.angle) * a.direction.sign() > 0.0;
         if a.pass == b.pass && along {
-            Place::Pass { angle, direction: a.direction, pass: a.pass }
+            ArrayState::Sweeping { angle, direction: a.direction, pass: a.pass }
         } else {
-            Place::Turning { angle }
+            ArrayState::Reversing { angle }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The volume around tracked frames: which way its axes point, and how far it goes.
 
-use super::Options;
+use super::CompoundingOptions;
 use super::pose::{Part, Pose};
 use crate::probe::Grid;
 use glam::{DAffine3, DMat3, DVec3};
@@ -34,7 +34,7 @@ impl Lattice {
     ///
     /// # Errors
     /// No pose is left, or no length, or nothing coarse enough; in words.
-    pub fn around(poses: &[Pose], options: &Options) -> Result<Lattice, String> {
+    pub fn around(poses: &[Pose], options: &CompoundingOptions) -> Result<Lattice, String> {
         let length = |what, mm: f64, least: f64| match (least..=1e6).contains(&mm) {
             true => Ok(()),
             false => Err(format!("{what} {mm} mm: must be a length of at most 1e6 mm")),

@@ -59,7 +59,7 @@ pub enum Overlap {
 
 /// How frames are compounded.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct CompoundingOptions {
     pub splat: Splat,
     pub overlap: Overlap,
     /// Widest gap that is bridged, mm; at most 64 voxels. 0: none.
@@ -73,9 +73,9 @@ pub struct Options {
     pub most_voxels: usize,
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options {
+impl Default for CompoundingOptions {
+    fn default() -> CompoundingOptions {
+        CompoundingOptions {
             splat: Splat::default(),
             overlap: Overlap::default(),
             widest_hole: 2.0,
@@ -89,7 +89,7 @@ impl Default for Options {
 
 /// What became of the frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct CompoundingCounts {
     /// Compounded.
     pub frames: u64,
     /// Of the compounded: those of which no pixel lies in the volume.
@@ -106,7 +106,7 @@ pub struct Counts {
 pub struct Compounder {
     lattice: Lattice,
     stored: StoredType,
-    options: Options,
+    options: CompoundingOptions,
     voxels: Voxels,
     sticks: Sticks,
     /// Hit since they were last given out.
@@ -114,7 +114,7 @@ pub struct Compounder {
     /// As they were last given out; empty: zero all over.
     slices: Vec<Vec<u8>>,
     zero: Vec<u8>,
-    counts: Counts,
+    counts: CompoundingCounts,
 }
 
 impl Compounder {
@@ -122,7 +122,7 @@ impl Compounder {
     ///
     /// # Errors
     /// A lattice or options that cannot be, or more voxels than the options allow; in words, before anything is allocated.
-    pub fn new(lattice: Lattice, stored: StoredType, options: Options) -> Result<Compounder, String> {
+    pub fn new(lattice: Lattice, stored: StoredType, options: CompoundingOptions) -> Result<Compounder, String> {
         let grid = &lattice.grid;
         grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
         if !lattice.to_volume.is_finite() {
@@ -138,7 +138,17 @@ impl Compounder {
         let voxels = Voxels::new(grid.size, options.overlap);
         let zero = vec![0; x * y * stored.bytes()];
         let (touched, slices) = (vec![false; z], vec![Vec::new(); z]);
-        Ok(Compounder { lattice, stored, options, voxels, sticks, touched, slices, zero, counts: Counts::default() })
+        Ok(Compounder {
+            lattice,
+            stored,
+            options,
+            voxels,
+            sticks,
+            touched,
+            slices,
+            zero,
+            counts: CompoundingCounts::default(),
+        })
     }
 
     pub fn lattice(&self) -> &Lattice {
@@ -149,7 +159,7 @@ impl Compounder {
         self.stored
     }
 
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> CompoundingCounts {
         self.counts
     }
 

@@ -1,7 +1,7 @@
 //! A connection that is kept up by a thread of its own, and the queue that the thread fills.
 
 use super::decode::{BODY_LIMIT, Decoded, decode};
-use super::error::Refused;
+use super::error::DecodeError;
 use super::message::Message;
 use super::queue::{Queue, Received};
 use crate::source::error::escaped;
@@ -30,7 +30,7 @@ const LONGEST: usize = 600;
 
 /// How a [`Client`] behaves. Every number may be anything; zeros make little sense but do no harm: tries take and are apart 10 ms at least.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ClientOptions {
     /// How long one address may take to answer.
     pub connect_timeout: Duration,
     /// How long a message that has begun may stand still before the connection is given up.
@@ -48,9 +48,9 @@ pub struct Options {
     pub queue_bytes: usize,
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options {
+impl Default for ClientOptions {
+    fn default() -> ClientOptions {
+        ClientOptions {
             connect_timeout: Duration::from_secs(2),
             stall_timeout: Duration::from_secs(5),
             silence_timeout: Duration::from_secs(30),
@@ -65,7 +65,7 @@ impl Default for Options {
 
 /// What has happened since the client was made.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Statistics {
+pub struct ClientStatistics {
     /// There is a connection now.
     pub connected: bool,
     /// Decoded, of all types.
@@ -103,7 +103,7 @@ struct Shared {
 
 struct State {
     queue: Queue,
-    statistics: Statistics,
+    statistics: ClientStatistics,
     connections: u64,
     last_error: Option<String>,
     socket: Option<TcpStream>,
@@ -124,10 +124,10 @@ impl Client {
     ///
     /// # Errors
     /// The operating system starts no thread.
-    pub fn connect(address: &str, options: Options) -> io::Result<Client> {
+    pub fn connect(address: &str, options: ClientOptions) -> io::Result<Client> {
         let state = State {
             queue: Queue::new(options.queue_messages, options.queue_bytes),
-            statistics: Statistics::default(),
+            statistics: ClientStatistics::default(),
             connections: 0,
             last_error: None,
             socket: None,
@@ -161,7 +161,7 @@ impl Client {
         }
     }
 
-    pub fn statistics(&self) -> Statistics {
+    pub fn statistics(&self) -> ClientStatistics {
         self.shared.lock().statistics.clone()
     }
 
@@ -213,7 +213,7 @@ impl Shared {
         self.changed.wait_timeout(state, most).unwrap_or_else(PoisonError::into_inner).0
     }
 
-    fn run(&self, address: &str, options: &Options) {
+    fn run(&self, address: &str, options: &ClientOptions) {
         let first_wait = options.first_wait.max(SHORTEST);
         let mut wait = first_wait;
         while !self.lock().stop {
@@ -240,7 +240,7 @@ impl Shared {
         }
     }
 
-    fn open(&self, address: &str, options: &Options) -> io::Result<TcpStream> {
+    fn open(&self, address: &str, options: &ClientOptions) -> io::Result<TcpStream> {
         let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
         for address in address.to_socket_addrs()?.take(ADDRESSES) {
             if self.lock().stop {
@@ -263,7 +263,7 @@ impl Shared {
     }
 
     /// Until the connection breaks, or cannot be understood any more, or the client is dropped.
-    fn receive(&self, stream: &TcpStream, options: &Options) -> Ended {
+    fn receive(&self, stream: &TcpStream, options: &ClientOptions) -> Ended {
         let mut input = BufReader::with_capacity(1 << 16, stream);
         // Never more than one message, so that none has to be moved.
         let mut bytes = Vec::new();
@@ -278,9 +278,9 @@ impl Shared {
                     clear(&mut bytes);
                     continue;
                 }
-                Err(Refused::Framing { error }) => {
+                Err(DecodeError::Framing { error }) => {
                     self.lock().statistics.lost_framing += 1;
-                    return Ended { why: Refused::Framing { error }.to_string(), useful };
+                    return Ended { why: DecodeError::Framing { error }.to_string(), useful };
                 }
                 Err(passed_over) => {
                     self.pass_over(&passed_over);
@@ -326,11 +326,11 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    fn pass_over(&self, refused: &Refused) {
+    fn pass_over(&self, refused: &DecodeError) {
         let mut state = self.lock();
         match refused {
-            Refused::Checksum { .. } => state.statistics.checksum_failures += 1,
-            Refused::Content { .. } | Refused::Framing { .. } => state.statistics.malformed += 1,
+            DecodeError::Checksum { .. } => state.statistics.checksum_failures += 1,
+            DecodeError::Content { .. } | DecodeError::Framing { .. } => state.statistics.malformed += 1,
         }
         state.last_error = Some(refused.to_string());
     }

@@ -1,11 +1,11 @@
 //! From bytes to a message. Any bytes give one, a number of bytes that are still missing, or a fault.
 
 use super::crc::crc64;
-use super::error::{Fault, MessageError, Refused};
+use super::error::{DecodeError, Fault, MessageError};
 use super::fields::{Fields, until_nul};
 use super::header::{HEADER, Header};
 use super::image::Image;
-use super::message::{Message, Other, Status, Text, Tool, ToolKind, Tracked, Transform};
+use super::message::{Message, Other, Status, Text, Tool, ToolKind, TrackingData, Transform};
 
 /// The largest body that is accepted unless asked otherwise, bytes.
 pub const BODY_LIMIT: usize = 256 << 20;
@@ -29,10 +29,11 @@ pub enum Decoded {
 /// before the whole body is: never more than the bytes that came.
 ///
 /// # Errors
-/// [`Refused`] says what is wrong in one line, and how many bytes to skip if the next message can be found.
-pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, Refused> {
+/// [`DecodeError`] says what is wrong in one line, and how many bytes to skip if the next message can be found.
+pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     let Some(head) = bytes.first_chunk::<HEADER>() else { return Ok(Decoded::Need(HEADER - bytes.len())) };
-    let framing = |kind: &str, device: &str, fault| Refused::Framing { error: MessageError::new(kind, device, fault) };
+    let framing =
+        |kind: &str, device: &str, fault| DecodeError::Framing { error: MessageError::new(kind, device, fault) };
     let header = Header::read(head).map_err(|fault| framing("header", "", fault))?;
     let body = header.accepted(limit).map_err(|fault| framing(&header.kind, &header.device, fault))?;
     let rest = &bytes[HEADER..];
@@ -42,11 +43,11 @@ pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, Refused> {
     let crc = crc64(body);
     if crc != header.crc {
         let fault = format!("is {:016x}, must be {crc:016x} for these {} bytes", header.crc, body.len());
-        return Err(Refused::Checksum { length, error: error(Fault::new("checksum", fault)) });
+        return Err(DecodeError::Checksum { length, error: error(Fault::new("checksum", fault)) });
     }
     match read(&header, body) {
         Ok(message) => Ok(Decoded::Message { message, length }),
-        Err(fault) => Err(Refused::Content { length, error: error(fault) }),
+        Err(fault) => Err(DecodeError::Content { length, error: error(fault) }),
     }
 }
 
@@ -65,7 +66,7 @@ fn read(header: &Header, body: &[u8]) -> Result<Message, Fault> {
                 return Err(Fault::new("tools", format!("are {} bytes, must be {TOOL} each", content.len())));
             }
             let tools = content.chunks_exact(TOOL).map(tool).collect::<Result<_, _>>()?;
-            Message::Tracked(Tracked { device, time, tools })
+            Message::TrackingData(TrackingData { device, time, tools })
         }
         "IMAGE" => Message::Image(Image::read(device, time, content)?),
         "STATUS" => {

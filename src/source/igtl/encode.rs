@@ -52,7 +52,7 @@ fn write(message: &Message, version: Version, body: &mut Vec<u8>) -> Result<(), 
     }
     match message {
         Message::Transform(m) => matrix(body, &m.matrix)?,
-        Message::Tracked(m) => {
+        Message::TrackingData(m) => {
             for tool in &m.tools {
                 name(body, "tool's name", &tool.name, 20)?;
                 body.extend([tool.kind.number(), 0]);

@@ -33,7 +33,7 @@ impl MessageError {
 
 /// Why bytes gave no message, and what is left to be done with them.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
+pub enum DecodeError {
     /// The body is not the one that was sent. The next message begins `length` bytes on.
     #[error("{error}")]
     Checksum { length: usize, error: MessageError },
@@ -46,10 +46,12 @@ pub enum Refused {
     Framing { error: MessageError },
 }
 
-impl Refused {
+impl DecodeError {
     pub fn error(&self) -> &MessageError {
         match self {
-            Refused::Checksum { error, .. } | Refused::Content { error, .. } | Refused::Framing { error } => error,
+            DecodeError::Checksum { error, .. }
+            | DecodeError::Content { error, .. }
+            | DecodeError::Framing { error } => error,
         }
     }
 }

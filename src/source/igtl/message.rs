@@ -6,7 +6,7 @@ use super::image::Image;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
     Transform(Transform),
-    Tracked(Tracked),
+    TrackingData(TrackingData),
     Image(Image),
     Status(Status),
     Text(Text),
@@ -26,7 +26,7 @@ pub struct Transform {
 
 /// TDATA: the poses of a tracker's tools at one time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tracked {
+pub struct TrackingData {
     pub device: String,
     /// Since 1970, s; 0: not stamped.
     pub time: f64,
@@ -34,7 +34,7 @@ pub struct Tracked {
     pub tools: Vec<Tool>,
 }
 
-/// One tool of a [`Tracked`].
+/// One tool of a [`TrackingData`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tool {
     /// At most 20 bytes on the wire.
@@ -115,7 +115,7 @@ impl Message {
     pub fn device(&self) -> &str {
         match self {
             Message::Transform(m) => &m.device,
-            Message::Tracked(m) => &m.device,
+            Message::TrackingData(m) => &m.device,
             Message::Image(m) => &m.device,
             Message::Status(m) => &m.device,
             Message::Text(m) => &m.device,
@@ -127,7 +127,7 @@ impl Message {
     pub fn time(&self) -> f64 {
         match self {
             Message::Transform(m) => m.time,
-            Message::Tracked(m) => m.time,
+            Message::TrackingData(m) => m.time,
             Message::Image(m) => m.time,
             Message::Status(m) => m.time,
             Message::Text(m) => m.time,
@@ -139,7 +139,7 @@ impl Message {
     pub fn kind(&self) -> &str {
         match self {
             Message::Transform(_) => "TRANSFORM",
-            Message::Tracked(_) => "TDATA",
+            Message::TrackingData(_) => "TDATA",
             Message::Image(_) => "IMAGE",
             Message::Status(_) => "STATUS",
             Message::Text(_) => "STRING",
@@ -150,7 +150,7 @@ impl Message {
     /// Bytes of memory, about.
     pub(super) fn weight(&self) -> usize {
         let held = match self {
-            Message::Tracked(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
+            Message::TrackingData(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
             Message::Image(m) => m.bytes.len(),
             Message::Status(m) => m.name.len() + m.text.len(),
             Message::Text(m) => m.text.len(),

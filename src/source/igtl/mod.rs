@@ -19,14 +19,14 @@ mod network;
 mod pairing;
 mod queue;
 
-pub use client::{Client, Options, PORT, Statistics};
+pub use client::{Client, ClientOptions, ClientStatistics, PORT};
 pub use crc::crc64;
 pub use decode::{BODY_LIMIT, Decoded, decode};
 pub use encode::{Version, encode};
-pub use error::{MessageError, Refused};
+pub use error::{DecodeError, MessageError};
 pub use header::HEADER;
 pub use image::{Coordinates, Image, Region, Scalar};
-pub use message::{Message, Other, Status, Text, Tool, ToolKind, Tracked, Transform};
+pub use message::{Message, Other, Status, Text, Tool, ToolKind, TrackingData, Transform};
 pub use network::{Network, NetworkOptions, Poses};
-pub use pairing::{Paired, Pairing, PairingCounts};
+pub use pairing::{PairedFrame, Pairing, PairingCounts};
 pub use queue::Received;

@@ -30,7 +30,7 @@ pub struct Pairing {
 
 /// A frame and where it was.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Paired {
+pub struct PairedFrame {
     pub image: Image,
     /// The TRANSFORM at the frame's time, mm: from the space that the image's own matrix leads to.
     pub pose: DAffine3,
@@ -76,13 +76,13 @@ impl Pairing {
     }
 
     /// The frames that this message settles, which may be none; messages of other types settle nothing.
-    pub fn push(&mut self, message: Message) -> Vec<Paired> {
+    pub fn push(&mut self, message: Message) -> Vec<PairedFrame> {
         let wanted = self.device.clone();
         match message {
             Message::Transform(m) if wanted.as_ref().is_none_or(|w| *w == m.device) => {
                 self.pose(m.device, m.time, &m.matrix)
             }
-            Message::Tracked(m) => match m.tools.into_iter().find(|t| wanted.as_ref() == Some(&t.name)) {
+            Message::TrackingData(m) => match m.tools.into_iter().find(|t| wanted.as_ref() == Some(&t.name)) {
                 Some(tool) => self.pose(tool.name, m.time, &tool.matrix),
                 None => return Vec::new(),
             },
@@ -97,7 +97,7 @@ impl Pairing {
     }
 
     /// The frames that still wait, with the poses that there are.
-    pub fn finish(&mut self) -> Vec<Paired> {
+    pub fn finish(&mut self) -> Vec<PairedFrame> {
         self.settle(true)
     }
 
@@ -115,7 +115,7 @@ impl Pairing {
     }
 
     /// In order: a frame that waits holds up those behind it.
-    fn settle(&mut self, at_once: bool) -> Vec<Paired> {
+    fn settle(&mut self, at_once: bool) -> Vec<PairedFrame> {
         let mut settled = Vec::new();
         while let Some(frame) = self.frames.front() {
             let full = self.frames.len() > FRAMES || self.frame_bytes > FRAME_BYTES;
@@ -132,7 +132,7 @@ impl Pairing {
                 Some((nearest, pose, interpolated)) => {
                     self.counts.paired += 1;
                     let (device, lag) = (nearest.device, image.time - nearest.time);
-                    settled.push(Paired { image, pose, device, lag, interpolated });
+                    settled.push(PairedFrame { image, pose, device, lag, interpolated });
                 }
                 None => self.counts.dropped += 1,
             }

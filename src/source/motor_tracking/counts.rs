@@ -2,7 +2,7 @@
 
 /// Of frames unless said otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct TrackingCounts {
     /// Were given a slice.
     pub placed: u64,
     /// Left out: before the sweep had begun.
@@ -25,10 +25,10 @@ pub struct Counts {
     pub incomplete: u64,
 }
 
-impl Counts {
+impl TrackingCounts {
     /// What was counted since an earlier time.
-    pub fn since(&self, before: &Counts) -> Counts {
-        Counts {
+    pub fn since(&self, before: &TrackingCounts) -> TrackingCounts {
+        TrackingCounts {
             placed: self.placed - before.placed,
             early: self.early - before.early,
             turning: self.turning - before.turning,
@@ -56,9 +56,9 @@ impl Counts {
     }
 }
 
-impl std::fmt::Display for Counts {
+impl std::fmt::Display for TrackingCounts {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        let Counts { placed, early, turning, beyond, farther, unknown, late, filled, whole, incomplete } = self;
+        let TrackingCounts { placed, early, turning, beyond, farther, unknown, late, filled, whole, incomplete } = self;
         write!(
             f,
             "{placed} frames in {whole} whole and {incomplete} incomplete passes, {filled} slices filled; left out: "
@@ -77,9 +77,17 @@ mod tests {
 
     #[test]
     fn what_is_left_out_of_plenty_is_no_fault() {
-        let plenty = Counts { placed: 9, early: 3, turning: 2, beyond: 1, farther: 7, whole: 1, ..Counts::default() };
+        let plenty = TrackingCounts {
+            placed: 9,
+            early: 3,
+            turning: 2,
+            beyond: 1,
+            farther: 7,
+            whole: 1,
+            ..TrackingCounts::default()
+        };
         assert_eq!(plenty.fault(), None);
-        let one = Counts { filled: 2, ..plenty };
+        let one = TrackingCounts { filled: 2, ..plenty };
         assert!(one.since(&plenty).fault().is_some_and(|f| f.starts_with("motor: 2 slices") && !f.contains(';')));
         assert!(one.to_string().contains("2 slices filled") && one.to_string().lines().count() == 1);
     }

@@ -1,9 +1,9 @@
 //! The phantom as a free-running probe: frame after frame as fast as sound allows, each of where the array really is.
 
-use crate::probe::motor::{Place, Watch};
+use crate::probe::motor::{ArrayState, PositionLog};
 use crate::source::live::{Event, Live, header_of};
-use crate::source::phantom::{Options, Phantom};
-use crate::source::phantom_source::Played;
+use crate::source::phantom::{Phantom, PhantomOptions};
+use crate::source::phantom_source::PhantomSource;
 use crate::source::recorder::Header;
 use crate::source::{Frame, InputError};
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ const FEWEST: usize = 16;
 /// Memory: the phantom's volumes, computed once.
 pub struct FreeRunning {
     header: Header,
-    watch: Watch,
+    watch: PositionLog,
     /// By volume and slice.
     volumes: Vec<Vec<Frame>>,
     /// Of a frame, s.
@@ -35,36 +35,36 @@ impl FreeRunning {
     ///
     /// # Errors
     /// As of [`Phantom::new`].
-    pub fn phantom(options: Options, speed: f64) -> Result<Phantom, InputError> {
-        let options = Options { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
-        let ratio = |options: &Options| {
+    pub fn phantom(options: PhantomOptions, speed: f64) -> Result<Phantom, InputError> {
+        let options = PhantomOptions { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
+        let ratio = |options: &PhantomOptions| {
             let probe = Phantom::new(options.clone())?.probe(0);
             let frame_time = probe.acquisition_time() / probe.slices.len() as f64;
             Ok(speed.to_radians() * frame_time / probe.slices.pitch())
         };
         let share = (RATIO / ratio(&options)?).min(1.0);
         let lines = ((options.lines as f64 * share) as usize).max(FEWEST);
-        let options = Options { lines, ..options };
+        let options = PhantomOptions { lines, ..options };
         let speed_ratio = ratio(&options)?.min(1.0);
-        Phantom::new(Options { speed_ratio, ..options })
+        Phantom::new(PhantomOptions { speed_ratio, ..options })
     }
 
     /// Computes the phantom's volumes. `watch`: of the motor that turns the array.
-    pub fn new(phantom: Phantom, watch: Watch) -> FreeRunning {
+    pub fn new(phantom: Phantom, watch: PositionLog) -> FreeRunning {
         let mut volumes: Vec<Vec<Frame>> = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));
         let probe = phantom.probe(0);
         let period = probe.acquisition_time() / probe.slices.len() as f64;
-        let header = header_of(&Played::new(phantom));
+        let header = header_of(&PhantomSource::new(phantom));
         FreeRunning { header, watch, volumes, period, begun: false, next: None, count: 0 }
     }
 
     /// What the array saw at a time: the frame of the nearest slice, swept the way that the array went.
     fn seen(&self, time: f64) -> Option<&Frame> {
         let (angle, pass) = match self.watch.at(time) {
-            Place::Pass { angle, pass, .. } => (angle, pass),
-            Place::Turning { angle } => (angle, 0),
-            Place::Outside => self.watch.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
+            ArrayState::Sweeping { angle, pass, .. } => (angle, pass),
+            ArrayState::Reversing { angle } => (angle, 0),
+            ArrayState::Unknown => self.watch.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
         };
         let volume = self.volumes.get(pass % self.volumes.len().max(1))?;
         let crate::probe::Geometry::Sweep(probe) = &self.header.forward else { return None };

@@ -15,13 +15,13 @@ mod counts;
 mod free;
 mod passes;
 
-pub use counts::Counts;
+pub use counts::TrackingCounts;
 pub use free::FreeRunning;
 
 use super::Frame;
 use super::live::{Event, Live};
 use super::recorder::Header;
-use crate::probe::motor::{Place, Turning};
+use crate::probe::motor::{ArrayState, BackgroundSweep};
 use crate::probe::{Advance, Axis, Geometry, Motion, Probe};
 use passes::{MOST_FILLED, Passes};
 use std::collections::VecDeque;
@@ -46,7 +46,7 @@ pub enum Clock {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
+pub struct MotorTrackingOptions {
     pub clock: Clock,
     /// The source is asked for frames only once the array sweeps, as a file can be. What runs by itself is listened to from the
     /// start: frames that waited would be taken for new ones.
@@ -56,10 +56,10 @@ pub struct Options {
 /// A free-running source whose frames the motor places.
 ///
 /// Memory: 32 frames that wait for a position, two that may be the nearest to their slice, and those that stand in for missing ones.
-pub struct Swept {
+pub struct MotorTracked {
     source: Box<dyn Live>,
-    motor: Turning,
-    options: Options,
+    motor: BackgroundSweep,
+    options: MotorTrackingOptions,
     now: Option<Now>,
     /// Frames that came, without place, and when: the time of the first line on the motor's clock, and until when they wait.
     waiting: VecDeque<(f64, Instant, Frame)>,
@@ -68,8 +68,8 @@ pub struct Swept {
     out: VecDeque<Event>,
     /// Why the source ended.
     ended: Option<Option<String>>,
-    counts: Counts,
-    told: Counts,
+    counts: TrackingCounts,
+    told: TrackingCounts,
     told_at: Instant,
     over: bool,
 }
@@ -82,9 +82,9 @@ struct Now {
     frame_bytes: usize,
 }
 
-impl Swept {
-    pub fn new(source: Box<dyn Live>, motor: Turning, options: Options) -> Swept {
-        Swept {
+impl MotorTracked {
+    pub fn new(source: Box<dyn Live>, motor: BackgroundSweep, options: MotorTrackingOptions) -> MotorTracked {
+        MotorTracked {
             source,
             motor,
             options,
@@ -93,14 +93,14 @@ impl Swept {
             lines: None,
             out: VecDeque::new(),
             ended: None,
-            counts: Counts::default(),
-            told: Counts::default(),
+            counts: TrackingCounts::default(),
+            told: TrackingCounts::default(),
             told_at: Instant::now(),
             over: false,
         }
     }
 
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> TrackingCounts {
         self.counts
     }
 
@@ -181,14 +181,14 @@ impl Swept {
             let place = self.motor.watch().at(time);
             let span = self.motor.watch().span();
             let not_yet = span.is_some_and(|(_, last)| time > last.time);
-            if place == Place::Outside && not_yet && !all && Instant::now() < until {
+            if place == ArrayState::Unknown && not_yet && !all && Instant::now() < until {
                 return;
             }
             let Some((_, _, mut frame)) = self.waiting.pop_front() else { return };
             frame.time = Some(time);
             match (place, span) {
-                (Place::Outside, None) => self.counts.early += 1,
-                (Place::Outside, Some((first, _))) if time < first.time => self.counts.early += 1,
+                (ArrayState::Unknown, None) => self.counts.early += 1,
+                (ArrayState::Unknown, Some((first, _))) if time < first.time => self.counts.early += 1,
                 _ => now.passes.frame(frame, place, &mut self.counts, &mut self.out),
             }
         }
@@ -219,7 +219,7 @@ impl Swept {
     }
 }
 
-impl Live for Swept {
+impl Live for MotorTracked {
     fn next(&mut self, patience: Duration) -> Event {
         let until = Instant::now() + patience;
         loop {

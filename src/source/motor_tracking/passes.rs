@@ -1,8 +1,8 @@
 //! Frames of known angle become the slices of a pass. Pure.
 
-use super::Counts;
+use super::TrackingCounts;
 use crate::probe::Axis;
-use crate::probe::motor::{Direction, Place};
+use crate::probe::motor::{ArrayState, Direction};
 use crate::source::Frame;
 use crate::source::live::Event;
 use std::collections::VecDeque;
@@ -32,7 +32,7 @@ struct Pass {
 
 #[derive(Clone)]
 struct Near {
-    /// Place in the order of the pass.
+    /// ArrayState in the order of the pass.
     step: usize,
     /// rad.
     angle: f64,
@@ -52,11 +52,11 @@ impl Passes {
     }
 
     /// A frame and where the array was at its first line. What is thereby known goes `out`.
-    pub fn frame(&mut self, frame: Frame, place: Place, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    pub fn frame(&mut self, frame: Frame, place: ArrayState, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let last = self.slices.len() as f64 - 1.0;
         match place {
-            Place::Outside => counts.unknown += 1,
-            Place::Turning { angle } => {
+            ArrayState::Unknown => counts.unknown += 1,
+            ArrayState::Reversing { angle } => {
                 counts.turning += 1;
                 // At the far end of a pass it is over: nothing is gained by waiting for the next to begin.
                 let step = self.now.as_ref().map(|now| self.step(angle.to_radians(), now.direction));
@@ -64,7 +64,7 @@ impl Passes {
                     self.end(counts, out);
                 }
             }
-            Place::Pass { angle, direction, pass } => {
+            ArrayState::Sweeping { angle, direction, pass } => {
                 let newest = self.over.max(self.now.as_ref().map(|now| now.number));
                 if Some(pass) == self.over {
                     // The array stood at the end, and still moved on a little.
@@ -113,7 +113,7 @@ impl Passes {
     }
 
     /// The pass that goes on, if any, is over.
-    pub fn end(&mut self, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    pub fn end(&mut self, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let Some(mut now) = self.now.take() else { return };
         if let Some(nearest) = now.nearest.take() {
             self.give(&mut now, nearest, counts, out);
@@ -134,7 +134,7 @@ impl Passes {
     }
 
     /// Gives a frame, and before it those that stand in for missing slices: each that of the neighbour whose angle is nearer.
-    fn give(&self, now: &mut Pass, near: Near, counts: &mut Counts, out: &mut VecDeque<Event>) {
+    fn give(&self, now: &mut Pass, near: Near, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let before = now.given.take();
         let missing = before.as_ref().map_or(0, |given| given.step + 1)..near.step;
         if missing.len() <= MOST_FILLED {
@@ -189,13 +189,13 @@ mod tests {
     }
 
     /// Passes of these angles, deg, every second one backwards; frames are tagged by their place in the list.
-    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, Counts) {
-        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, TrackingCounts) {
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let mut tag = 0;
         for (pass, angles) in passes.iter().enumerate() {
             let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
             for angle in *angles {
-                all.frame(frame(tag), Place::Pass { angle: *angle, direction, pass }, &mut counts, &mut out);
+                all.frame(frame(tag), ArrayState::Sweeping { angle: *angle, direction, pass }, &mut counts, &mut out);
                 tag += 1;
             }
         }
@@ -244,8 +244,8 @@ mod tests {
 
     #[test]
     fn what_lies_half_a_pitch_beyond_the_sweep_or_at_a_turn_is_left_out_and_ends_the_pass() {
-        let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
-        let at = |angle, pass| Place::Pass { angle, direction: Direction::Forward, pass };
+        let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
+        let at = |angle, pass| ArrayState::Sweeping { angle, direction: Direction::Forward, pass };
         for angle in [-9.0, -7.01, -6.9, -4.0, -2.0, 0.0, 2.0, 4.0, 6.9] {
             all.frame(frame(0), at(angle, 0), &mut counts, &mut out);
         }
@@ -255,13 +255,13 @@ mod tests {
         for angle in [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0] {
             all.frame(frame(0), at(angle, 2), &mut counts, &mut out);
         }
-        all.frame(frame(0), Place::Turning { angle: -6.5 }, &mut counts, &mut out);
+        all.frame(frame(0), ArrayState::Reversing { angle: -6.5 }, &mut counts, &mut out);
         assert_eq!(counts.whole, 1);
-        all.frame(frame(0), Place::Turning { angle: 6.5 }, &mut counts, &mut out);
+        all.frame(frame(0), ArrayState::Reversing { angle: 6.5 }, &mut counts, &mut out);
         assert_eq!((counts.whole, counts.turning), (2, 2));
         all.frame(frame(0), at(6.0, 2), &mut counts, &mut out);
         all.frame(frame(0), at(6.0, 0), &mut counts, &mut out);
-        all.frame(frame(0), Place::Outside, &mut counts, &mut out);
+        all.frame(frame(0), ArrayState::Unknown, &mut counts, &mut out);
         assert_eq!((out.len(), counts.turning, counts.late, counts.unknown), (14, 3, 1, 1));
     }
 
@@ -271,13 +271,13 @@ mod tests {
         fn no_order_of_places_gives_a_slice_twice(
             places in prop::collection::vec((-9.0..9.0_f64, 0..4_usize, 0..6_u8), 0..200),
         ) {
-            let (mut all, mut counts, mut out) = (Passes::new(slices()), Counts::default(), VecDeque::new());
+            let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
             for (angle, pass, kind) in places {
                 let direction = if pass % 2 == 0 { Direction::Forward } else { Direction::Backward };
                 let place = match kind {
-                    0 => Place::Turning { angle },
-                    1 => Place::Outside,
-                    _ => Place::Pass { angle, direction, pass },
+                    0 => ArrayState::Reversing { angle },
+                    1 => ArrayState::Unknown,
+                    _ => ArrayState::Sweeping { angle, direction, pass },
                 };
                 all.frame(frame(0), place, &mut counts, &mut out);
             }

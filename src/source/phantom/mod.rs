@@ -40,7 +40,7 @@ const LARGEST_VOLUME: usize = 1 << 25;
 
 /// What is to be made.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct PhantomOptions {
     /// Other seeds give other speckle; the body stays.
     pub seed: u64,
     pub body: Body,
@@ -60,9 +60,9 @@ pub struct Options {
     pub samples: usize,
 }
 
-impl Default for Options {
-    fn default() -> Options {
-        Options {
+impl Default for PhantomOptions {
+    fn default() -> PhantomOptions {
+        PhantomOptions {
             seed: 1,
             body: Body::Head,
             volumes: 1,
@@ -76,9 +76,9 @@ impl Default for Options {
     }
 }
 
-/// Options that were checked, and the probe that they make. Frames are computed when asked for.
+/// PhantomOptions that were checked, and the probe that they make. Frames are computed when asked for.
 pub struct Phantom {
-    options: Options,
+    options: PhantomOptions,
     /// Swept forwards, without its advance.
     probe: Probe,
     volumes: Volumes,
@@ -87,7 +87,7 @@ pub struct Phantom {
 
 impl Phantom {
     /// Refuses what cannot be swept, on one line.
-    pub fn new(options: Options) -> Result<Phantom, InputError> {
+    pub fn new(options: PhantomOptions) -> Result<Phantom, InputError> {
         let whole = |field, value: usize, least: usize, most: usize| match (least..=most).contains(&value) {
             true => Ok(()),
             false => Err(refusal(field, format!("is {value}, must lie in {least}..={most}"))),
@@ -128,7 +128,7 @@ impl Phantom {
         Ok(phantom)
     }
 
-    pub fn options(&self) -> &Options {
+    pub fn options(&self) -> &PhantomOptions {
         &self.options
     }
 

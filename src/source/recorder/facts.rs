@@ -1,16 +1,16 @@
 //! What is in a file of frames, in words.
 
-use super::Replay;
+use super::Reader;
 use crate::probe::Geometry;
 use crate::source::describe::{self, number};
 use crate::source::{InputError, SampleType, Source};
 
-impl Replay {
+impl Reader {
     /// What the file is, for people to read: title and value. Goes through all frames once, since only then is it known which are whole.
     ///
     /// # Errors
     /// What the operating system says.
-    pub fn facts(mut self) -> Result<Vec<(String, String)>, InputError> {
+    pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let found = self.gone_through()?;
         let mut facts: Vec<(String, String)> = Vec::new();
         let mut say = |title: &str, value: String| facts.push((title.into(), value));

@@ -18,7 +18,7 @@ mod facts;
 mod read;
 mod write;
 
-pub use read::Replay;
+pub use read::Reader;
 pub use write::Writer;
 
 use super::StoredType;
@@ -81,7 +81,7 @@ impl Header {
         if of(&self.forward) != of(&self.backward) {
             return Err(("backward", "has frames of another size or number than forward".into()));
         }
-        if !self.forward.is_but_for_advance(&self.backward) {
+        if !self.forward.equals_except_advance(&self.backward) {
             return Err(("backward", "differs from forward in more than the motor's way during a frame".into()));
         }
         if self.frame_bytes().is_none() {

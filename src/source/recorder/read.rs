@@ -17,7 +17,7 @@ const MOST_ENTRIES: u64 = 1 << 24;
 const WIDEST_GAP: u64 = 1 << 30;
 
 /// A file of frames that is read.
-pub struct Replay {
+pub struct Reader {
     path: PathBuf,
     file: File,
     header: Header,
@@ -32,7 +32,7 @@ pub struct Replay {
     rebuilt: bool,
 }
 
-impl Replay {
+impl Reader {
     /// Whether a file begins as ours do.
     pub fn is_one(start: &[u8]) -> bool {
         start.starts_with(MAGIC)
@@ -40,7 +40,7 @@ impl Replay {
 
     /// # Errors
     /// A file that cannot be read, is of another format or version, or whose header is damaged.
-    pub fn open(path: &Path) -> Result<Replay, InputError> {
+    pub fn open(path: &Path) -> Result<Reader, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let mut file = File::open(path).map_err(unreadable)?;
@@ -48,7 +48,7 @@ impl Replay {
         let mut start = [0; 16];
         file.read_exact(&mut start).map_err(|_| fault("header", "the file ends before it".into()))?;
         let word = |at: usize| u32::from_le_bytes([start[at], start[at + 1], start[at + 2], start[at + 3]]);
-        if !Replay::is_one(&start) {
+        if !Reader::is_one(&start) {
             return Err(fault("file", "is no file of frames".into()));
         }
         let (version, size) = (word(8), word(12));
@@ -72,7 +72,7 @@ impl Replay {
         }
         let header: Header = serde_json::from_slice(text).map_err(|e| fault("header", e.to_string()))?;
         header.check().map_err(|(field, wrong)| fault(field, wrong))?;
-        let mut replay = Replay {
+        let mut replay = Reader {
             path: path.into(),
             file,
             header,
@@ -224,7 +224,7 @@ fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
     Some((frame, time(32)?))
 }
 
-impl Source for Replay {
+impl Source for Reader {
     fn geometry(&self, volume: usize) -> Geometry {
         // Which way it was swept, its first frame says; that is looked up without moving on.
         let backward = self.volumes.get(volume).is_some_and(|n| self.backward(*n));
@@ -280,7 +280,7 @@ impl Source for Replay {
     }
 }
 
-impl Replay {
+impl Reader {
     /// Whether a frame was swept backwards; what cannot be read was not.
     fn backward(&self, n: usize) -> bool {
         let mut flags = [0; 4];

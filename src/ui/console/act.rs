@@ -29,14 +29,14 @@ impl Console {
     }
 
     fn on_screen(&mut self, command: &Command, now: Instant) {
-        let count = self.stream.cine().kept().len();
+        let count = self.stream.cine().volumes().len();
         match *command {
             Command::Freeze => {
                 self.playing = None;
                 self.stream.freeze(!self.stream.is_frozen());
             }
             Command::Cine(by) => {
-                let at = self.stream.cine_place().unwrap_or(count.saturating_sub(1)) as i64 + i64::from(by);
+                let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1)) as i64 + i64::from(by);
                 self.look_back(at.clamp(0, count.saturating_sub(1) as i64) as usize);
                 self.touched.get_or_insert(now);
             }
@@ -69,17 +69,17 @@ impl Console {
     fn look_back(&mut self, place: usize) {
         self.playing = None;
         self.stream.freeze(true);
-        self.stream.show_kept(place);
+        self.stream.show_cine_volume(place);
     }
 
     /// The next volume of a loop that is played, when it is due.
     pub(super) fn play(&mut self, now: Instant) {
-        let (Some(due), count) = (self.playing, self.stream.cine().kept().len()) else { return };
+        let (Some(due), count) = (self.playing, self.stream.cine().volumes().len()) else { return };
         if count < 2 {
             self.playing = None;
-        } else if now >= due && !self.stream.is_looking_back() {
-            let next = self.stream.cine_place().map_or(0, |place| (place + 1) % count);
-            self.stream.show_kept(next);
+        } else if now >= due && !self.stream.is_replaying() {
+            let next = self.stream.cine_position().map_or(0, |place| (place + 1) % count);
+            self.stream.show_cine_volume(next);
             self.playing = Some((due + LOOP).max(now));
         }
     }
@@ -95,7 +95,7 @@ impl Console {
     }
 
     fn save_loop(&mut self) {
-        let kept: Vec<_> = self.stream.cine().kept().iter().cloned().collect();
+        let kept: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
         let saved = match self.stream.header() {
             Some(header) if !kept.is_empty() => {
                 let header = header.clone();

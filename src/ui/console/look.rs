@@ -103,7 +103,7 @@ impl Console {
             hud: self.hud,
             is_frozen: self.stream.is_frozen(),
             is_playing: self.playing.is_some(),
-            cine: (self.stream.cine().kept().len(), self.stream.cine_place()),
+            cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
             is_drawn,
             quality,
             budget: self.pace.budget(),

@@ -21,7 +21,7 @@ use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
 use crate::scene::Settings;
 use std::path::PathBuf;
@@ -41,7 +41,7 @@ pub struct Options {
     /// Volume images that take turns, 2 or 3.
     pub images: u32,
     pub queues: Option<usize>,
-    pub cine: Room,
+    pub cine: CineLimits,
     /// Time of a picture that is held while the view moves.
     pub budget: Option<Duration>,
     pub rungs: Vec<Rung>,
@@ -76,7 +76,7 @@ impl Options {
             update: Update::Whole,
             images: 3,
             queues: None,
-            cine: Room::default(),
+            cine: CineLimits::default(),
             budget: None,
             rungs: super::quality_ladder::built_in(),
             retry: None,
@@ -195,7 +195,7 @@ impl Console {
         let is_panelled = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
         controls.resize(panels::place(size, options.scale, is_panelled).1);
-        let streamed = live::Options {
+        let streamed = live::StreamOptions {
             update: options.update,
             images: options.images,
             queues: options.queues,

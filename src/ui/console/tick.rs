@@ -1,7 +1,7 @@
 //! One turn of the console: what came goes in, what is due is drawn, and what was drawn is shown.
 
 use super::{Console, ConsoleError, Next};
-use crate::live::{Feed, Shown, Step, StreamError};
+use crate::live::{Feed, FinishedPicture, Step, StreamError};
 use std::time::{Duration, Instant};
 
 /// The stream has so long at a time before hands are asked again.
@@ -26,7 +26,7 @@ impl Console {
             self.next.renews |= (amiss.is_mended)();
         }
         if let Some(feed) = self.supply.poll(now).filter(|_| self.amiss.is_none()) {
-            self.stream.listen_to(feed);
+            self.stream.replace_source(feed);
             (self.heard, self.stale) = (now, true);
         }
         while let Some(saved) = self.keep.poll() {
@@ -81,7 +81,7 @@ impl Console {
                     break;
                 }
                 Ok(Step::Fault(fault)) => self.say(&fault, true),
-                Ok(Step::Went) => {}
+                Ok(Step::Progress) => {}
                 Ok(Step::End(why)) => self.ended(why, now),
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
                 // One that fails whatever comes is as good as lost.
@@ -113,11 +113,11 @@ impl Console {
             tracing::warn!("source: {why}");
         }
         self.supply.ended(why, now);
-        self.stream.listen_to(Feed::none());
+        self.stream.replace_source(Feed::none());
         self.stale = true;
     }
 
-    fn drew(&mut self, shown: &Shown) {
+    fn drew(&mut self, shown: &FinishedPicture) {
         self.fresh = true;
         self.pace.took(self.rung, shown.took);
         self.times.pictures.add(shown.took);

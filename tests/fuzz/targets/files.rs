@@ -1,7 +1,7 @@
 //! Recordings.
 
 use super::{told, written};
-use echolume::source::recorder::Replay;
+use echolume::source::recorder::Reader;
 use echolume::source::{InputError, Recording, Source};
 use std::path::Path;
 
@@ -34,7 +34,7 @@ fn outcome(result: Result<String, InputError>) -> String {
 
 fn recording(path: &Path, probe: Option<&Path>) -> String {
     outcome(Recording::open(path, probe).and_then(|recording| {
-        let _ = recording.facts();
+        let _ = recording.description();
         read(recording)
     }))
 }
@@ -52,9 +52,9 @@ pub fn kretz(bytes: &[u8]) -> String {
 pub fn frames(bytes: &[u8]) -> String {
     let once = |bytes: &[u8]| {
         let path = written("input.frames", bytes);
-        outcome(Replay::open(&path).and_then(|replay| {
+        outcome(Reader::open(&path).and_then(|replay| {
             let whole = read(replay)?;
-            Replay::open(&path)?.facts().map(|_| whole)
+            Reader::open(&path)?.description().map(|_| whole)
         }))
     };
     let mut right = bytes.to_vec();

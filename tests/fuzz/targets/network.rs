@@ -2,8 +2,8 @@
 
 use super::{Bytes, told};
 use echolume::source::igtl::{
-    Coordinates, Decoded, HEADER, Image, Message, Pairing, Refused, Region, Scalar, Tool, ToolKind, Tracked, Transform,
-    Version, crc64, decode, encode,
+    Coordinates, DecodeError, Decoded, HEADER, Image, Message, Pairing, Region, Scalar, Tool, ToolKind, TrackingData,
+    Transform, Version, crc64, decode, encode,
 };
 use echolume::source::live::{Event, Live};
 use echolume::source::piped::Piped;
@@ -35,8 +35,8 @@ fn stream(mut bytes: &[u8]) -> String {
                 round_trip(&message);
                 length
             }
-            Err(Refused::Framing { error }) => return outcome + &told(error),
-            Err(Refused::Checksum { length, error } | Refused::Content { length, error }) => {
+            Err(DecodeError::Framing { error }) => return outcome + &told(error),
+            Err(DecodeError::Checksum { length, error } | DecodeError::Content { length, error }) => {
                 outcome += &told(error);
                 length
             }
@@ -69,7 +69,7 @@ pub fn pairing(bytes: &[u8]) -> String {
             0 => Message::Transform(Transform { device, time, matrix }),
             1 => {
                 let tools = vec![Tool { name: device.clone(), kind: ToolKind::SixD, matrix }];
-                Message::Tracked(Tracked { device, time, tools })
+                Message::TrackingData(TrackingData { device, time, tools })
             }
             _ => {
                 let size = [2, 1, if kind < 250 { 1 } else { 2 }];

@@ -3,7 +3,7 @@
 use super::{Bytes, told};
 use echolume::probe::Grid;
 use echolume::source::StoredType;
-use echolume::source::freehand::{Compounder, Lattice, Options, Overlap, Pose, Splat, TrackedFrame};
+use echolume::source::freehand::{Compounder, CompoundingOptions, Lattice, Overlap, Pose, Splat, TrackedFrame};
 use glam::{DAffine3, DVec3};
 
 const MOST_VOXELS: usize = 1 << 12;
@@ -20,7 +20,7 @@ fn pose(bytes: &mut Bytes, nearly: bool) -> Pose {
 pub fn compounder(bytes: &[u8]) -> String {
     let mut bytes = Bytes(bytes);
     let stored = |n: u8| [StoredType::U8, StoredType::U16, StoredType::F32][usize::from(n % 3)];
-    let options = Options {
+    let options = CompoundingOptions {
         splat: [Splat::Nearest, Splat::Trilinear][usize::from(bytes.u8() % 2)],
         overlap: [Overlap::Mean, Overlap::Latest, Overlap::Maximum][usize::from(bytes.u8() % 3)],
         widest_hole: if bytes.u8() < 128 { 2.0 } else { bytes.number() },

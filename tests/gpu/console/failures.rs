@@ -35,7 +35,7 @@ fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
     desk.console.command(&Command::Turn([20.0, 5.0]), Instant::now());
     desk.rest();
     assert!(last.as_ref() != Some(&desk.picture()));
-    assert_eq!(desk.console.stream().cine().kept().len(), 3, "volumes of three sources");
+    assert_eq!(desk.console.stream().cine().volumes().len(), 3, "volumes of three sources");
 }
 
 /// Prevents a sleeve from ending a kiosk, and a kiosk that cannot be ended.

@@ -1,7 +1,7 @@
 //! From what hands do to the picture that shows it: the same, byte for byte, as one that is drawn of the same settings by itself.
 
 use super::*;
-use echolume::source::recorder::Replay;
+use echolume::source::recorder::Reader;
 
 const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
 
@@ -81,7 +81,10 @@ fn the_keys_of_time_freeze_look_back_and_play() {
     ] {
         desk.press(key);
         desk.rest();
-        assert!(desk.console.stream().cine_place() == Some(place) && desk.picture() == seen[place], "{key:?}: {place}");
+        assert!(
+            desk.console.stream().cine_position() == Some(place) && desk.picture() == seen[place],
+            "{key:?}: {place}"
+        );
     }
     desk.press(Key::Enter);
     let (mut places, begun, mut now) = (Vec::new(), Instant::now(), Instant::now());
@@ -90,7 +93,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
         let next = desk.tick(now);
         let stream = desk.console.stream();
         if stream.is_idle() {
-            places.extend(stream.cine_place().filter(|place| places.last() != Some(place)));
+            places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
             // The time at which it asks to be asked again comes at once.
             now = next.at.expect("a loop goes on").max(now);
         }
@@ -117,7 +120,7 @@ fn what_is_saved_is_what_is_seen_and_kept() {
     desk.press(Key::Char('p'));
     desk.press(Key::Char('r'));
     assert!(folder.wait("png", |file| Picture::load(file).ok()) == seen[1]);
-    let mut replay = folder.wait("frames", |file| Replay::open(file).ok().filter(|r| !r.rebuilt() && r.frames() == 27));
+    let mut replay = folder.wait("frames", |file| Reader::open(file).ok().filter(|r| !r.rebuilt() && r.frames() == 27));
     assert!(*replay.header() == header(0.3));
     use echolume::source::Source;
     for expected in (0..3).flat_map(body).collect::<Vec<_>>().chunks(9) {

@@ -10,13 +10,13 @@ use echolume::scene::{Scene, VolumeFormat};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-fn waking() -> (Arc<AtomicU64>, live::Options) {
+fn waking() -> (Arc<AtomicU64>, live::StreamOptions) {
     let woken = Arc::new(AtomicU64::new(0));
     let counted = woken.clone();
     let wake: Wake = Arc::new(move || {
         counted.fetch_add(1, Ordering::Relaxed);
     });
-    (woken, live::Options { wake: Some(wake), ..kept(Update::Whole) })
+    (woken, live::StreamOptions { wake: Some(wake), ..kept(Update::Whole) })
 }
 
 /// Prevents a view that stands still while shaders compile, whichever way the volumes are swept that come meanwhile.
@@ -91,7 +91,7 @@ fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
     bench.frames(volume(1));
     assert!(bench.picture() == (1, expected[1].clone()));
     bench.stream.freeze(true);
-    bench.stream.show_kept(0);
+    bench.stream.show_cine_volume(0);
     assert!(bench.picture() == (0, expected[0].clone()));
     bench.stream.revive(&other).expect("made anew of what could be drawn");
     assert!(bench.picture() == (0, expected[0].clone()));

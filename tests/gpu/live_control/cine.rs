@@ -1,7 +1,7 @@
 //! Freezing, the cine loop, and settings that change while nothing comes.
 
 use super::*;
-use echolume::source::recorder::Replay;
+use echolume::source::recorder::Reader;
 
 /// Prevents a frozen picture that changes, work for frames that nobody sees, a recording with a gap, and a volume of which the first
 /// frames came while frozen from being shown as if it were whole.
@@ -21,7 +21,7 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
         assert!(bench.settle().is_empty());
         assert_eq!(bench.dispatches(), dispatches, "{update:?}");
         assert!(bench.stream.renderer().expect("begun").end_picture().expect("picture") == before);
-        assert_eq!(bench.stream.cine().kept().len(), 1, "what was not shown is not kept");
+        assert_eq!(bench.stream.cine().volumes().len(), 1, "what was not shown is not kept");
 
         bench.stream.freeze(false);
         bench.frames(speckled(3).drain(4..));
@@ -32,7 +32,7 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
         let counts = bench.stream.statistics().expect("statistics").volumes;
         assert_eq!((counts.shown, counts.dropped, bench.faults.len()), (2, 0, 0), "{counts:?}");
         drop(bench);
-        let recording = Replay::open(&file).expect("recording");
+        let recording = Reader::open(&file).expect("recording");
         assert_eq!((recording.frames(), recording.rebuilt()), (5 * 9, false));
     }
 }
@@ -51,15 +51,15 @@ fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
         let seen: Vec<_> = (0..4).map(|number| bench.live(number)).collect();
         bench.stream.freeze(true);
         for (n, place) in [3usize, 0, 2, 2, 1].into_iter().enumerate() {
-            bench.stream.show_kept(place);
-            assert_eq!(bench.stream.cine_place(), Some(place));
+            bench.stream.show_cine_volume(place);
+            assert_eq!(bench.stream.cine_position(), Some(place));
             // Frozen, but the probe goes on.
             bench.frames(speckled(4 + n as u32));
             let (volume, picture) = bench.picture();
             assert!(volume == place as u32 && picture == seen[place], "{update:?}: {toml}: {place}");
-            assert_eq!(bench.stream.cine_place(), Some(place));
+            assert_eq!(bench.stream.cine_position(), Some(place));
         }
-        bench.stream.show_kept(99);
+        bench.stream.show_cine_volume(99);
         assert!(bench.settle().is_empty(), "a place that is not there");
         bench.stream.freeze(false);
         bench.live(9);
@@ -74,7 +74,7 @@ fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
     let device = Device::new();
     let toml = "mode = 'mip'\nslices.everything = true";
     for images in [2, 3] {
-        let mut bench = Bench::new(&device, toml, live::Options { images, ..kept(Update::Whole) });
+        let mut bench = Bench::new(&device, toml, live::StreamOptions { images, ..kept(Update::Whole) });
         bench.begin(header(0.3));
         let seen: Vec<_> = (0..3).map(|number| bench.live(number)).collect();
         let mut counted = 3;
@@ -82,7 +82,7 @@ fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
             bench.frames(speckled(number).drain(..5));
             bench.settle();
             let place = number as usize % 3;
-            bench.stream.show_kept(place);
+            bench.stream.show_cine_volume(place);
             // Both are under way now.
             bench.frames(speckled(number).drain(5..));
             for shown in bench.settle() {
@@ -115,8 +115,8 @@ fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
             (1, "mode = 'sr'\nslices.sigma = {}", true),
             (1, "mode = 'orthogonal'\nslices.sigma = {}", false),
         ] {
-            if bench.stream.cine_place() != Some(volume) {
-                bench.stream.show_kept(volume);
+            if bench.stream.cine_position() != Some(volume) {
+                bench.stream.show_cine_volume(volume);
                 bench.settle();
             }
             bench.stream.change(settings(toml)).expect("change");
@@ -127,7 +127,7 @@ fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
                 if let Step::Picture(shown) = bench.stream.step(Duration::from_millis(1)).expect("step") {
                     last = Some(shown);
                 }
-                came_again |= bench.stream.is_looking_back();
+                came_again |= bench.stream.is_replaying();
             }
             let last = last.expect("drawn");
             let expected = fresh(&device, toml, &header(0.3), update, &speckled(volume as u32));
@@ -149,11 +149,11 @@ fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginni
             (0..3).for_each(|number| drop(bench.live(number)));
             bench.stream.freeze(true);
             match asked {
-                Some(place) => bench.stream.show_kept(place),
+                Some(place) => bench.stream.show_cine_volume(place),
                 None => bench.stream.change(settings("mode = 'mip'\nslices.median = true")).expect("change"),
             }
             let begun = Instant::now();
-            let half_way = |stream: &Stream| stream.is_looking_back() && !stream.is_drawing();
+            let half_way = |stream: &Stream| stream.is_replaying() && !stream.is_drawing();
             while asked.is_none() && !half_way(&bench.stream) {
                 bench.stream.step(Duration::from_millis(1)).expect("step");
                 assert!(begun.elapsed() < BOUND);
@@ -176,7 +176,7 @@ fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginni
 fn without_a_cine_loop_other_settings_wait_for_the_next_volume_and_nothing_else_does() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
-        let options = live::Options { update, ..live::Options::default() };
+        let options = live::StreamOptions { update, ..live::StreamOptions::default() };
         let mut bench = Bench::new(&device, "mode = 'mip'", options);
         bench.begin(header(0.3));
         bench.live(0);
@@ -184,7 +184,7 @@ fn without_a_cine_loop_other_settings_wait_for_the_next_volume_and_nothing_else_
         let toml = "mode = 'mip'\nslices.median = true";
         bench.stream.change(settings(toml)).expect("change");
         bench.settle();
-        assert!(bench.stream.is_idle() && bench.stream.cine_place().is_none());
+        assert!(bench.stream.is_idle() && bench.stream.cine_position().is_none());
         bench.stream.freeze(false);
         assert!(bench.live(1) == fresh(&device, toml, &header(0.3), update, &speckled(1)), "{update:?}");
     }

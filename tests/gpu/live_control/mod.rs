@@ -7,9 +7,9 @@ mod sources;
 use crate::common::gpu::*;
 use crate::live::*;
 use echolume::gpu::{Options, Renderer};
-use echolume::live::cine::Room;
+use echolume::live::cine::CineLimits;
 use echolume::live::views::Views;
-use echolume::live::{self, Feed, Shown, Step, Stream, Update};
+use echolume::live::{self, Feed, FinishedPicture, Step, Stream, Update};
 use echolume::picture::Picture;
 use echolume::source::Frame;
 use echolume::source::live::{Event, Live};
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 /// Nothing here takes nearly so long.
 pub const BOUND: Duration = Duration::from_secs(120);
-pub const ROOM: Room = Room { volumes: 8, bytes: 1 << 24 };
+pub const ROOM: CineLimits = CineLimits { volumes: 8, bytes: 1 << 24 };
 const MARK: &str = "so far";
 
 /// A source that says what it is sent, when it is sent.
@@ -54,11 +54,11 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(device: &Device, toml: &str, options: live::Options) -> Bench {
+    fn new(device: &Device, toml: &str, options: live::StreamOptions) -> Bench {
         Bench::recorded(device, toml, options, None)
     }
 
-    fn recorded(device: &Device, toml: &str, options: live::Options, record: Option<&Path>) -> Bench {
+    fn recorded(device: &Device, toml: &str, options: live::StreamOptions, record: Option<&Path>) -> Bench {
         let (say, feed) = fed(record);
         Bench { stream: Stream::new(device, feed, settings(toml), options), say, faults: Vec::new() }
     }
@@ -72,7 +72,7 @@ impl Bench {
     }
 
     /// All that was said is looked at, and all that follows from it is done.
-    fn settle(&mut self) -> Vec<Shown> {
+    fn settle(&mut self) -> Vec<FinishedPicture> {
         self.say.send(Event::Fault(MARK.into())).expect("listens");
         let (mut shown, mut is_marked, begun) = (Vec::new(), false, Instant::now());
         while !is_marked || !self.stream.is_idle() {
@@ -81,7 +81,7 @@ impl Bench {
                 Step::Picture(picture) => shown.push(picture),
                 Step::Fault(fault) if fault == MARK => is_marked = true,
                 Step::Fault(fault) => self.faults.push(fault),
-                Step::Went => {}
+                Step::Progress => {}
                 Step::End(why) => panic!("the end: {why:?}"),
             }
         }
@@ -107,8 +107,8 @@ impl Bench {
     }
 }
 
-fn kept(update: Update) -> live::Options {
-    live::Options { update, cine: ROOM, ..live::Options::default() }
+fn kept(update: Update) -> live::StreamOptions {
+    live::StreamOptions { update, cine: ROOM, ..live::StreamOptions::default() }
 }
 
 /// A volume as a renderer of its own draws it.

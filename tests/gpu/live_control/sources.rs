@@ -25,7 +25,7 @@ fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() 
         bench.frames(speckled(3).drain(..4));
         bench.settle();
         let (say, feed) = fed(None);
-        bench.stream.listen_to(feed);
+        bench.stream.replace_source(feed);
         bench.say = say;
         bench.begin(header(0.3));
         for number in [0, 1] {
@@ -34,20 +34,20 @@ fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() 
             bench.frames(frames);
             seen.push(bench.picture().1);
         }
-        assert_eq!(bench.stream.cine().kept().len(), 5);
+        assert_eq!(bench.stream.cine().volumes().len(), 5);
         bench.stream.freeze(true);
         for place in [4, 1, 3, 0, 2] {
-            bench.stream.show_kept(place);
+            bench.stream.show_cine_volume(place);
             assert!(bench.picture().1 == seen[place], "{update:?}: {place}");
-            assert_eq!(bench.stream.cine_place(), Some(place), "{update:?}");
+            assert_eq!(bench.stream.cine_position(), Some(place), "{update:?}");
             // Found again where stage 1 is another, too.
             bench.stream.change(settings("mode = 'mip'\nslices.median = true")).expect("change");
             bench.settle();
-            assert_eq!(bench.stream.cine_place(), Some(place), "{update:?}");
+            assert_eq!(bench.stream.cine_position(), Some(place), "{update:?}");
             bench.stream.change(settings("mode = 'mip'")).expect("change");
             assert!(bench.picture().1 == seen[place], "{update:?}: {place} and back");
         }
-        let mut numbers: Vec<_> = bench.stream.cine().kept().iter().map(|kept| kept.volume).collect();
+        let mut numbers: Vec<_> = bench.stream.cine().volumes().iter().map(|kept| kept.volume).collect();
         assert!(numbers.is_sorted(), "{numbers:?}");
         numbers.dedup();
         assert_eq!(numbers.len(), 5, "a recording of them would have one number twice");
@@ -65,9 +65,9 @@ fn a_frozen_volume_outlives_its_device() {
         bench.stream.freeze(true);
         bench.stream.revive(&other).expect("made anew");
         assert!(bench.picture() == (3, seen[3].clone()), "{update:?}");
-        bench.stream.show_kept(1);
+        bench.stream.show_cine_volume(1);
         assert!(bench.picture() == (1, seen[1].clone()), "{update:?}");
-        bench.stream.show_kept(2);
+        bench.stream.show_cine_volume(2);
         // What was asked for and did not come any more.
         bench.stream.revive(&third).expect("made anew");
         assert!(bench.picture() == (2, seen[2].clone()), "{update:?}");
@@ -88,11 +88,11 @@ fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
     bench.begin(theirs.clone());
     bench.frames(frames.clone());
     assert!(bench.settle().is_empty());
-    bench.stream.show_kept(0);
+    bench.stream.show_cine_volume(0);
     assert!(bench.picture() == (0, seen[0].clone()));
     bench.stream.freeze(false);
     bench.settle();
-    assert!(bench.stream.header() == Some(&theirs) && bench.stream.cine().kept().is_empty());
+    assert!(bench.stream.header() == Some(&theirs) && bench.stream.cine().volumes().is_empty());
     bench.frames(frames.clone());
     let expected = fresh(&device, "mode = 'mip'", &theirs, Update::Whole, &frames);
     assert!(bench.picture() == (9, expected));
@@ -103,7 +103,7 @@ fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
     bench.settle();
     bench.stream.freeze(false);
     bench.settle();
-    assert!(bench.stream.cine().kept().len() == 1 && bench.faults.is_empty());
+    assert!(bench.stream.cine().volumes().len() == 1 && bench.faults.is_empty());
 }
 
 /// Prevents a device that runs hot for a picture that stands still.
@@ -120,7 +120,7 @@ fn a_stream_that_has_nothing_to_do_says_so_and_does_nothing() {
         let begun = Instant::now();
         while begun.elapsed() < Duration::from_millis(200) {
             assert!(bench.stream.is_idle());
-            assert!(matches!(bench.stream.step(Duration::from_millis(1)), Ok(Step::Went)));
+            assert!(matches!(bench.stream.step(Duration::from_millis(1)), Ok(Step::Progress)));
         }
         assert_eq!(bench.dispatches(), dispatches);
         // The same settings once more are no others.

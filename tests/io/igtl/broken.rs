@@ -24,7 +24,7 @@ fn every_turned_bit_of_a_body_or_checksum_is_noticed() {
             let mut damaged = bytes.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
             match total(&damaged, BODY_LIMIT) {
-                Err(Refused::Checksum { length, .. }) => assert_eq!(length, bytes.len()),
+                Err(DecodeError::Checksum { length, .. }) => assert_eq!(length, bytes.len()),
                 other => panic!("{file}: bit {bit} gives {other:?}"),
             }
         }
@@ -41,7 +41,7 @@ fn an_absurd_claim_is_refused_from_its_header_alone() {
     for claim in [1u64 << 60, u64::MAX, BODY_LIMIT as u64 + 1] {
         let mut header = stored("Image_Motor_v1.bin")[..HEADER].to_vec();
         header[42..50].copy_from_slice(&claim.to_be_bytes());
-        let Err(Refused::Framing { error }) = total(&header, BODY_LIMIT) else { panic!("{claim} is accepted") };
+        let Err(DecodeError::Framing { error }) = total(&header, BODY_LIMIT) else { panic!("{claim} is accepted") };
         assert_eq!(
             error.to_string(),
             format!("IMAGE from 'Image_Motor': body size: is {claim} bytes, must be at most 268435456")
@@ -116,7 +116,7 @@ fn bodies_that_cannot_be_true_are_refused_by_name() {
     ];
     for (bytes, fault) in faults {
         match total(&bytes, BODY_LIMIT) {
-            Err(Refused::Content { length, error }) => {
+            Err(DecodeError::Content { length, error }) => {
                 assert_eq!(length, bytes.len());
                 assert!(error.to_string().ends_with(fault), "'{error}' does not say '{fault}'");
             }

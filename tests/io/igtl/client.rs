@@ -45,8 +45,12 @@ pub fn stay(stream: &mut TcpStream) {
     let _ = stream.read(&mut [0]);
 }
 
-pub fn quick() -> Options {
-    Options { first_wait: Duration::from_millis(20), longest_wait: Duration::from_millis(200), ..Options::default() }
+pub fn quick() -> ClientOptions {
+    ClientOptions {
+        first_wait: Duration::from_millis(20),
+        longest_wait: Duration::from_millis(200),
+        ..ClientOptions::default()
+    }
 }
 
 pub fn bytes(message: &Message) -> Vec<u8> {
@@ -59,7 +63,7 @@ fn take(client: &Client) -> Message {
 }
 
 /// Waits for it, 10 s at most.
-fn until(client: &Client, reached: impl Fn(&Statistics) -> bool) -> Statistics {
+fn until(client: &Client, reached: impl Fn(&ClientStatistics) -> bool) -> ClientStatistics {
     let started = Instant::now();
     loop {
         let statistics = client.statistics();
@@ -92,7 +96,7 @@ fn messages_come_in_order_whatever_the_pieces() {
         for file in FILES {
             assert_eq!(take(&client), whole(&stored(file)));
         }
-        let expected = Statistics { connected: true, messages: 5, bytes: length, ..Statistics::default() };
+        let expected = ClientStatistics { connected: true, messages: 5, bytes: length, ..ClientStatistics::default() };
         assert_eq!(client.statistics(), expected);
         assert!(client.try_next().is_none());
         gone(client);
@@ -159,7 +163,7 @@ fn garbage_and_absurd_claims_end_the_connection_and_a_new_one_is_made() {
 #[test]
 fn a_slow_consumer_loses_the_oldest_and_the_count_says_so() {
     let all = (0..50).flat_map(|n| bytes(&transform("Probe", f64::from(n), 0.0))).collect();
-    let options = Options { queue_messages: 4, ..quick() };
+    let options = ClientOptions { queue_messages: 4, ..quick() };
     let client = Client::connect(&serve(vec![send_and_stay(all)]), options).unwrap();
     let statistics = until(&client, |s| s.messages == 50);
     assert_eq!(statistics.dropped, 46);
@@ -170,7 +174,7 @@ fn a_slow_consumer_loses_the_oldest_and_the_count_says_so() {
 #[test]
 fn the_queue_is_bounded_in_bytes_as_well() {
     let all = (0..20).flat_map(|n| bytes(&Message::Image(image(f64::from(n), [100, 100, 10])))).collect();
-    let options = Options { queue_bytes: 350_000, ..quick() };
+    let options = ClientOptions { queue_bytes: 350_000, ..quick() };
     let client = Client::connect(&serve(vec![send_and_stay(all)]), options).unwrap();
     assert_eq!(until(&client, |s| s.messages == 20).dropped, 17);
     assert_eq!(take(&client).time(), 17.0);
@@ -182,7 +186,7 @@ fn a_peer_that_stands_still_is_given_up() {
     let whole = bytes(&transform("Probe", 1.0, 1.0));
     let scripts = vec![send_and_stay(half), send_and_stay(whole.clone()), send_and_stay(whole)];
     let short = Duration::from_millis(300);
-    let options = Options { stall_timeout: short, silence_timeout: short * 2, ..quick() };
+    let options = ClientOptions { stall_timeout: short, silence_timeout: short * 2, ..quick() };
     let client = Client::connect(&serve(scripts), options).unwrap();
     take(&client);
     let error = client.last_error().unwrap();
@@ -201,7 +205,7 @@ fn tries_come_apart_and_no_further_than_the_longest_wait() {
         Box::new(move |_: TcpStream| sender.send(Instant::now()).unwrap()) as Script
     });
     let options =
-        Options { first_wait: Duration::from_millis(50), longest_wait: Duration::from_millis(200), ..quick() };
+        ClientOptions { first_wait: Duration::from_millis(50), longest_wait: Duration::from_millis(200), ..quick() };
     let client = Client::connect(&serve(scripts.collect()), options).unwrap();
     let times: Vec<Instant> = (0..6).map(|_| accepted.recv_timeout(Duration::from_secs(10)).unwrap()).collect();
     let gaps: Vec<u128> = times.windows(2).map(|t| (t[1] - t[0]).as_millis()).collect();
@@ -234,13 +238,14 @@ fn dropping_ends_the_thread_in_every_state() {
     let image = stored("Image_Motor_v1.bin");
     // Silent, within a header, within a body.
     for cut in [0, 20, 100] {
-        let client = Client::connect(&serve(vec![send_and_stay(image[..cut].to_vec())]), Options::default()).unwrap();
+        let client =
+            Client::connect(&serve(vec![send_and_stay(image[..cut].to_vec())]), ClientOptions::default()).unwrap();
         until(&client, |s| s.connected && s.bytes == cut as u64);
         gone(client);
     }
     // Waiting to try again, and with an address that is none.
     for address in [nowhere().as_str(), "not an address", "", "127.0.0.1:99999"] {
-        let client = Client::connect(address, Options::default()).unwrap();
+        let client = Client::connect(address, ClientOptions::default()).unwrap();
         let started = Instant::now();
         while client.last_error().is_none() && started.elapsed() < Duration::from_secs(10) {
             thread::sleep(Duration::from_millis(5));
@@ -250,13 +255,13 @@ fn dropping_ends_the_thread_in_every_state() {
         gone(client);
     }
     // At once.
-    gone(Client::connect(&nowhere(), Options::default()).unwrap());
+    gone(Client::connect(&nowhere(), ClientOptions::default()).unwrap());
 }
 
 #[test]
 fn options_of_zero_do_no_harm() {
     let zero = Duration::ZERO;
-    let options = Options {
+    let options = ClientOptions {
         connect_timeout: zero,
         stall_timeout: zero,
         silence_timeout: zero,
@@ -272,6 +277,6 @@ fn options_of_zero_do_no_harm() {
     until(&client, |s| s.lost_framing > 0);
     assert!(client.try_next().is_none() && client.last_error().is_some());
     gone(client);
-    let client = Client::connect(&server(), Options { body_limit: 48, ..options }).unwrap();
+    let client = Client::connect(&server(), ClientOptions { body_limit: 48, ..options }).unwrap();
     assert_eq!(take(&client).time(), 1.0);
 }

@@ -44,7 +44,7 @@ pub fn whole(bytes: &[u8]) -> Message {
 }
 
 /// What any bytes must give: a message, a number of missing bytes, or one line that fits on a screen.
-pub fn total(bytes: &[u8], limit: usize) -> Result<Decoded, Refused> {
+pub fn total(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     let decoded = decode(bytes, limit);
     match &decoded {
         Ok(Decoded::Need(missing)) => assert!(*missing > 0),
@@ -53,7 +53,7 @@ pub fn total(bytes: &[u8], limit: usize) -> Result<Decoded, Refused> {
             let line = refused.to_string();
             assert_eq!(line.lines().count(), 1, "{line}");
             assert!(line.len() < 2000 && !line.chars().any(char::is_control), "{line:?}");
-            if let Refused::Checksum { length, .. } | Refused::Content { length, .. } = refused {
+            if let DecodeError::Checksum { length, .. } | DecodeError::Content { length, .. } = refused {
                 assert!((HEADER..=bytes.len()).contains(length));
             }
         }

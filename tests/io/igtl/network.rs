@@ -153,7 +153,8 @@ fn moved(k: u8) -> Message {
 }
 
 fn sweep_options() -> NetworkOptions {
-    let freehand = freehand::Options { margin: 1.0, spacing: Some(0.5), ..freehand::Options::default() };
+    let freehand =
+        freehand::CompoundingOptions { margin: 1.0, spacing: Some(0.5), ..freehand::CompoundingOptions::default() };
     NetworkOptions { freehand, first: 4, update: 0.2, frames: 2, ..options() }
 }
 

@@ -20,7 +20,7 @@ fn turned(device: &str, time: f64, angle: f64, x: f32) -> Message {
     Message::Transform(Transform { device: device.into(), time, matrix })
 }
 
-fn push_all(pairing: &mut Pairing, messages: Vec<Message>) -> Vec<Paired> {
+fn push_all(pairing: &mut Pairing, messages: Vec<Message>) -> Vec<PairedFrame> {
     messages.into_iter().flat_map(|m| pairing.push(m)).collect()
 }
 
@@ -110,7 +110,7 @@ fn a_tool_of_a_tracker_is_a_pose_by_its_name() {
         Tool { name: name.into(), kind: ToolKind::SixD, matrix }
     };
     let tools = vec![tool("Stylus", 1.0), tool("Probe", 2.0)];
-    let tracked = Message::Tracked(Tracked { device: "Tracker".into(), time: 3.0, tools });
+    let tracked = Message::TrackingData(TrackingData { device: "Tracker".into(), time: 3.0, tools });
     let paired = push_all(&mut pairing(Some("Probe")), vec![tracked.clone(), frame(3.0)]);
     assert_eq!(paired[0].pose.translation.x, 2.0);
     let mut unnamed = pairing(None);

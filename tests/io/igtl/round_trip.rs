@@ -59,7 +59,7 @@ fn message() -> impl Strategy<Value = Message> {
             time,
             matrix
         })),
-        (name(), time(), vec(tool, 0..5)).prop_map(|(device, time, tools)| Message::Tracked(Tracked {
+        (name(), time(), vec(tool, 0..5)).prop_map(|(device, time, tools)| Message::TrackingData(TrackingData {
             device,
             time,
             tools

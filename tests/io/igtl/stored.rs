@@ -50,8 +50,8 @@ fn three_tools_come() {
         tool("Channel 1", ToolKind::SixD),
         tool("Channel 2", ToolKind::FiveD),
     ];
-    let expected = Tracked { device: "Tracker".into(), time: 0.0, tools };
-    assert_eq!(whole(&stored("TDATA_ref_cpp_v1.bin")), Message::Tracked(expected));
+    let expected = TrackingData { device: "Tracker".into(), time: 0.0, tools };
+    assert_eq!(whole(&stored("TDATA_ref_cpp_v1.bin")), Message::TrackingData(expected));
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::wait::eventually;
-use echolume::probe::motor::simulate::{Options, Simulator};
+use echolume::probe::motor::simulate::{Simulator, SimulatorOptions};
 use echolume::probe::motor::table::{Home, Side, Units};
 use echolume::probe::motor::tmcl::{Request, axis, command};
-use echolume::probe::motor::{Direction, Drive, Fault, MotorTable, Place, Position, Stopped, Sweep, Track};
+use echolume::probe::motor::{ArrayState, Direction, Drive, Fault, MotorTable, Position, Stopped, Sweep, Track};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ fn status_tells_what_is_there_and_moves_nothing() {
 fn home_is_where_the_switch_is_however_it_is_looked_for() {
     let found = |home, home_direction, reversed, home_angle_deg| {
         let table = MotorTable { home, home_direction, reversed, home_angle_deg, ..table() };
-        let options = Options { table: table.clone(), ..Options::default() };
+        let options = SimulatorOptions { table: table.clone(), ..SimulatorOptions::default() };
         let simulator = Simulator::start(options).expect("a pseudo-terminal");
         let mut drive = Drive::open(&settings(&simulator, 2000), &table).expect("opened");
         drive.home().expect("found");
@@ -63,9 +63,12 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
     let (first, last) = (positions[0].time, positions[positions.len() - 1].time);
     let count = positions.len();
     let track = Track::new(positions, 10.0).expect("in order");
-    assert_eq!(track.at(first - 1e-3), Place::Outside);
-    assert_eq!(track.at(last + 1e-3), Place::Outside);
-    assert!(matches!(track.at((first + last) / 2.0), Place::Pass { .. } | Place::Turning { .. }), "{count}");
+    assert_eq!(track.at(first - 1e-3), ArrayState::Unknown);
+    assert_eq!(track.at(last + 1e-3), ArrayState::Unknown);
+    assert!(
+        matches!(track.at((first + last) / 2.0), ArrayState::Sweeping { .. } | ArrayState::Reversing { .. }),
+        "{count}"
+    );
     // At rest where it was sent: nothing to stop.
     let before = simulator.received().len();
     drop(drive);
@@ -77,7 +80,7 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
 fn a_reversed_motor_on_an_older_controller_sweeps_the_same_angle() {
     let table = MotorTable { units: Units::Tmc429, ramp_divisor: 9, reversed: true, ..table() };
     table.check().expect("within the controller's registers");
-    let options = Options { table: table.clone(), ..Options::default() };
+    let options = SimulatorOptions { table: table.clone(), ..SimulatorOptions::default() };
     let simulator = Simulator::start(options).expect("a pseudo-terminal");
     let mut drive = Drive::open(&settings(&simulator, 2000), &table).expect("opened");
     drive.home().expect("home");
@@ -135,7 +138,7 @@ fn the_watchdog_is_written_only_when_it_differs_and_only_where_there_is_one() {
     assert_eq!(drive.status().expect("answered").watchdog, Some(Duration::from_secs(2)));
     let written = simulator.received().iter().filter(|r| r.command == command::SET_GLOBAL).count();
     assert_eq!(written, 1);
-    let options = Options { table: table(), no_watchdog: true, fault: None };
+    let options = SimulatorOptions { table: table(), no_watchdog: true, fault: None };
     let without = Simulator::start(options).expect("a pseudo-terminal");
     let mut drive = Drive::open(&settings(&without, 2000), &table()).expect("opened");
     assert_eq!(drive.status().expect("answered").watchdog, None);

@@ -3,9 +3,9 @@
 use crate::common::files::{Folder, MOTOR_PROBE};
 use crate::common::motor::table;
 use echolume::probe::ProbeFile;
-use echolume::probe::motor::simulate::Injected;
+use echolume::probe::motor::simulate::SimulatedFault;
 use echolume::probe::motor::table::Units;
-use echolume::probe::motor::{Direction, MotorTable, Place, Position, Sweep, Track};
+use echolume::probe::motor::{ArrayState, Direction, MotorTable, Position, Sweep, Track};
 use proptest::prelude::*;
 use std::time::Duration;
 
@@ -118,17 +118,17 @@ fn frames_get_the_angle_and_direction_of_their_time() {
     for i in 0..1900 {
         let time = f64::from(i) * 1e-3 + 0.0003;
         match track.at(time) {
-            Place::Pass { angle, direction, pass } => {
+            ArrayState::Sweeping { angle, direction, pass } => {
                 assert!((angle - cosine(time)).abs() <= bound, "{time}: {angle} for {}", cosine(time));
                 assert_eq!(pass, (time * 2.0) as usize, "{time}");
                 assert_eq!(direction == Direction::Forward, pass % 2 == 0);
             }
-            Place::Turning { angle } => {
+            ArrayState::Reversing { angle } => {
                 turning += 1;
                 let from_turn = (time * 2.0 - (time * 2.0).round()).abs() / 2.0;
                 assert!(from_turn <= pitch && (angle - cosine(time)).abs() <= bound, "{time}");
             }
-            Place::Outside => panic!("{time} is within"),
+            ArrayState::Unknown => panic!("{time} is within"),
         }
     }
     assert!(turning > 0 && turning <= 3 * 2 * 13, "{turning}");
@@ -139,11 +139,11 @@ fn what_was_not_seen_has_no_angle() {
     let at = |time, angle| Position { time, angle, direction: Direction::Forward, pass: 0 };
     let track = Track::new(vec![at(1.0, 0.0), at(1.05, 1.0), at(3.0, 2.0), at(3.05, 2.0)], 0.1).expect("in order");
     for time in [0.9, 3.1, 2.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(track.at(time), Place::Outside, "{time}");
+        assert_eq!(track.at(time), ArrayState::Unknown, "{time}");
     }
-    assert_eq!(track.at(1.05), Place::Pass { angle: 1.0, direction: Direction::Forward, pass: 0 });
-    assert_eq!(track.at(3.025), Place::Turning { angle: 2.0 }, "it stood");
-    assert_eq!(Track::new(vec![], 1.0).expect("empty").at(0.0), Place::Outside);
+    assert_eq!(track.at(1.05), ArrayState::Sweeping { angle: 1.0, direction: Direction::Forward, pass: 0 });
+    assert_eq!(track.at(3.025), ArrayState::Reversing { angle: 2.0 }, "it stood");
+    assert_eq!(Track::new(vec![], 1.0).expect("empty").at(0.0), ArrayState::Unknown);
     for wrong in [vec![at(1.0, 0.0), at(1.0, 1.0)], vec![at(f64::NAN, 0.0)], vec![at(0.0, f64::INFINITY)]] {
         assert!(Track::new(wrong, 1.0).is_err());
     }
@@ -162,15 +162,15 @@ fn a_track_that_grows_forgets_the_oldest_and_refuses_what_is_not_later() {
     for wrong in [0.999, 0.5, f64::NAN, f64::INFINITY] {
         assert!(!track.push(at(wrong)), "{wrong}");
     }
-    assert!(matches!(track.at(0.95), Place::Turning { .. } | Place::Pass { .. }));
-    assert_eq!(track.at(0.5), Place::Outside, "long forgotten");
+    assert!(matches!(track.at(0.95), ArrayState::Reversing { .. } | ArrayState::Sweeping { .. }));
+    assert_eq!(track.at(0.5), ArrayState::Unknown, "long forgotten");
 }
 
 #[test]
 fn faults_are_asked_for_by_name_and_time() {
-    assert!("stall@0.5".parse::<Injected>().is_ok_and(|i| i.after == Some(Duration::from_millis(500))));
-    assert!("mute".parse::<Injected>().is_ok_and(|i| i.after.is_none()));
+    assert!("stall@0.5".parse::<SimulatedFault>().is_ok_and(|i| i.after == Some(Duration::from_millis(500))));
+    assert!("mute".parse::<SimulatedFault>().is_ok_and(|i| i.after.is_none()));
     for wrong in ["", "fire", "stall@", "stall@-1", "stall@nan", "stall@1e9", "@1"] {
-        assert!(wrong.parse::<Injected>().is_err(), "{wrong}");
+        assert!(wrong.parse::<SimulatedFault>().is_err(), "{wrong}");
     }
 }

@@ -4,10 +4,10 @@ use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::probes::wobbler;
 use crate::common::wait::eventually;
 use echolume::probe::motor::simulate::Simulator;
-use echolume::probe::motor::{Drive, Sweep, Turning};
+use echolume::probe::motor::{BackgroundSweep, Drive, Sweep};
 use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
 use echolume::source::live::{Event, Live};
-use echolume::source::motor_tracking::{Clock, FreeRunning, Options, Swept};
+use echolume::source::motor_tracking::{Clock, FreeRunning, MotorTracked, MotorTrackingOptions};
 use echolume::source::phantom;
 use echolume::source::recorder::Header;
 use echolume::source::{Frame, StoredType};
@@ -91,19 +91,19 @@ impl Live for Free {
     }
 }
 
-fn turning(simulator: &Simulator, sweep: Sweep) -> Turning {
+fn turning(simulator: &Simulator, sweep: Sweep) -> BackgroundSweep {
     let drive = Drive::open(&settings(simulator, 2000), &table()).expect("opened");
-    Turning::start(drive, sweep, false).expect("a sweep that it can do")
+    BackgroundSweep::start(drive, sweep, false).expect("a sweep that it can do")
 }
 
-fn swept(simulator: &Arc<Simulator>, source: Free, clock: Clock) -> Swept {
-    Swept::new(Box::new(source), turning(simulator, SWEEP), Options { clock, holds: false })
+fn swept(simulator: &Arc<Simulator>, source: Free, clock: Clock) -> MotorTracked {
+    MotorTracked::new(Box::new(source), turning(simulator, SWEEP), MotorTrackingOptions { clock, holds: false })
 }
 
 const ARRIVAL: Clock = Clock::Arrival { delay: 0.0 };
 
 /// Frames until so many volumes are whole, or the end.
-fn frames(swept: &mut Swept, volumes: u64) -> (Vec<Frame>, Option<Option<String>>) {
+fn frames(swept: &mut MotorTracked, volumes: u64) -> (Vec<Frame>, Option<Option<String>>) {
     let (mut frames, begun) = (Vec::new(), Instant::now());
     while swept.counts().whole < volumes && begun.elapsed() < Duration::from_secs(120) {
         match swept.next(Duration::from_millis(50)) {
@@ -224,11 +224,11 @@ fn the_phantom_on_a_free_running_array_is_put_together_again() {
     let simulator = simulated(None);
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
     let motor = turning(&simulator, sweep);
-    let options = phantom::Options { volumes: 2, lines: 64, samples: 32, ..phantom::Options::default() };
+    let options = phantom::PhantomOptions { volumes: 2, lines: 64, samples: 32, ..phantom::PhantomOptions::default() };
     let whole = FreeRunning::phantom(options.clone(), motor.speed()).expect("a phantom");
     let known: Vec<Vec<Frame>> = (0..2).map(|volume| whole.volume(volume)).collect();
     let source = FreeRunning::new(whole, motor.watch().clone());
-    let mut swept = Swept::new(Box::new(source), motor, Options { clock: ARRIVAL, holds: false });
+    let mut swept = MotorTracked::new(Box::new(source), motor, MotorTrackingOptions { clock: ARRIVAL, holds: false });
     let (frames, end) = frames(&mut swept, 2);
     assert_eq!(end, None);
     let right = |frame: &&Frame| {

@@ -23,7 +23,7 @@ pub fn all_frames(recording: &mut Recording) -> Result<Vec<Frame>, InputError> {
 
 pub fn all_bytes(path: impl AsRef<Path>) -> Result<Vec<u8>, InputError> {
     let mut recording = Recording::open(path.as_ref(), None)?;
-    let _ = recording.facts();
+    let _ = recording.description();
     Ok(all_frames(&mut recording)?.into_iter().flat_map(|f| f.bytes).collect())
 }
 

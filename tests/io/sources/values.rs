@@ -167,7 +167,7 @@ fn what_a_kretz_file_cannot_give_is_said() {
     let wavelet = folder.write("w.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(2, 0x1100, b"xy")));
     assert!(total(&wavelet).unwrap_err().contains("wavelet"));
     let several = open(&folder.write("4d.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(0xd600, 1, b"xy"))));
-    assert!(several.facts().iter().any(|(title, _)| title == "4D"));
+    assert!(several.description().iter().any(|(title, _)| title == "4D"));
     // Without tables the voxels are Cartesian, the radial step apart.
     let plain = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");
     let at = |tag: &[u8]| plain.windows(4).position(|w| w == tag).unwrap();
@@ -181,13 +181,13 @@ fn what_a_kretz_file_cannot_give_is_said() {
 fn no_patient_field_is_ever_shown() {
     let folder = Folder::new("patient");
     let whole = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");
-    let mut shown = format!("{:?}", open(&folder.write("p.vol", &whole)).facts());
+    let mut shown = format!("{:?}", open(&folder.write("p.vol", &whole)).description());
     for cut in 0..whole.len() {
         shown += &total(&folder.write("p.vol", &whole[..cut])).unwrap_err();
     }
     let more = "PatientName = SECRET^PATIENT\nSeq_Frame0000_PatientName = SECRET\nComment = SECRET\n";
     let whole = image("2 2 2", "MET_UCHAR", more, &[1; 8]);
-    shown += &format!("{:?}", open(&folder.write("p.mha", &whole)).facts());
+    shown += &format!("{:?}", open(&folder.write("p.mha", &whole)).description());
     for cut in 0..whole.len() {
         shown += &total(&folder.write("p.mha", &whole[..cut])).unwrap_err();
     }
@@ -221,5 +221,5 @@ fn data_in_a_second_file_are_found_behind_its_header() {
     assert_eq!(total(&header("HeaderSize = 7\n")), Ok(data.clone()));
     assert!(total(&header("HeaderSize = 8\n")).unwrap_err().contains("23 of 24"));
     assert_eq!(total(&header("")).unwrap()[..7], [9; 7]);
-    assert!(open(&header("")).facts().iter().any(|(title, _)| title == "more data"));
+    assert!(open(&header("")).description().iter().any(|(title, _)| title == "more data"));
 }

@@ -74,10 +74,10 @@ fn samples_lie_where_trigonometry_puts_them() {
 #[test]
 fn a_place_is_unswept_to_where_it_was_swept_from() {
     let s = 3.0f64.sqrt();
-    let (x, y, position) = fan().unswept(DVec3::new(-4.0, 20.0 + 7.0 * s, 7.0));
+    let (x, y, position) = fan().inverse_sweep_map(DVec3::new(-4.0, 20.0 + 7.0 * s, 7.0));
     assert!(near(x, -4.0) && near(y, 34.0) && near(position, PI / 6.0), "{x}, {y}, {position}");
-    assert_eq!(linear().unswept(DVec3::new(1.0, 2.0, 3.0)), (1.0, 2.0, 3.0));
-    assert_eq!(still().unswept(DVec3::new(1.0, 2.0, 0.7)), (1.0, 2.0, 0.0));
+    assert_eq!(linear().inverse_sweep_map(DVec3::new(1.0, 2.0, 3.0)), (1.0, 2.0, 3.0));
+    assert_eq!(still().inverse_sweep_map(DVec3::new(1.0, 2.0, 0.7)), (1.0, 2.0, 0.0));
 }
 
 /// Each way of the motor, on even slices and on uneven ones.
@@ -178,7 +178,7 @@ fn the_box_touches_all_that_the_rectangle_sweeps_over() {
             for (x, y) in
                 [plane_low[0], plane_high[0]].iter().flat_map(|x| [plane_low[1], plane_high[1]].map(|y| (*x, y)))
             {
-                let place = probe.swept(x, y, probe.slices.at(slice));
+                let place = probe.sweep_map(x, y, probe.slices.at(slice));
                 (least, most) = (least.min(place), most.max(place));
             }
         }

@@ -54,15 +54,15 @@ impl FaultKind {
 /// A fault and when it begins: `NAME`, from the start; `NAME@SECONDS`, so long after the module was first sent to a position,
 /// which is when a sweep begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Injected {
+pub struct SimulatedFault {
     pub kind: FaultKind,
     pub after: Option<Duration>,
 }
 
-impl FromStr for Injected {
+impl FromStr for SimulatedFault {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Injected, String> {
+    fn from_str(text: &str) -> Result<SimulatedFault, String> {
         let (name, after) = text.split_once('@').map_or((text, None), |(name, after)| (name, Some(after)));
         let kind = FaultKind::ALL.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
         let names = FaultKind::ALL.map(|(name, _)| name).join(", ");
@@ -72,15 +72,15 @@ impl FromStr for Injected {
             None => None,
             Some(text) => Some(seconds(text).ok_or_else(|| format!("'{text}' must be 0 to 3600 seconds"))?),
         };
-        Ok(Injected { kind, after: after.map(Duration::from_secs_f64) })
+        Ok(SimulatedFault { kind, after: after.map(Duration::from_secs_f64) })
     }
 }
 
 /// What the simulator is to be.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct SimulatorOptions {
     pub table: MotorTable,
-    pub fault: Option<Injected>,
+    pub fault: Option<SimulatedFault>,
     /// The module has no watchdog.
     pub no_watchdog: bool,
 }
@@ -101,7 +101,7 @@ pub struct Simulator {
 impl Simulator {
     /// # Errors
     /// The system has no pseudo-terminal to give.
-    pub fn start(options: Options) -> std::io::Result<Simulator> {
+    pub fn start(options: SimulatorOptions) -> std::io::Result<Simulator> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
         unlockpt(&master)?;
@@ -166,7 +166,7 @@ struct Line {
     slave: OwnedFd,
     shared: Arc<Shared>,
     address: u8,
-    fault: Option<Injected>,
+    fault: Option<SimulatedFault>,
 }
 
 impl Line {

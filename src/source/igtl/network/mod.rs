@@ -9,7 +9,7 @@ mod samples;
 mod sweep;
 mod whole;
 
-use super::client::{self, Client, Statistics};
+use super::client::{self, Client, ClientStatistics};
 use super::decode::BODY_LIMIT;
 use super::message::Message;
 use crate::source::live::{Event, Live};
@@ -38,9 +38,9 @@ pub enum Poses {
 /// How a [`Network`] behaves.
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
-    pub client: client::Options,
+    pub client: client::ClientOptions,
     pub poses: Poses,
-    pub freehand: freehand::Options,
+    pub freehand: freehand::CompoundingOptions,
     /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
     pub first: usize,
     /// A sweep is given out so often, s, while frames come ...
@@ -54,9 +54,9 @@ pub struct NetworkOptions {
 impl Default for NetworkOptions {
     fn default() -> NetworkOptions {
         NetworkOptions {
-            client: client::Options::default(),
+            client: client::ClientOptions::default(),
             poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
-            freehand: freehand::Options { margin: 20.0, ..freehand::Options::default() },
+            freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
             first: 100,
             update: 0.5,
             frames: 64,
@@ -75,7 +75,7 @@ impl Default for NetworkOptions {
 pub struct Network {
     client: Client,
     /// What the faults have been told of.
-    known: Statistics,
+    known: ClientStatistics,
     last_error: Option<String>,
     /// There ever was a connection.
     connected: bool,
@@ -108,7 +108,7 @@ impl Network {
     pub fn connect(address: &str, options: NetworkOptions) -> io::Result<Network> {
         Ok(Network {
             client: Client::connect(address, options.client.clone())?,
-            known: Statistics::default(),
+            known: ClientStatistics::default(),
             last_error: None,
             connected: false,
             lost: 0,
@@ -123,7 +123,7 @@ impl Network {
     }
 
     /// Of the connection.
-    pub fn statistics(&self) -> Statistics {
+    pub fn statistics(&self) -> ClientStatistics {
         self.client.statistics()
     }
 

@@ -3,7 +3,7 @@
 use super::drive::Drive;
 use super::fault::{Fault, MotorError, Stopped};
 use super::guard::Interrupter;
-use super::sweep::{Place, Position, Sweep, Track};
+use super::sweep::{ArrayState, Position, Sweep, Track};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -15,9 +15,9 @@ const LONGEST_GAP: f64 = 0.1;
 
 /// A motor that sweeps until it is dropped, or fails. Dropping it stops the motor and waits for that: one request and its reply, or
 /// where the module no longer answers as long as stopping is tried.
-pub struct Turning {
+pub struct BackgroundSweep {
     port: String,
-    watch: Watch,
+    watch: PositionLog,
     speed: f64,
     angle: f64,
     interrupter: Interrupter,
@@ -26,7 +26,7 @@ pub struct Turning {
 
 /// Where the array was lately. Clones see the same.
 #[derive(Clone)]
-pub struct Watch {
+pub struct PositionLog {
     /// Time 0 of the positions.
     start: Instant,
     /// The same, s since 1970.
@@ -39,17 +39,17 @@ struct State {
     ended: Option<MotorError>,
 }
 
-impl Turning {
+impl BackgroundSweep {
     /// Looks for home unless it was found before, and sweeps without an end.
     ///
     /// # Errors
-    /// A sweep that the motor cannot do, before anything has moved. What goes wrong later is told by [`Turning::stop`].
-    pub fn start(mut drive: Drive, sweep: Sweep, homed: bool) -> Result<Turning, MotorError> {
+    /// A sweep that the motor cannot do, before anything has moved. What goes wrong later is told by [`BackgroundSweep::stop`].
+    pub fn start(mut drive: Drive, sweep: Sweep, homed: bool) -> Result<BackgroundSweep, MotorError> {
         let sweep = Sweep { volumes: None, ..sweep };
         let speed = sweep.speed(&drive.table, drive.guard.port().settings().round_trip());
         let speed = speed.map_err(|fault| drive.guard.fail("sweep", fault))?;
         let track = Track { positions: Vec::new(), longest_gap: LONGEST_GAP };
-        let watch = Watch {
+        let watch = PositionLog {
             start: Instant::now(),
             start_of_stamps: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
             state: Arc::new(Mutex::new(State { track, ended: None })),
@@ -59,12 +59,12 @@ impl Turning {
         let thread = std::thread::Builder::new().name("motor".into()).spawn(move || theirs.turn(drive, &sweep, homed));
         let thread = thread.map_err(|e| {
             let fault = Fault::OutOfRange(format!("a thread for the motor cannot be started: {e}"));
-            MotorError { port: port.clone(), doing: "sweep", fault, stopped: Stopped::NotMoved }
+            MotorError { port: port.clone(), operation: "sweep", fault, stopped: Stopped::NotMoved }
         })?;
-        Ok(Turning { port, watch, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
+        Ok(BackgroundSweep { port, watch, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
     }
 
-    pub fn watch(&self) -> &Watch {
+    pub fn watch(&self) -> &PositionLog {
         &self.watch
     }
 
@@ -78,7 +78,7 @@ impl Turning {
         self.angle
     }
 
-    /// The motor sweeps no more, whyever: [`Turning::stop`] says that.
+    /// The motor sweeps no more, whyever: [`BackgroundSweep::stop`] says that.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
@@ -93,7 +93,7 @@ impl Turning {
             // The drive has stopped the motor when it was dropped, or has said that it could not.
             let stopped = Stopped::Unconfirmed("see the messages before this one".into());
             let fault = Fault::Interrupted("a panic on its own thread");
-            return Err(MotorError { port: self.port.clone(), doing: "sweep", fault, stopped });
+            return Err(MotorError { port: self.port.clone(), operation: "sweep", fault, stopped });
         }
         match self.watch.ended() {
             Some(MotorError { fault: Fault::Interrupted(_), stopped: Stopped::Confirmed, .. }) | None => Ok(()),
@@ -102,7 +102,7 @@ impl Turning {
     }
 }
 
-impl Drop for Turning {
+impl Drop for BackgroundSweep {
     fn drop(&mut self) {
         let known = self.watch.ended().is_some();
         if let Err(error) = self.stop()
@@ -113,7 +113,7 @@ impl Drop for Turning {
     }
 }
 
-impl Watch {
+impl PositionLog {
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
@@ -152,7 +152,7 @@ impl Watch {
     }
 
     /// Where the array was, see [`Track::at`].
-    pub fn at(&self, time: f64) -> Place {
+    pub fn at(&self, time: f64) -> ArrayState {
         self.lock().track.at(time)
     }
 

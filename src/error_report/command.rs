@@ -1,11 +1,11 @@
 //! `echolume report error`.
 
-use super::asked::Asked;
-use super::{Failure, failed, input, say};
+use crate::args::InputArgs;
 use crate::error_report::{self, Measure, choose, dials, measure, plot};
 use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
+use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest report that is read, bytes.
@@ -13,43 +13,43 @@ const LONGEST: u64 = 64 << 20;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Each dial is turned alone, the rest as the scene has it. Errors are those of the picture before stage 4's tone.\n\n\
+    after_help = "Each dial is varied alone; the other settings stay as in the scene. Errors are those of the picture before the tone mapping of stage 4.\n\n\
                         Examples:\n  \
                         echolume report error --dial step --dial format --size 96x96 -o report\n  \
                         echolume report error sweep.mha --preset fetal --mode vr --under-error 0.01\n  \
                         echolume report error --under-time 16ms"
 )]
-pub struct Error {
+pub struct ErrorReport {
     #[command(flatten)]
-    asked: Asked,
+    input: InputArgs,
     /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick, or
-    /// all; may be given again
+    /// all; may be repeated
     #[arg(long, value_name = "NAME", default_value = "all")]
     dial: Vec<String>,
-    /// Volumes timed at each place of a dial
+    /// Number of volumes timed at each setting of a dial
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
-    /// What places are held against: f64 on the CPU, converged (the device's best), or auto: f64 where it takes under a minute
+    /// Reference: f64 on the CPU, converged (the device's best), or auto: f64 if it takes under a minute
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     against: String,
     /// Write error.json, error.csv, error.svg and error.png into this folder
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// What counts as error: rmse, mm (distance maps) or degrees (normals)
+    /// Error measure: rmse, mm (distance maps) or degrees (normals)
     #[arg(long, value_name = "NAME", default_value = "rmse")]
     measure: String,
-    /// Name the cheapest settings whose error stays under this
+    /// Print the cheapest settings with an error below this
     #[arg(long, value_name = "ERROR")]
     under_error: Option<f64>,
-    /// Name the most accurate settings that take less, such as 16ms
+    /// Print the most accurate settings that take less time, such as 16ms
     #[arg(long, value_name = "TIME")]
     under_time: Option<String>,
-    /// Take the measurements of an earlier report instead of measuring
+    /// Use the measurements of an earlier report (error.json)
     #[arg(long, value_name = "FILE")]
     from: Option<PathBuf>,
 }
 
-impl Error {
+impl ErrorReport {
     pub fn run(&self) -> Result<(), Failure> {
         let measure = match self.measure.as_str() {
             "rmse" => Measure::Rmse,
@@ -82,20 +82,20 @@ impl Error {
             "converged" => measure::Held::Converged,
             other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
         };
-        let (mut source, scene) = self.asked.open()?;
+        let (mut source, scene) = self.input.open()?;
         if let Some(folder) = &self.output {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let dials = self.dials(&scene)?;
-        let context = self.asked.device(false)?;
+        let context = self.input.open_device(false)?;
         let mut frames = Vec::new();
-        self.asked.frames(&mut *source, |frame| {
+        self.input.for_each_frame(&mut *source, |frame| {
             frames.push(frame);
             Ok(())
         })?;
-        let layers = self.asked.layers()?;
-        let (repeats, frames, shown) = (self.repeat, &frames[..], self.asked.shown());
+        let layers = self.input.layers()?;
+        let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
         let asked =
             measure::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
         let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
@@ -109,14 +109,14 @@ impl Error {
         report.map_err(failed)
     }
 
-    /// The dials asked for. Of all, those that the scene has.
+    /// The requested dials. For `all`, those that apply to the scene.
     fn dials(&self, scene: &Scene) -> Result<Vec<dials::Dial>, Failure> {
         let mut turned = Vec::new();
         if self.dial.iter().any(|d| d == "all") {
             for name in dials::NAMES {
                 match dials::dial(name, scene) {
                     Ok(dial) => turned.push(dial),
-                    Err(why) => say!("without {name}: this scene {why}"),
+                    Err(why) => say!("dial {name} left out: this scene {why}"),
                 }
             }
             return Ok(turned);
@@ -142,15 +142,15 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
     Ok(())
 }
 
-/// A stored report.
-pub(super) fn read(file: &Path) -> Result<error_report::Report, Failure> {
+/// Reads a stored report.
+pub(crate) fn read(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
     error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }
 
-/// A time such as 16ms, 0.25s or 250us.
-pub(super) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
+/// Parses a time such as 16ms, 0.25s or 250us, in ns.
+pub(crate) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
     let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
     let parsed =
         units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));

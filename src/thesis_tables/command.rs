@@ -1,15 +1,15 @@
 //! `echolume report tables`.
 
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{Output, check_outputs, open_device};
 use crate::gpu::Choice;
 use crate::picture::grey::Grey;
 use crate::picture::replace;
+use crate::terminal::{Failure, failed, input, say};
 use crate::thesis_tables::measure::{Asked, growth, run};
 use crate::thesis_tables::{csv, markdown};
 use std::path::{Path, PathBuf};
 
-/// Volumes rendered in each row before times count: they compile shaders and wake clocks.
+/// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.
 const WARM_UP: usize = 1;
 
 #[derive(clap::Args)]
@@ -20,19 +20,19 @@ const WARM_UP: usize = 1;
                         echolume report tables --markdown tables.md --csv tables.csv\n  \
                         echolume report tables scan.png --quick --repeat 3"
 )]
-pub struct Tables {
-    /// PNG, JPEG, PNM or BMP for Tables 7-9
+pub struct ThesisTables {
+    /// Pictures for Tables 7-9: PNG, JPEG, PNM or BMP
     pictures: Vec<PathBuf>,
-    /// Volumes measured in each row
+    /// Number of volumes measured in each row
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
     /// Write the tables to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Write Tables 3-6 to this file, too, and Tables 7-9 to NAME.growth.csv beside it
+    /// Write Tables 3-6 also to this file, and Tables 7-9 to NAME.growth.csv next to it
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Volumes of a quarter of the edge and frames of 64 lines, to try
+    /// Quick trial: volumes of a quarter of the edge length, frames of 64 lines
     #[arg(long)]
     quick: bool,
     /// Vulkan device, by number or part of its name (see `echolume devices`)
@@ -40,19 +40,19 @@ pub struct Tables {
     device: Option<Choice>,
 }
 
-impl Tables {
+impl ThesisTables {
     pub fn run(&self) -> Result<(), Failure> {
         let growth_file =
             self.csv.as_ref().filter(|_| !self.pictures.is_empty()).map(|f| f.with_extension("growth.csv"));
-        let targets: [Target; 3] = [
+        let targets: [Output; 3] = [
             ("--markdown", self.markdown.as_deref()),
             ("--csv", self.csv.as_deref()),
             ("--csv", growth_file.as_deref()),
         ];
-        targets::check(&targets, self.pictures.iter().map(PathBuf::as_path))?;
+        check_outputs(&targets, self.pictures.iter().map(PathBuf::as_path))?;
         let greys: Vec<Grey> =
             self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
-        let context = super::look::open_device(self.device.clone(), false)?;
+        let context = open_device(self.device.clone(), false)?;
 
         let asked = Asked { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
         let bar = indicatif::ProgressBar::new(asked.volumes() as u64).with_message("volumes");

@@ -1,9 +1,10 @@
 //! `echolume verify`.
 
-use super::{Failure, failed, input, say, targets};
+use crate::args::check_outputs;
 use crate::files::signals::Held;
 use crate::files::{read_text, replace};
 use crate::gpu::{Choice, Context, ContextOptions, GpuError};
+use crate::terminal::{Failure, failed, input, say};
 use crate::verify::report::baseline::{self, Compared, compare};
 use crate::verify::report::{Level, Outcome, Run, Verdict, html, json, junit, words};
 use crate::verify::self_test::{self, Caught};
@@ -18,56 +19,56 @@ const LONGEST: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 everything is as it should be, 1 something is not, or could not be written, 2 usage or an input, 3 no device.\n\nExamples:\n  \
+    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device.\n\nExamples:\n  \
                         echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
                         echolume verify --full --json before.json               (before the driver is updated)\n  \
                         echolume verify --full --baseline before.json --html after.html\n  \
-                        echolume verify --self-test                             (would it notice?)"
+                        echolume verify --self-test                             (do the checks detect injected faults?)"
 )]
 pub struct Verify {
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
     device: Option<Choice>,
-    /// Every pass, mode and path once: what is run unless --full is given
+    /// Run every pass, mode and path once (the default)
     #[arg(long, conflicts_with = "full")]
     quick: bool,
-    /// Every input of every pass in every scene, and a stress of minutes
+    /// Run every input of every pass in every scene, and a stress test of some minutes
     #[arg(long)]
     full: bool,
-    /// Say what changed since this earlier run (its --json), also what stays within tolerance; exit code 1 if it became worse
+    /// Compare with an earlier run (its --json), also within tolerances; exit code 1 if anything became worse
     #[arg(long, value_name = "FILE")]
     baseline: Option<PathBuf>,
-    /// Ratio of times to the baseline's that is a fault
+    /// Ratio to the baseline's time that counts as a failure
     #[arg(long, value_name = "RATIO", default_value_t = 1.25, requires = "baseline")]
     threshold: f64,
     /// Write JUnit XML, for CI
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Write everything that was measured: the next run's baseline
+    /// Write all measurements (JSON), for --baseline
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a page with pictures side by side
+    /// Write an HTML page with pictures side by side
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Where the pictures of failures go: actual, expected, difference; made when there are some
+    /// Folder for the pictures of failures: actual, expected, difference. Created when needed
     #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
     pictures: PathBuf,
-    /// Plant faults, one after the other, and say which check notices each; one that is not noticed is a failure
+    /// Inject faults one at a time and print which check detects each; an undetected fault is a failure
     #[arg(long, conflicts_with_all = ["against", "baseline", "full", "only", "list"])]
     self_test: bool,
-    /// Draw the pictures of every mode on this device too, and compare them
+    /// Render every mode on this device too, and compare the pictures
     #[arg(long, value_name = "N|NAME")]
     against: Option<Choice>,
-    /// Only checks whose group or name holds this; may be given again
+    /// Run only checks whose group or name contains this; may be repeated
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
-    /// List the checks and end
+    /// List the checks and exit
     #[arg(long)]
     list: bool,
-    /// Without the validation layer, also where it is installed
+    /// Do not use the validation layer even if it is installed
     #[arg(long)]
     no_validation: bool,
-    /// Print what all pictures add up to, and nothing else
+    /// Print only a digest of all pictures
     #[arg(long, hide = true)]
     digest: bool,
 }
@@ -88,9 +89,9 @@ impl Verify {
         }
         let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
-        targets::check(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
+        check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
-        // What was not asked for is not missing.
+        // Checks that were not requested are not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.looks_at(o)));
         let mut bench = self.bench(level)?;
         let (mut run, stopped) = match self.self_test {
@@ -103,7 +104,7 @@ impl Verify {
         self.judge(&run, compared.as_ref(), stopped)
     }
 
-    /// What is looked at on the device, and what came of it; a signal, if one ended it early.
+    /// Runs the checks on the device. Returns the outcomes, and the signal if one ended the run early.
     fn checked(&self, bench: &mut Bench) -> Result<(Run, Option<&'static str>), Failure> {
         let held = Held::first();
         announce(bench);
@@ -121,7 +122,7 @@ impl Verify {
             if group.first().is_some_and(|first| first.group != outcome.group) {
                 tell(&std::mem::take(&mut group));
             }
-            // Of each group one line, but a failure is told at once.
+            // One line per group; a failure is printed at once.
             if outcome.verdict == Verdict::Failed {
                 say!("{}", words::failure(outcome).trim_end());
             }
@@ -131,12 +132,12 @@ impl Verify {
         let mut run = while_told(&held, || verify::run(bench, &checks, || held.signal(), hear));
         tell(&group);
         let stopped = held.signal().filter(|_| ran < checks.len());
-        // Whoever reads only the files is to see it too.
+        // Readers of the report files must see it, too.
         run.outcomes.extend(stopped.map(|signal| verify::stopped(signal, checks.len() - ran)));
         Ok((run, stopped))
     }
 
-    /// Which planted fault each check notices.
+    /// Runs the self-test: which check detects each injected fault.
     fn tested(&self, bench: &Bench) -> Result<Run, Failure> {
         announce(bench);
         let begun = Instant::now();
@@ -149,7 +150,7 @@ impl Verify {
         Ok(bench.run_of(caught.iter().map(Caught::outcome).collect(), begun))
     }
 
-    /// With validation, where its layer is installed.
+    /// Opens the device, with validation if its layer is installed.
     fn bench(&self, level: Level) -> Result<Bench, Failure> {
         let device = self.device.clone().unwrap_or(Choice::Best);
         let with = |validation| Bench::new(&ContextOptions { device: device.clone(), validation }, level);
@@ -163,15 +164,14 @@ impl Verify {
     fn chosen(&self, mut checks: Vec<Check>) -> Result<Vec<Check>, Failure> {
         checks.retain(|check| self.wants(check.group, &check.name));
         match checks.is_empty() {
-            true => Err(input(format!(
-                "--only {}: no check is called so; --list says what there are",
-                self.only.join(", ")
-            ))),
+            true => {
+                Err(input(format!("--only {}: no check has this name; --list prints all names", self.only.join(", "))))
+            }
             false => Ok(checks),
         }
     }
 
-    /// Whether this run would have had a check of an earlier one.
+    /// True if this run includes a check of an earlier one.
     fn looks_at(&self, earlier: &Outcome) -> bool {
         (earlier.group == "against") == self.against.is_some() && self.wants(&earlier.group, &earlier.name)
     }
@@ -181,7 +181,7 @@ impl Verify {
             || self.only.iter().any(|part| group.contains(part.as_str()) || name.contains(part.as_str()))
     }
 
-    /// Writes what shows each failure, and names the files in it. A folder that cannot be written to loses only them.
+    /// Writes the pictures of each failure and stores their file names in it. If the folder cannot be written, only the pictures are lost.
     fn save_pictures(&self, run: &mut Run) {
         for outcome in run.outcomes.iter_mut().filter(|o| o.verdict == Verdict::Failed) {
             for shown in &outcome.pictures {
@@ -219,7 +219,10 @@ impl Verify {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
         }
         if let Some(signal) = stopped {
-            return Err(failed(format!("{signal} came before all {} checks were run", run.outcomes.len() - 1)));
+            return Err(failed(format!(
+                "{signal} ended the run before all {} checks were done",
+                run.outcomes.len() - 1
+            )));
         }
         let worse = compared.filter(|c| c.is_worse()).map_or(0, Compared::worse_checks);
         match (run.count(Verdict::Failed), worse) {
@@ -230,7 +233,7 @@ impl Verify {
     }
 }
 
-/// Writes a file, where one is asked for.
+/// Writes a report file, if one was requested.
 fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
     let Some(file) = file else { return Ok(()) };
     replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
@@ -241,11 +244,11 @@ fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) ->
 fn announce(bench: &Bench) {
     let device = &bench.context.candidate;
     let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
-    let watched = if bench.watched() { "" } else { "; the validation layer does not watch" };
+    let watched = if bench.watched() { "" } else { "; without the validation layer" };
     say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
 }
 
-/// Says at once that a signal came: the check that runs may take a minute.
+/// Reports a signal at once: the running check may take a minute.
 fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
     const OFTEN: Duration = Duration::from_millis(100);
     let (working, works) = mpsc::channel::<()>();
@@ -253,7 +256,7 @@ fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
         scope.spawn(move || {
             while held.signal().is_none() && works.recv_timeout(OFTEN) == Err(RecvTimeoutError::Timeout) {}
             if let Some(signal) = held.signal() {
-                say!("{signal}: ends after this check; once more, and it ends at once with nothing written");
+                say!("{signal}: stopping after this check; a second signal stops at once and writes nothing");
             }
         });
         let done = work();
@@ -272,7 +275,7 @@ fn context(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
     Context::new(options).map_err(no_device)
 }
 
-/// What there is no device for is told apart by its exit code.
+/// A missing device has an exit code of its own.
 fn no_device(error: GpuError) -> Failure {
     match error {
         GpuError::NoLoader(_) | GpuError::NoDevice | GpuError::NoneFits(_) | GpuError::NoSuchDevice { .. } => {
@@ -282,7 +285,7 @@ fn no_device(error: GpuError) -> Failure {
     }
 }
 
-/// Letters and digits of a title, so that it may be a file's name anywhere; of bounded length.
+/// A file name made of the letters and digits of a title, of bounded length.
 fn file_name(title: &str) -> String {
     let plain = title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     let mut name = String::new();

@@ -1,49 +1,53 @@
-//! What a view is made of, whether flags or a configuration say so.
+//! The configuration of a view: device, window and console, from flags or from a configuration file.
 
-use super::arriving::Arriving;
-use super::look::Look;
 use super::view::rungs;
-use super::{Failure, input};
+use crate::args::{SceneArgs, SourceArgs};
 use crate::gpu::window::{PresentMode, display};
 use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
-use crate::live::cine::Room;
+use crate::live::cine::CineLimits;
 use crate::source::live::Live;
+use crate::terminal::{Failure, input};
 use crate::ui::console::{Amiss, Console, Options};
 use crate::ui::source_supervisor::Open;
 use crate::ui::window::{self, Make, Shape};
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
-/// Of a window, where nothing else is said, pixels.
-const SIZE: [u32; 2] = [1280, 800];
+/// Default size of the window, pixels.
+const DEFAULT_SIZE: [u32; 2] = [1280, 800];
 
-/// The device and the window: what stays as it was at the start.
-pub struct Place {
+/// The device and the window. They stay the same for the whole run.
+pub struct WindowConfig {
     pub device: ContextOptions,
     pub shape: Shape,
-    /// A monitor that no desktop holds, instead of a window.
+    /// A monitor without a desktop, instead of a window.
     pub direct: Option<display::Wanted>,
 }
 
-impl Place {
-    pub fn usual() -> Place {
+impl WindowConfig {
+    /// The default: the best device, a window of [`DEFAULT_SIZE`].
+    pub fn usual() -> WindowConfig {
         let device = ContextOptions { device: Choice::Best, validation: false };
         let (monitor, pace, time) = (None, PresentMode::Fifo, None);
         let direct = None;
-        Place { device, direct, shape: Shape { size: SIZE, full_screen: false, monitor, pace, stays: false, time } }
+        WindowConfig {
+            device,
+            direct,
+            shape: Shape { size: DEFAULT_SIZE, full_screen: false, monitor, pace, stays: false, time },
+        }
     }
 
-    /// Runs what is made there until someone leaves.
+    /// Opens the window and runs the console that `make` creates, until the user leaves.
     ///
     /// # Errors
-    /// As of [`window::run`].
+    /// Those of [`window::run`].
     pub fn run(self, make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
         match self.direct {
             None => window::run(&self.device, self.shape, make),
             #[cfg(target_os = "linux")]
             Some(wanted) => {
-                // What is typed would otherwise reach the shell behind, and be run there at the end.
+                // Grab the keyboard: otherwise the shell of the terminal would run what is typed.
                 let (pace, time) = (self.shape.pace, self.shape.time);
                 let shape = crate::ui::direct::Shape { wanted, pace, grab: true, time };
                 crate::ui::direct::run(&self.device, shape, make)
@@ -53,8 +57,9 @@ impl Place {
         }
     }
 
-    pub fn configured(config: &Config) -> Result<Place, Failure> {
-        let mut place = Place::usual();
+    /// The device and window of a configuration.
+    pub fn configured(config: &Config) -> Result<WindowConfig, Failure> {
+        let mut place = WindowConfig::usual();
         let display = &config.display;
         place.shape.size = display.size;
         place.shape.full_screen = display.full_screen;
@@ -76,31 +81,32 @@ impl Place {
     }
 }
 
-/// Everything else.
-pub struct Wanted {
-    /// None: there is nothing to see.
-    pub source: Option<Arriving>,
-    /// It was opened before there was a window.
+/// The source and the console. A kiosk reads them anew after a fault.
+pub struct ConsoleConfig {
+    /// None: the console shows only a message.
+    pub source: Option<SourceArgs>,
+    /// The source, if it was opened before the window.
     pub first: Option<Box<dyn Live>>,
     pub options: Options,
 }
 
-impl Wanted {
-    /// Nothing to see, for a console that only says why; also without a configuration there is a way out.
-    pub fn nothing() -> Wanted {
+impl ConsoleConfig {
+    /// A console that shows only a message. The default exit keys work.
+    pub fn nothing() -> ConsoleConfig {
         let exit = Config::default().keys.exit;
         let options = Options { panels: false, exit, is_kiosk: true, ..Options::usual() };
-        Wanted { source: None, first: None, options }
+        ConsoleConfig { source: None, first: None, options }
     }
 
-    pub fn configured(config: &Config, look: &Look) -> Result<Wanted, Failure> {
+    /// The console of a configuration. The flags of `scene` override its settings.
+    pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
         let layers = config.layers().map_err(|e| input(config.refuse(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
         let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
         let options = Options {
-            settings: look.layers_over(layers, &[])?.finish().map_err(input)?,
+            settings: scene.layers_over(layers, &[])?.finish().map_err(input)?,
             update: live.update,
-            cine: Room { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
+            cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
             budget: display.budget,
             rungs: rungs(display.report.as_deref())?,
             retry: Some(live.retry),
@@ -110,24 +116,24 @@ impl Wanted {
             scale: display.scale as f32,
             ..Options::usual()
         };
-        Ok(Wanted { source: Some(Arriving::configured(config)?), first: None, options })
+        Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
 
-    /// With its source open.
+    /// The same with its source open.
     ///
     /// # Errors
-    /// Why it cannot be opened.
-    pub fn opened(mut self) -> Result<Wanted, Failure> {
-        self.first = self.source.as_ref().map(Arriving::open).transpose()?;
+    /// The source cannot be opened.
+    pub fn opened(mut self) -> Result<ConsoleConfig, Failure> {
+        self.first = self.source.as_ref().map(SourceArgs::open).transpose()?;
         Ok(self)
     }
 
-    /// As the console takes it. `factor`: pixels a point of the window system.
+    /// The arguments of the console: how to open the source, and its options. `factor`: pixels per point of the window system.
     pub fn options(self, factor: f32, wake: Wake, amiss: Option<Amiss>) -> (Open, Options) {
         let (source, first) = (self.source, Mutex::new(self.first));
         let open: Open = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
             Some(source) => Ok(source),
-            None => match source.as_ref().map(Arriving::open) {
+            None => match source.as_ref().map(SourceArgs::open) {
                 Some(opened) => opened.map_err(Failure::message),
                 None => Err("there is no source".into()),
             },
@@ -137,7 +143,7 @@ impl Wanted {
     }
 }
 
-/// Now, as it goes into names of files.
+/// The current time, formatted for file names.
 fn stamp() -> String {
     crate::ui::export::stamp(SystemTime::now())
 }

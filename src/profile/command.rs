@@ -1,14 +1,12 @@
 //! `echolume profile`.
 
-use super::asked::Asked;
-use super::look::open_device;
-use super::targets::{self, Target};
-use super::{Failure, failed, input, say};
+use crate::args::{InputArgs, Output, check_outputs, open_device};
 use crate::files::{read_text, replace};
 use crate::gpu::Choice;
 use crate::profile as model;
 use crate::profile::measure;
 use crate::profile::{compare, formats, table, trace};
+use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest profile that is read, bytes.
@@ -22,45 +20,44 @@ const LONGEST: u64 = 256 << 20;
                         echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)")]
 pub struct Profile {
     #[command(flatten)]
-    asked: Asked,
-    /// Volumes measured
+    input: InputArgs,
+    /// Number of volumes to measure
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10000))]
     repeat: u32,
-    /// Volumes rendered before that: they compile shaders and wake clocks
+    /// Number of warm-up volumes: the driver compiles shaders and the clocks rise
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     warm_up: u32,
-    /// Send the frames once and measure the picture alone
+    /// Upload the frames once and measure only the picture
     #[arg(long)]
     still: bool,
-    /// Turn the view by this much before each volume, so that every picture is from another angle: the camera's azimuth, that
-    /// of the planes where planes are cut
+    /// Rotate the view by this angle before each volume: the azimuth of the camera, or of the planes
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
     turn: f64,
-    /// Leave out measuring what bounds the device (copies, samples, fetches)
+    /// Do not measure the device's ceilings (copies, samples, fetches)
     #[arg(long)]
     no_ceilings: bool,
-    /// Write everything measured, to be compared later
+    /// Write all measurements (JSON), for --compare
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write one line a pass
+    /// Write one line per pass (CSV)
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write one line a pass and repeat
+    /// Write one line per pass and repeat (CSV)
     #[arg(long, value_name = "FILE")]
     csv_samples: Option<PathBuf>,
     /// Write a trace for Perfetto or Chrome
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Compare two profiles pass by pass instead of measuring; exit code 1 on a regression
+    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression
     #[arg(long, num_args = 2, value_names = ["OLD", "NEW"])]
     compare: Option<Vec<PathBuf>>,
-    /// Measure on this device too, in turns with the other, and compare them
+    /// Measure on this device too, alternating with the other, and compare them
     #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
     against: Option<Choice>,
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,
-    /// Compare also what was measured on other scenes or sizes
+    /// Compare also profiles of different scenes or sizes
     #[arg(long)]
     force: bool,
 }
@@ -74,22 +71,22 @@ impl Profile {
     }
 
     fn measure(&self) -> Result<(), Failure> {
-        let (mut source, mut scene) = self.asked.open()?;
+        let (mut source, mut scene) = self.input.open()?;
         scene.settings.slices.still |= self.still;
-        let targets: [Target; 4] = [
+        let targets: [Output; 4] = [
             ("--json", self.json.as_deref()),
             ("--csv", self.csv.as_deref()),
             ("--csv-samples", self.csv_samples.as_deref()),
             ("--trace", self.trace.as_deref()),
         ];
-        self.asked.check_targets(&targets, &*source)?;
+        self.input.check_outputs(&targets, &*source)?;
         if !self.turn.is_finite() {
             return Err(input(format!("--turn {}: must be a finite angle in degrees", self.turn)));
         }
-        let context = self.asked.device(false)?;
-        // One volume, kept for all repeats.
+        let context = self.input.open_device(false)?;
+        // All repeats use the same volume.
         let mut frames = Vec::new();
-        self.asked.frames(&mut *source, |frame| {
+        self.input.for_each_frame(&mut *source, |frame| {
             frames.push(frame);
             Ok(())
         })?;
@@ -98,7 +95,7 @@ impl Profile {
             warm_up: self.warm_up as usize,
             still: self.still,
             turn: self.turn,
-            input: self.asked.shown(),
+            input: self.input.name(),
             ceilings: !self.no_ceilings,
         };
         let against = match &self.against {
@@ -131,12 +128,12 @@ impl Profile {
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {
-        targets::check(&[("--json", self.json.as_deref())], [old, new])?;
+        check_outputs(&[("--json", self.json.as_deref())], [old, new])?;
         let (old, new) = (read(old)?, read(new)?);
         self.judge(&old, &new)
     }
 
-    /// Prints what differs; fails on a regression.
+    /// Prints the differences. Fails on a regression.
     fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
         let options = compare::Options { threshold: self.threshold, force: self.force, ..compare::Options::default() };
         let compared = compare::compare(old, new, &options).map_err(input)?;

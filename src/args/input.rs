@@ -1,0 +1,267 @@
+//! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
+
+use crate::files::check_target;
+use crate::gpu::context::list;
+use crate::gpu::{Choice, Context, ContextOptions, Fetch, GpuError, select};
+use crate::scene::load::Layers;
+use crate::scene::{Input, Scene};
+use crate::source::phantom::{self, Phantom};
+use crate::source::phantom_source::PhantomSource;
+use crate::source::{self, Frame, Source};
+use crate::terminal::{Failure, failed, input, say};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The arguments of every command that renders a recording.
+#[derive(clap::Args)]
+pub struct InputArgs {
+    /// Recording: MetaImage (.mha, .mhd), Kretz (.vol) or frames (.frames). Without one, a synthetic fetal head (preset phantom)
+    input: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the recording]
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// Volume of the recording to use, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    volume: usize,
+}
+
+impl InputArgs {
+    /// Opens the recording and builds the scene of the chosen volume.
+    pub fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
+        self.open_with(&[])
+    }
+
+    /// Like [`InputArgs::open`], with `chosen` assignments as a layer of settings below the flags and `--set`.
+    pub fn open_with(&self, chosen: &[String]) -> Result<(Box<dyn Source>, Scene), Failure> {
+        let source = self.source()?;
+        if self.volume >= source.volumes() {
+            let (wanted, count) = (self.volume, source.volumes());
+            return Err(input(format!("{}: --volume {wanted}: there are {count}, numbered from 0", self.name())));
+        }
+        let geometry = source.geometry(self.volume);
+        let samples = Input { stored: source.stored_type(), range: source.range() };
+        let settings = self.layers_with(chosen)?.finish().map_err(input)?;
+        let scene = Scene::new(geometry, samples, settings).map_err(input)?;
+        Ok((source, scene))
+    }
+
+    /// The recording as it was typed, or `phantom`.
+    pub fn name(&self) -> String {
+        self.input.as_ref().map_or("phantom".into(), |file| file.display().to_string())
+    }
+
+    /// Refuses outputs that would replace an input: the files of the source or of the settings. See [`check_outputs`].
+    pub fn check_outputs(&self, outputs: &[Output], source: &dyn Source) -> Result<(), Failure> {
+        let mut read = source.files();
+        read.extend(self.probe.clone());
+        read.extend(self.scene.files());
+        check_outputs(outputs, read.iter().map(PathBuf::as_path))
+    }
+
+    /// Calls `each` with every frame of the volume, in the order of the recording, and shows a progress bar.
+    pub fn for_each_frame(
+        &self,
+        source: &mut dyn Source,
+        mut each: impl FnMut(Frame) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        source.skip_to_volume(self.volume).map_err(input)?;
+        let frames = source.frames_per_volume();
+        let bar = indicatif::ProgressBar::new(frames as u64).with_message("frames");
+        let mut volume = None;
+        for _ in 0..frames {
+            let Some(frame) = source.next_frame().map_err(input)? else { break };
+            // An incomplete volume has fewer frames: the next one then begins earlier.
+            if *volume.get_or_insert(frame.volume) != frame.volume {
+                break;
+            }
+            each(frame)?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+
+    /// `scene` with the way of sampling that the chosen device will use. Without a device the scene stays unchanged.
+    pub fn resolve_sampling(&self, scene: Scene) -> Scene {
+        let devices = list().unwrap_or_default();
+        match select::choose(&devices, self.scene.device.as_ref().unwrap_or(&Choice::Best)) {
+            Ok(n) => scene.sampled(Fetch::of(&devices[n]).sampling()),
+            Err(_) => scene,
+        }
+    }
+
+    /// Opens the chosen device and prints its name.
+    pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
+        self.scene.open_device(validation)
+    }
+
+    fn source(&self) -> Result<Box<dyn Source>, Failure> {
+        match &self.input {
+            Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
+            None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
+        }
+    }
+
+    /// The layers of settings before they are resolved.
+    pub fn layers(&self) -> Result<Layers, Failure> {
+        self.layers_with(&[])
+    }
+
+    fn layers_with(&self, chosen: &[String]) -> Result<Layers, Failure> {
+        self.scene.layers(self.input.is_none(), chosen)
+    }
+}
+
+/// The arguments that choose the settings of a scene, in layers, and the device.
+#[derive(clap::Args)]
+pub struct SceneArgs {
+    /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
+    #[arg(long)]
+    mode: Option<String>,
+    /// single, or 4up: three orthogonal planes and the rendering
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<String>,
+    /// Transfer function: grey, sepia, skin, bone, cool, warm, or a .toml file of points
+    #[arg(long, value_name = "NAME|FILE")]
+    transfer: Option<String>,
+    /// File of settings (TOML)
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Preset of settings: bmode, bone, fetal, phantom, thesis. May be repeated; a later one overrides an earlier one
+    #[arg(long, value_name = "NAME")]
+    preset: Vec<String>,
+    /// Width and height of the picture, pixels
+    #[arg(long, value_name = "WxH")]
+    size: Option<String>,
+    /// azimuth, elevation, roll, fov (deg; 0 is parallel), zoom, target=lateral:depth:elevation (mm)
+    #[arg(long, value_name = "KEY=VALUE,...", allow_hyphen_values = true)]
+    camera: Option<String>,
+    /// Region of interest, mm: lateral=LOW:HIGH,depth=LOW:HIGH,elevation=LOW:HIGH
+    #[arg(long, value_name = "SIDE=LOW:HIGH,...", allow_hyphen_values = true)]
+    roi: Option<String>,
+    /// Any setting of a scene file, such as surface.threshold=0.1. The value none switches a filter or light off: light.shadow=none
+    #[arg(long, value_name = "KEY.PATH=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
+    /// Vulkan device, by number or part of its name (see `echolume devices`)
+    #[arg(long, value_name = "N|NAME")]
+    pub device: Option<Choice>,
+}
+
+impl SceneArgs {
+    /// The layers of settings before they are resolved. `chosen` assignments form a layer below the flags and `--set`.
+    pub fn layers(&self, is_phantom: bool, chosen: &[String]) -> Result<Layers, Failure> {
+        let mut layers = Layers::default();
+        if is_phantom {
+            layers.preset("phantom").map_err(input)?;
+        }
+        self.layers_over(layers, chosen)
+    }
+
+    /// Adds the presets, files and flags on top of `layers`.
+    pub fn layers_over(&self, mut layers: Layers, chosen: &[String]) -> Result<Layers, Failure> {
+        for preset in &self.preset {
+            layers.preset(preset).map_err(input)?;
+        }
+        if let Some(file) = &self.scene {
+            layers.file(file).map_err(input)?;
+        }
+        for assignment in chosen {
+            // A setting that is absent cannot be switched off.
+            if !assignment.ends_with("=none") || layers.has(assignment) {
+                layers.set_by(&format!("--budget, {assignment}"), assignment).map_err(input)?;
+            }
+        }
+        for (flag, assignment) in self.assignments()? {
+            layers.set_by(&flag, &assignment).map_err(input)?;
+        }
+        for assignment in &self.set {
+            layers.set(assignment).map_err(input)?;
+        }
+        Ok(layers)
+    }
+
+    /// The files that settings are read from.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.scene.iter().cloned().chain(self.transfer.iter().map(PathBuf::from))
+    }
+
+    /// True if `--size` was given.
+    #[cfg(feature = "view")]
+    pub fn has_size(&self) -> bool {
+        self.size.is_some()
+    }
+
+    /// Each flag as it was typed, with the assignment that it stands for.
+    fn assignments(&self) -> Result<Vec<(String, String)>, Failure> {
+        let mut set = Vec::new();
+        set.extend(self.mode.as_ref().map(|mode| (format!("--mode {mode}"), format!("mode={mode}"))));
+        for (name, key, value) in
+            [("--layout", "layout", &self.layout), ("--transfer", "volume.transfer", &self.transfer)]
+        {
+            set.extend(value.as_ref().map(|value| (format!("{name} {value}"), format!("{key}={value}"))));
+        }
+        if let Some(size) = &self.size {
+            let flag = format!("--size {size}");
+            let edges = size.split_once('x').and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)));
+            let (w, h) = edges.ok_or_else(|| input(format!("{flag}: must read WIDTHxHEIGHT in pixels, as 512x512")))?;
+            set.push((flag, format!("picture.size=[{w},{h}]")));
+        }
+        for (name, table, text) in [("--camera", "camera", &self.camera), ("--roi", "region", &self.roi)] {
+            for part in text.iter().flat_map(|t| t.split(',')) {
+                let flag = format!("{name} {part}");
+                let pair = part.split_once('=');
+                let (key, value) = pair.ok_or_else(|| input(format!("{flag}: must read key=value,key=value")))?;
+                let key = if key == "fov" { "field_of_view" } else { key };
+                let value = if value.contains(':') { format!("[{}]", value.replace(':', ",")) } else { value.into() };
+                set.push((flag, format!("{table}.{key}={value}")));
+            }
+        }
+        Ok(set)
+    }
+
+    /// Opens the chosen device and prints its name.
+    pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
+        open_device(self.device.clone(), validation)
+    }
+}
+
+/// Opens the chosen device, or the best one, and prints its name on one line.
+pub fn open_device(choice: Option<Choice>, validation: bool) -> Result<Arc<Context>, Failure> {
+    let device = choice.unwrap_or(Choice::Best);
+    let context = Context::new(&ContextOptions { device, validation }).map_err(|e| match e {
+        GpuError::NoSuchDevice { .. } => input(e),
+        e => failed(e),
+    })?;
+    let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
+    say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
+    Ok(context)
+}
+
+/// The flag that names an output, and its file if the flag was given.
+pub type Output<'a> = (&'a str, Option<&'a Path>);
+
+/// Refuses outputs that cannot be written, that would replace an input (`read`), or that are written twice.
+pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+    let read: Vec<&Path> = read.into_iter().collect();
+    let outputs: Vec<(&str, &Path)> = outputs.iter().filter_map(|(flag, file)| Some((*flag, (*file)?))).collect();
+    for (n, (flag, file)) in outputs.iter().enumerate() {
+        let refuse = |why: String| Err(input(format!("{flag} {}: {why}; give another name", file.display())));
+        if read.iter().any(|input| is_same_file(input, file)) {
+            return refuse("would replace an input".into());
+        }
+        if let Some((other, _)) = outputs[..n].iter().find(|(_, before)| is_same_file(before, file)) {
+            return refuse(format!("is written by {other} already"));
+        }
+        check_target(file).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// True if both paths name the same regular file. A device may be written to more than once.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let resolved = |file: &Path| file.canonicalize().ok();
+    let is_special = std::fs::metadata(b).is_ok_and(|m| !m.is_file());
+    !is_special && (a == b || resolved(a).is_some_and(|a| resolved(b) == Some(a)))
+}

@@ -1,0 +1,9 @@
+//! Command-line arguments that several commands share.
+
+mod input;
+mod motor;
+mod source;
+
+pub use input::{InputArgs, Output, SceneArgs, check_outputs, open_device};
+pub use motor::{SerialArgs, motor_failure, motor_table};
+pub use source::{SourceArgs, StreamArgs};

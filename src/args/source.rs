@@ -1,0 +1,243 @@
+//! Arguments of commands that render live: the source of frames, and how volumes become pictures.
+
+use super::motor::{MotorArgs, PlannedSweep};
+use crate::kiosk::config::Config;
+use crate::live::Update;
+use crate::probe::Geometry;
+use crate::source::Source;
+use crate::source::freehand;
+use crate::source::igtl::{Network, NetworkOptions, Poses};
+use crate::source::live::{Live, Playback, PlaybackSource};
+use crate::source::motor_tracking::FreeRunning;
+use crate::source::phantom::{self, Phantom};
+use crate::source::phantom_source::CachedPhantom;
+use crate::source::piped::Piped;
+use crate::terminal::{Failure, failed, input};
+use clap::Parser;
+use std::path::{Path, PathBuf};
+
+/// Volumes of the phantom. They are computed once and played in a loop: two sweeps forth and two back.
+const PHANTOM_VOLUMES: usize = 4;
+/// Default rate of the phantom, volumes per second.
+const PHANTOM_RATE: f64 = 1.0;
+/// Prefix of OpenIGTLink addresses.
+const NETWORK: &str = "igtl://";
+
+/// The source of live frames.
+#[derive(Clone, clap::Args)]
+pub struct SourceArgs {
+    /// phantom; a recording (.mha, .mhd, .vol, .frames); - for standard input (a line of JSON, then raw frames, as
+    /// tools/pipe_frames.py writes them); igtl://HOST[:PORT] for OpenIGTLink
+    #[arg(long, value_name = "SOURCE", default_value = "phantom")]
+    source: String,
+    /// Geometry of the probe (TOML), for sources that do not state it
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+    /// Rate of a recording or the phantom, volumes per second [default: as fast as possible; the phantom: 1]
+    #[arg(long, value_name = "N", conflicts_with = "real_time")]
+    rate: Option<f64>,
+    /// Play a recording at the rate of its time stamps
+    #[arg(long)]
+    real_time: bool,
+    /// Number of times that a recording is played
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    rounds: u32,
+    /// OpenIGTLink: the device (TRANSFORM) or tool (TDATA) that tracks 2D frames; "image": the matrix of each IMAGE [default: any TRANSFORM]
+    #[arg(long, value_name = "NAME")]
+    tool: Option<String>,
+    /// The rectangle of each tracked frame that holds ultrasound, pixels
+    #[arg(long, value_name = "X,Y,W,H")]
+    clip: Option<String>,
+    /// Voxel spacing of the volume that tracked frames are compounded into, mm [default: the frames' pixel spacing]
+    #[arg(long, value_name = "MM")]
+    spacing: Option<f64>,
+    /// Widest gap between tracked frames that is filled, mm
+    #[arg(long, value_name = "MM", default_value_t = 2.0)]
+    hole: f64,
+    #[command(flatten)]
+    motor: MotorArgs,
+}
+
+/// The arguments alone, to parse what a configuration states.
+#[derive(Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct SourceParser {
+    #[command(flatten)]
+    source: SourceArgs,
+}
+
+impl SourceArgs {
+    /// The source that a configuration states. Messages name its keys.
+    pub fn from_config(config: &Config) -> Result<SourceArgs, Failure> {
+        let parsed = SourceParser::try_parse_from(config.source_arguments()).map_err(|error| {
+            let text = error.to_string();
+            // Usage and the hint to --help follow an empty line. They apply to a command line only.
+            let text = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").replace("\n ", "");
+            input(config.refuse(&text))
+        })?;
+        parsed.source.check().map_err(|failure| match failure {
+            Failure::Input(text) => input(config.refuse(&text)),
+            failure => failure,
+        })?;
+        Ok(parsed.source)
+    }
+
+    /// Checks the values without opening the source.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.playback(self.rate)?;
+        self.network()?;
+        self.motor.check()
+    }
+
+    /// True if the source is the built-in phantom.
+    pub fn is_phantom(&self) -> bool {
+        self.source == "phantom"
+    }
+
+    /// The name of the source for messages.
+    pub fn name(&self) -> &str {
+        match self.source.as_str() {
+            "-" => "standard input",
+            source => source,
+        }
+    }
+
+    /// The source as a path. Meaningful only if it is a file.
+    pub fn path(&self) -> &Path {
+        Path::new(&self.source)
+    }
+
+    /// Opens the source. With a motor, also opens its port and starts it.
+    pub fn open(&self) -> Result<Box<dyn Live>, Failure> {
+        let network = self.source.strip_prefix(NETWORK);
+        let is_file = !self.is_phantom() && self.source != "-" && network.is_none();
+        let fan = self.is_phantom().then_some(phantom::FAN_ANGLE_DEG);
+        let sweep = self.motor.plan(self.probe.as_deref(), is_file.then(|| self.path()), fan)?;
+        if self.is_phantom() {
+            return self.phantom(sweep.as_ref());
+        }
+        let source: Box<dyn Live> = if self.source == "-" {
+            Box::new(Piped::new(std::io::stdin(), self.probe.as_deref()).map_err(input)?)
+        } else if let Some(address) = network {
+            if address.is_empty() {
+                return Err(input(format!("--source {}: must read igtl://HOST or igtl://HOST:PORT", self.source)));
+            }
+            if sweep.is_some() {
+                return Err(input(format!(
+                    "--source {}: its frames carry their own positions; --motor is for frames without",
+                    self.source
+                )));
+            }
+            let network = Network::connect(address, self.network()?);
+            Box::new(network.map_err(|e| failed(format!("{}: {e}", self.source)))?)
+        } else {
+            let recording = crate::source::open(self.path(), self.probe.as_deref()).map_err(input)?;
+            // The frame rate of a free-running probe is limited by the speed of sound.
+            let rate = self.rate.or(sweep.as_ref().and_then(|_| acoustic_rate(&*recording)));
+            Box::new(PlaybackSource::new(recording, self.playback(rate)?, self.rounds))
+        };
+        match sweep {
+            Some(sweep) => {
+                let motor = sweep.start()?;
+                Ok(sweep.track(source, motor, is_file))
+            }
+            None => Ok(source),
+        }
+    }
+
+    fn playback(&self, rate: Option<f64>) -> Result<Playback, Failure> {
+        match rate {
+            _ if self.real_time => Ok(Playback::Recorded),
+            Some(rate) if !(rate > 0.0 && rate <= 1e6) => {
+                Err(input(format!("--rate {rate}: must be above 0, at most 1e6 volumes a second")))
+            }
+            Some(rate) => Ok(Playback::Volumes(rate)),
+            None => Ok(Playback::Fast),
+        }
+    }
+
+    /// The phantom: its volumes in a loop, or with a motor the frames that the moving array acquires.
+    fn phantom(&self, sweep: Option<&PlannedSweep>) -> Result<Box<dyn Live>, Failure> {
+        let options =
+            phantom::PhantomOptions { volumes: PHANTOM_VOLUMES, both_ways: true, ..phantom::PhantomOptions::default() };
+        let Some(sweep) = sweep else {
+            let playback = self.playback(self.rate.or(Some(PHANTOM_RATE)))?;
+            let phantom = Phantom::new(options).map_err(input)?;
+            return Ok(Box::new(PlaybackSource::new(Box::new(CachedPhantom::new(phantom)), playback, u32::MAX)));
+        };
+        if self.rate.is_some() || self.real_time {
+            return Err(input(
+                "--rate and --real-time: with --motor the speed of sound and the motor set the rate of the phantom",
+            ));
+        }
+        let phantom = FreeRunning::phantom(options, sweep.speed).map_err(input)?;
+        let motor = sweep.start()?;
+        let source = FreeRunning::new(phantom, motor.watch().clone());
+        Ok(sweep.track(Box::new(source), motor, false))
+    }
+
+    fn network(&self) -> Result<NetworkOptions, Failure> {
+        let mut options = NetworkOptions::default();
+        match (&mut options.poses, self.tool.as_deref()) {
+            (poses, Some("image")) => *poses = Poses::Image,
+            (Poses::Messages { device, .. }, tool) => *device = tool.map(str::to_string),
+            (Poses::Image, _) => {}
+        }
+        let positive = |flag: &str, mm: f64, least: f64| match mm >= least && mm <= 1000.0 {
+            true => Ok(mm),
+            false => Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm"))),
+        };
+        let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
+        let widest_hole = positive("--hole", self.hole, 0.0)?;
+        options.freehand =
+            freehand::CompoundingOptions { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
+        Ok(options)
+    }
+
+    fn clip(&self) -> Result<Option<[usize; 4]>, Failure> {
+        let Some(text) = &self.clip else { return Ok(None) };
+        let numbers: Option<Vec<usize>> = text.split(',').map(|n| n.parse().ok()).collect();
+        match numbers.and_then(|n| <[usize; 4]>::try_from(n).ok()) {
+            Some(clip) => Ok(Some(clip)),
+            None => Err(input(format!("--clip {text}: must read X,Y,W,H in pixels, as 100,40,520,440"))),
+        }
+    }
+}
+
+/// The volume rate that the speed of sound allows, per second. None for a Cartesian volume.
+fn acoustic_rate(source: &dyn Source) -> Option<f64> {
+    match source.geometry(0) {
+        Geometry::Sweep(probe) => Some(1.0 / probe.acquisition_time()),
+        Geometry::Cartesian(_) => None,
+    }
+}
+
+/// How the volumes of a live source become pictures.
+#[derive(clap::Args)]
+pub struct StreamArgs {
+    /// whole: a volume is shown when all of its frames have arrived; rolling: each frame is shown at once
+    #[arg(long, value_name = "HOW", default_value = "whole")]
+    update: String,
+    /// Number of volume buffers with --update whole, 2 or 3
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=3))]
+    pub images: u32,
+    /// Number of device queues to use, 1 to 3 [default: one for each kind of work that the device has a queue for]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
+    queues: Option<u8>,
+}
+
+impl StreamArgs {
+    /// The value of `--update`.
+    pub fn update(&self) -> Result<Update, Failure> {
+        match self.update.as_str() {
+            "whole" => Ok(Update::Whole),
+            "rolling" => Ok(Update::Rolling),
+            other => Err(input(format!("--update {other}: must be whole or rolling"))),
+        }
+    }
+
+    /// The value of `--queues`.
+    pub fn queues(&self) -> Option<usize> {
+        self.queues.map(usize::from)
+    }
+}

@@ -1,0 +1,100 @@
+//! What a command says to the terminal: lines on standard output, and the one line that ends a command that failed.
+
+use std::io::{ErrorKind, Write};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Longest message of a failure, characters.
+const MAX_MESSAGE: usize = 600;
+
+/// The first error of writing to standard output.
+static WRITE_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
+/// True once the reader of standard output has closed it.
+static IS_CLOSED: AtomicBool = AtomicBool::new(false);
+
+/// Prints one line on standard output. Takes the arguments of `format!`.
+macro_rules! say {
+    ($($word:tt)*) => { crate::terminal::print(format_args!($($word)*)) };
+}
+pub(crate) use say;
+
+/// Why a command ends early, in one line.
+#[derive(Debug)]
+pub enum Failure {
+    /// The input or the command line is wrong: exit code 2.
+    Input(String),
+    /// The request was valid but could not be carried out: exit code 1.
+    Failed(String),
+    /// `verify` found no device to test: exit code 3.
+    NoDevice(String),
+}
+
+impl Failure {
+    /// The message without its kind.
+    pub fn message(self) -> String {
+        let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = self;
+        message
+    }
+
+    /// The exit code of the process.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Failed(_) => 1,
+            Failure::Input(_) => 2,
+            Failure::NoDevice(_) => 3,
+        }
+    }
+}
+
+/// A failure of the input or the command line.
+pub fn input(error: impl std::fmt::Display) -> Failure {
+    Failure::Input(error.to_string())
+}
+
+/// A failure of a valid request.
+pub fn failed(error: impl std::fmt::Display) -> Failure {
+    Failure::Failed(error.to_string())
+}
+
+/// Prints a line on standard output. A write error is reported when the command ends: a reader may close the pipe at any time, but a full
+/// disk is a failure.
+pub fn print(line: std::fmt::Arguments) {
+    let line = without_control_characters(&line.to_string());
+    match writeln!(std::io::stdout(), "{line}").and_then(|()| std::io::stdout().flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => IS_CLOSED.store(true, Ordering::Relaxed),
+        Err(error) => drop(WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error)),
+    }
+}
+
+/// Prints the failure on standard error as one line.
+pub fn print_failure(failure: &Failure) {
+    let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = failure;
+    let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
+}
+
+/// True if the reader of standard output has closed it.
+pub fn is_closed() -> bool {
+    IS_CLOSED.load(Ordering::Relaxed)
+}
+
+/// The first error of writing to standard output since the last call.
+pub fn take_write_error() -> Option<std::io::Error> {
+    WRITE_ERROR.lock().unwrap_or_else(|e| e.into_inner()).take()
+}
+
+/// Escapes control characters other than line ends. Text from files must not control the terminal.
+fn without_control_characters(text: &str) -> String {
+    let mut lines = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() && c != '\n' { lines.extend(c.escape_default()) } else { lines.push(c) }
+    }
+    lines
+}
+
+/// `message` as one line of at most [`MAX_MESSAGE`] characters.
+fn single_line(message: &str) -> String {
+    let start: String = message.chars().take(MAX_MESSAGE).collect();
+    let line = without_control_characters(&start).replace('\n', "\\n");
+    if message.chars().nth(MAX_MESSAGE).is_some() { line + " ..." } else { line }
+}
