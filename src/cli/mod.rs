@@ -20,7 +20,7 @@ mod view;
 #[cfg(feature = "view")]
 mod view_config;
 
-use crate::kiosk::rotating::{self, Rotating};
+use crate::kiosk::log_rotation::{self, Rotating};
 use crate::terminal::{self, Failure, failed, input};
 use crate::{profile, verify};
 use clap::{Parser, Subcommand};
@@ -166,7 +166,7 @@ fn start_log(
             log.without_time().with_writer(std::io::stderr).finish().with(shown).init();
         }
         Some(path) => {
-            let file = Rotating::open(path, rotating::USUAL_BYTES, rotating::USUAL_FILES);
+            let file = Rotating::open(path, log_rotation::USUAL_BYTES, log_rotation::USUAL_FILES);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }

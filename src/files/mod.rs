@@ -1,6 +1,6 @@
-//! The files of whoever uses the program: read up to a limit, written whole or not at all, and left tidy by a signal.
+//! Files: bounded reading, atomic replacement, and signal handling while a file is written.
 //!
-//! Faults are told without the file's name where the caller has its own way to say it.
+//! Some errors omit the file's name, because the caller adds it.
 
 pub mod signals;
 mod unfinished;
@@ -11,43 +11,43 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// All of a file of at most `most` bytes. `what` it is: said of one that is longer.
+/// Reads a file of at most `max_bytes` bytes. `what` names its kind in messages.
 ///
 /// # Errors
-/// What is wrong, without the file's name: it is no regular file, is longer, or cannot be read.
-pub fn read(path: &Path, most: u64, what: &str) -> Result<Vec<u8>, String> {
+/// The fault without the file's name: it is not a regular file, is longer than `max_bytes`, or cannot be read.
+pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>, String> {
     let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
-    let too_long = || Err(format!("is longer than {} MiB, which no {what} is", most >> 20));
+    let too_long = || Err(format!("is longer than {} MiB, which no {what} is", max_bytes >> 20));
     let about = std::fs::metadata(path).map_err(unreadable)?;
-    // A pipe would be waited for, and a device never ends.
+    // Reading a pipe would block, and a device may never end.
     if !about.is_file() {
         return Err("is not a regular file".into());
     }
-    if about.len() > most {
+    if about.len() > max_bytes {
         return too_long();
     }
     let mut bytes = Vec::new();
-    // The file may grow meanwhile, and those of the kernel do not say how long they are.
-    File::open(path).and_then(|file| file.take(most + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
-    if bytes.len() as u64 > most { too_long() } else { Ok(bytes) }
+    // The file may grow meanwhile, and files of the kernel report no length.
+    File::open(path).and_then(|file| file.take(max_bytes + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
+    if bytes.len() as u64 > max_bytes { too_long() } else { Ok(bytes) }
 }
 
-/// The same of text.
+/// Like [`read`], for text.
 ///
 /// # Errors
-/// As of [`read`], and bytes that are not UTF-8.
-pub fn read_text(path: &Path, most: u64, what: &str) -> Result<String, String> {
-    String::from_utf8(read(path, most, what)?).map_err(|_| "cannot be read: it is no text in UTF-8".into())
+/// Those of [`read`], and bytes that are not UTF-8.
+pub fn read_text(path: &Path, max_bytes: u64, what: &str) -> Result<String, String> {
+    String::from_utf8(read(path, max_bytes, what)?).map_err(|_| "cannot be read: it is not UTF-8 text".into())
 }
 
-/// Writes bytes beside the target first and renames: a full disk leaves the old file as it was, and so does a signal.
+/// Replaces a file atomically: writes a temporary file next to it, then renames. A full disk or a signal leaves the old file unchanged.
 ///
 /// # Errors
-/// One line naming the file and the fault.
+/// One line that names the file and the fault.
 pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
     let cannot = |e: &dyn std::fmt::Display| format!("{}: cannot be written: {e}", file.display());
     if is_special(file) {
-        // A device or a pipe is written to; renaming would replace it.
+        // Write to a device or a pipe directly: renaming would replace it.
         let opened = OpenOptions::new().write(true).open(file);
         return opened.and_then(|mut f| f.write_all(bytes)).map_err(|e| cannot(&e));
     }
@@ -60,10 +60,10 @@ pub fn replace(file: &Path, bytes: &[u8]) -> Result<(), String> {
         .map_err(|e| cannot(&e))
 }
 
-/// Whether a file could be written there, before the work is done.
+/// Checks that a file can be written there, before any work is done.
 ///
 /// # Errors
-/// One line: the folder does not exist or takes no file, or the name is a folder's.
+/// One line: the folder does not exist or cannot be written, or the name is a folder.
 pub fn check_target(file: &Path) -> Result<(), String> {
     check_place(file)?;
     match is_special(file) {

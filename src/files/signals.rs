@@ -1,5 +1,5 @@
-//! SIGINT, SIGTERM and SIGHUP, for whoever has something to end first: a motor that turns, a recording without its index, a file that is
-//! half written. Where nobody has, they end the process as they always do.
+//! SIGINT, SIGTERM and SIGHUP for code that must finish something first: a moving motor, a recording without its index, an incomplete
+//! file. Otherwise the signals end the process by default.
 
 use signal_hook::SigId;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -12,24 +12,24 @@ const SIGNALS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
 #[cfg(not(unix))]
 const SIGNALS: &[i32] = &[SIGINT, SIGTERM];
 
-/// The process' signal handlers, registered once.
+/// The signal handlers of the process, registered once.
 struct Handlers {
-    /// The number of the last signal; 0: none.
+    /// Number of the last signal; 0 for none.
     received: Arc<AtomicUsize>,
-    /// Nobody holds the signals: they do what they do by default.
+    /// True while no [`Held`] or [`Writing`] exists: signals have their default effect.
     unheld: Arc<AtomicBool>,
-    /// One has come, and the next does what it does by default.
+    /// True after a first signal if the next one has its default effect.
     again: Arc<AtomicBool>,
     holders: Mutex<Holders>,
 }
 
 #[derive(Default)]
 struct Holders {
-    /// [`Held`] in all, and those that no second signal may break.
+    /// Number of [`Held`], and of those that no second signal may interrupt.
     held: usize,
     patient: usize,
     writing: usize,
-    /// What notes the first signal for the second.
+    /// The handlers that record the first signal, so that the second has its default effect.
     noting: Vec<SigId>,
 }
 
@@ -50,7 +50,7 @@ fn handlers() -> &'static Handlers {
     })
 }
 
-/// All but those that whoever started the process had it ignore, as `nohup` does.
+/// The signals to catch: all except those that the parent process made this one ignore, as `nohup` does.
 fn caught() -> impl Iterator<Item = i32> {
     let ignored = std::fs::read_to_string("/proc/self/status").ok().and_then(|status| {
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
@@ -64,7 +64,7 @@ impl Handlers {
         self.holders.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Lets go of one more or less of the holders.
+    /// Changes the counts of holders and updates the handlers.
     fn change(&self, how: impl FnOnce(&mut Holders)) {
         let mut holders = self.lock();
         if holders.held + holders.writing == 0 {
@@ -94,24 +94,24 @@ impl Handlers {
     }
 }
 
-/// The last signal that came while somebody held them, if any: for work that can end early.
+/// The last signal that arrived while a [`Held`] existed, if any. For work that can end early.
 pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)
 }
 
-/// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process but are told by [`Held::signal`].
+/// While one exists, SIGINT, SIGTERM and SIGHUP do not end the process; [`Held::signal`] reports them.
 #[derive(Debug)]
 pub struct Held {
     patient: bool,
 }
 
 impl Held {
-    /// However many come: what must not be left in motion is stopped first.
+    /// Holds every signal, for work that must never be interrupted, such as stopping a motor.
     pub fn take() -> Held {
         Held::with(true)
     }
 
-    /// The first that comes; the second ends the process at once, unless somebody else holds all of them.
+    /// Holds the first signal. The second ends the process at once, unless another holder takes every signal.
     pub fn first() -> Held {
         Held::with(false)
     }
@@ -124,7 +124,7 @@ impl Held {
         Held { patient }
     }
 
-    /// The last signal that came, if any.
+    /// The last signal, if any.
     pub fn signal(&self) -> Option<&'static str> {
         handlers().signal().map(|(_, name)| name)
     }
@@ -139,7 +139,7 @@ impl Drop for Held {
     }
 }
 
-/// While one exists and nobody has a [`Held`], the first signal waits: it ends the process when the last of these is gone.
+/// While one exists and no [`Held`] does, the first signal is deferred until the last of these is dropped.
 #[derive(Debug)]
 pub struct Writing(());
 
@@ -149,7 +149,7 @@ impl Writing {
         Writing(())
     }
 
-    /// The signal that waits, so that whoever writes gives up; none where it is somebody else's to say what it means.
+    /// The deferred signal, so that the writer stops. None if a [`Held`] decides what the signal means.
     pub fn signal(&self) -> Option<&'static str> {
         let handlers = handlers();
         let (_, name) = handlers.signal()?;
@@ -166,7 +166,7 @@ impl Drop for Writing {
             last = holders.held + holders.writing == 0;
         });
         if let Some((signal, _)) = handlers.signal().filter(|_| last) {
-            // Does not come back.
+            // This call does not return.
             let _ = low_level::emulate_default_handler(signal);
         }
     }

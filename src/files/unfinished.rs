@@ -1,4 +1,4 @@
-//! Files that are whole or not there.
+//! Atomic files: complete, or absent.
 
 use super::signals::Writing;
 use std::fs::metadata;
@@ -6,8 +6,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// A file under a name of its own until it is whole; gone if it is dropped before. After a signal it takes no more, so that whoever
-/// writes it gives up, and the signal does its work when it is gone.
+/// A file under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the writer
+/// stops; the signal takes effect when the file is deleted.
 pub struct Unfinished {
     file: BufWriter<Part>,
     target: PathBuf,
@@ -15,25 +15,25 @@ pub struct Unfinished {
 
 struct Part {
     file: NamedTempFile,
-    // Behind the file: it is gone before a signal ends the process.
+    // Dropped after the file, so that the file is deleted before a signal ends the process.
     signals: Writing,
 }
 
 impl Unfinished {
     /// # Errors
-    /// What the system says of the folder; something that is no regular file is there.
+    /// The folder cannot be written, or the target exists and is not a regular file.
     pub fn create(target: &Path) -> io::Result<Unfinished> {
-        // Through a link to the file itself, and beside it, so that renaming is one step within one file system.
+        // Resolve links, and use the target's folder, so that renaming is atomic within one file system.
         let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
         if metadata(&target).is_ok_and(|there| !there.is_file()) {
-            return Err(io::Error::other("what is there is no regular file"));
+            return Err(io::Error::other("the target is not a regular file"));
         }
         let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut named = tempfile::Builder::new();
         named.prefix(".echolume-").suffix(".part");
         #[cfg(unix)]
         {
-            // As any other new file: the process' mask decides.
+            // The process' umask applies, as for any new file.
             use std::os::unix::fs::PermissionsExt;
             named.permissions(std::fs::Permissions::from_mode(0o666));
         }
@@ -42,19 +42,19 @@ impl Unfinished {
         Ok(Unfinished { file: BufWriter::new(Part { file, signals }), target })
     }
 
-    /// Everything is on the disk.
+    /// Flushes everything to the disk.
     ///
     /// # Errors
-    /// A disk that is full; a signal came.
+    /// The disk is full, or a signal arrived.
     pub fn finish(&mut self) -> io::Result<()> {
         self.file.flush()?;
         self.file.get_ref().file.as_file().sync_all()
     }
 
-    /// Gives it its name, in one step.
+    /// Renames the file to its target, atomically.
     ///
     /// # Errors
-    /// A disk that is full; a signal came before all was written.
+    /// The disk is full, or a signal arrived before everything was written.
     pub fn rename(self) -> io::Result<()> {
         let Part { file, signals } = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
         let named = file.persist(&self.target).map_err(|e| e.error);

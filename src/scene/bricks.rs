@@ -1,6 +1,6 @@
-//! Bricks: the box that rays cross, cut into cells of a few texels' size, so that rays can leap over cells that cannot change a
-//! picture. Bricks lie in space, where rays are straight, not in the texture, where a sweep bends them; what each can see of
-//! the texture, and on which side of the sector's border it lies, follows from the geometry once and for all.
+//! The brick grid of empty-space skipping. It divides the box that rays cross into cells of a few texels, so that rays can skip cells
+//! that cannot change the picture. Bricks are aligned to space, where rays are straight, and not to the texture, where a sweep bends
+//! them. The texels that a brick can touch, and its position relative to the sector's border, follow from the geometry alone.
 
 use super::Scene;
 use super::region::insonified_box;
@@ -8,39 +8,39 @@ use super::visible_bounds::reach;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use glam::DVec3;
 
-/// Edge of the tiles of a slice whose smallest and largest value are kept, texels.
+/// Size of the slice tiles whose minimum and maximum are stored, texels.
 pub const TILE: u32 = 4;
-/// Most bricks of a scene: 8 MB of their table.
-const MOST: f64 = 524_288.0;
-/// Share of its edge that a brick is taken to be larger by: places and ways in f32 are off by far less.
+/// Maximum number of bricks of a scene: a table of 8 MB.
+const MAX_BRICKS: f64 = 524_288.0;
+/// Margin of a brick relative to its size. Rounding errors of f32 positions and distances are far smaller.
 const MARGIN: f64 = 4e-3;
-/// The look-up table of the sweep is off by less than this share of a slice from so many entries on.
-const FEWEST_ENTRIES: u32 = 65;
+/// Error bound of the sweep's look-up table in slices, and the number of entries from which it holds.
+const MIN_ENTRIES: u32 = 65;
 const SLICE_MARGIN: f64 = 0.01;
 
-/// The lattice of bricks.
+/// The grid of bricks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bricks {
     /// Lower corner of brick (0, 0, 0), mm in space.
     pub low: DVec3,
-    /// mm.
+    /// Edge length, mm.
     pub edge: DVec3,
     pub count: [u32; 3],
 }
 
-/// Where a brick lies to the insonified region.
+/// Position of a brick relative to the insonified region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Wholly outside: no sample is taken.
+    /// Entirely outside: no sample is taken.
     Outside,
-    /// Across its border, or not known.
+    /// Across the border, or unknown.
     Across,
-    /// Wholly inside.
+    /// Entirely inside.
     Inside,
 }
 
 impl Side {
-    /// Of what two bounds say.
+    /// The combination of two bounds.
     fn and(self, other: Side) -> Side {
         match (self, other) {
             (Side::Outside, _) | (_, Side::Outside) => Side::Outside,
@@ -50,7 +50,7 @@ impl Side {
     }
 }
 
-/// What the samples within a brick may look at: tile columns, tile rows and slices, first and last.
+/// The tiles that samples within a brick may touch: columns, rows and slices, first and last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     pub tiles: [[u32; 2]; 2],
@@ -69,33 +69,33 @@ impl Bricks {
 }
 
 impl Scene {
-    /// Whether rays leap over bricks.
+    /// True if rays skip bricks.
     pub fn skips(&self) -> bool {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
-        if !casts || self.settings.ray.brick == 0 || (swept && self.settings.ray.entries < FEWEST_ENTRIES) {
+        if !casts || self.settings.ray.brick == 0 || (swept && self.settings.ray.entries < MIN_ENTRIES) {
             return false;
         }
-        // Where f32 cannot tell places within a brick's margin, as from a camera in another town.
+        // No skipping where f32 cannot resolve positions to a brick's margin, as with a camera kilometres away.
         let bricks = self.bricks();
         let farthest = self.low.abs().max(self.high.abs()).max(self.rays.origin.abs()).max_element();
         farthest * 1e-6 < MARGIN * bricks.edge.min_element()
     }
 
-    /// Bricks over the whole insonified region, whatever part of it is looked at.
+    /// The bricks of the whole insonified region, independent of the region of interest.
     pub fn bricks(&self) -> Bricks {
         let (low, high) = insonified_box(&self.geometry);
         let size = f64::from(self.settings.ray.brick.max(TILE));
         let [x, y] = self.grid.pitch;
         let (pitch, first) = match &self.geometry {
-            // From half a texel on, so that a brick's samples lie between as many texels as it has and one more.
+            // Offset by half a texel, so that the samples of a brick of n texels lie between n + 1 texels.
             Geometry::Cartesian(grid) => (DVec3::from(grid.spacing), DVec3::from(grid.spacing) * (1.0 - size)),
             Geometry::Sweep(_) => (DVec3::splat(x.min(y)), DVec3::ZERO),
         };
         let (low, mut edge) = (low + first, pitch * size);
         let count = |edge: DVec3| ((high - low) / edge).ceil().max(DVec3::ONE);
-        while count(edge).x * count(edge).y * count(edge).z > MOST {
-            // Along the axis that has most.
+        while count(edge).x * count(edge).y * count(edge).z > MAX_BRICKS {
+            // Along the axis with the most bricks.
             let n = count(edge);
             let axis = (0..3).max_by(|a, b| n[*a].total_cmp(&n[*b])).unwrap_or(0);
             edge[axis] *= 2.0;
@@ -103,20 +103,20 @@ impl Scene {
         Bricks { low, edge, count: count(edge).to_array().map(|n| n as u32) }
     }
 
-    /// Tiles of the volume's slices along each axis, and slices.
+    /// Number of tiles along both axes of a slice, and number of slices.
     pub fn tile_counts(&self) -> [u32; 3] {
         let [width, height, slices] = self.volume_size();
         [width.div_ceil(TILE), height.div_ceil(TILE), slices]
     }
 
-    /// What the samples within one brick of a lattice may look at.
+    /// The tiles that samples within one brick may touch.
     pub fn reach(&self, bricks: &Bricks, cell: [u32; 3]) -> Reach {
         let margin = bricks.edge * MARGIN;
         let (low, high) = (bricks.place(cell) - margin, bricks.place(cell) + bricks.edge + margin);
         let mut seen = Extent::of(self, low, high);
         let taps = self.tap_reach();
         if taps > 0.0 {
-            // A sample has a side by its own place, its value by its taps.
+            // The side of a sample follows from its position, its value from its taps.
             seen.texels = Extent::of(self, low - taps, high + taps).texels;
         }
         let [columns, rows, slices] = std::array::from_fn(|axis| {
@@ -127,19 +127,18 @@ impl Scene {
         Reach { tiles: [columns, rows].map(|r| r.map(|n| n / TILE)), slices, side: seen.side }
     }
 
-    /// How far from a sample's place the filter that slides along the ray looks, mm: so many steps along the ray, and as far to
-    /// both sides.
+    /// Reach of the sliding filter around a sample, mm: its taps along the ray, and the same distance to both sides.
     fn tap_reach(&self) -> f64 {
         reach(self, self.settings.ray.sliding / 2) * 3f64.sqrt()
     }
 
-    /// All that bricks and what they look at follow from, beside the geometry: equal numbers make equal tables.
+    /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.
     pub fn brick_basis(&self) -> impl PartialEq + use<> {
         (self.bricks(), self.grid, self.tap_reach())
     }
 }
 
-/// A box in space in texture indices, and where it lies to the sector. Bounds, not the least ones.
+/// Bounds of a box in texture indices, and its position relative to the sector. The bounds are conservative.
 struct Extent {
     texels: [[f64; 2]; 3],
     side: Side,
@@ -153,7 +152,7 @@ impl Extent {
         match &scene.geometry {
             Geometry::Cartesian(volume) => {
                 let slices = [low.z, high.z].map(|z| (z - volume.origin[2]) / volume.spacing[2]);
-                // Beyond the border the nearest texel goes on.
+                // Beyond the border the nearest texel is repeated.
                 Extent { texels: [columns, rows([low.y, high.y]), slices], side: Side::Inside }
             }
             Geometry::Sweep(probe) => {
@@ -166,7 +165,7 @@ impl Extent {
     }
 }
 
-/// In-plane depths and slice positions of a box; no positions where the box holds or lies behind the axis.
+/// In-plane depths and slice positions of a box. None if the box contains the wobble axis or lies behind it.
 fn unswept(probe: &Probe, low: DVec3, high: DVec3) -> ([f64; 2], Option<[f64; 2]>) {
     match probe.motion {
         Motion::Translated | Motion::Still { .. } => ([low.y, high.y], Some([low.z, high.z])),
@@ -181,14 +180,14 @@ fn unswept(probe: &Probe, low: DVec3, high: DVec3) -> ([f64; 2], Option<[f64; 2]
     }
 }
 
-/// Shortest and longest distance of a rectangle's points from the origin.
+/// Minimum and maximum distance of the points of a rectangle from the origin.
 fn distances(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let nearest = |r: [f64; 2]| if r[0] > 0.0 { r[0] } else { (-r[1]).max(0.0) };
     let farthest = |r: [f64; 2]| r[0].abs().max(r[1].abs());
     [nearest(a).hypot(nearest(b)), farthest(a).hypot(farthest(b))]
 }
 
-/// Least and largest angle off the second axis of a rectangle that lies on its positive side: corners hold the extremes.
+/// Minimum and maximum angle to the second axis of a rectangle on its positive side. The extremes lie at corners.
 fn angles(across: [f64; 2], along: [f64; 2]) -> [f64; 2] {
     let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| across[i].atan2(along[j]));
     [corners.into_iter().fold(f64::MAX, f64::min), corners.into_iter().fold(f64::MIN, f64::max)]
@@ -202,7 +201,7 @@ fn side(range: [f64; 2], limits: [f64; 2]) -> Side {
     }
 }
 
-/// Where an in-plane rectangle lies to the sector.
+/// Position of an in-plane rectangle relative to the sector.
 fn in_plane(probe: &Probe, x: [f64; 2], y: [f64; 2]) -> Side {
     let (ranges, lines) = match probe.array {
         Array::Linear => (y, Some(x)),
@@ -213,7 +212,7 @@ fn in_plane(probe: &Probe, x: [f64; 2], y: [f64; 2]) -> Side {
     by_range.and(by_line)
 }
 
-/// Slice indices that any line may have had at these positions, and where they lie to the sweep.
+/// Range of slice indices of all lines at these positions, and its position relative to the sweep.
 fn sliced(probe: &Probe, positions: Option<[f64; 2]>) -> ([f64; 2], Side) {
     let count = probe.slices.len();
     let all = [0.0, (count - 1) as f64];
@@ -228,7 +227,7 @@ fn sliced(probe: &Probe, positions: Option<[f64; 2]>) -> ([f64; 2], Side) {
         Advance::Same(a) => *a,
         Advance::Each(table) => table.get(k).copied().unwrap_or(0.0),
     };
-    // Each slice while its frame was acquired, swept either way: bricks stay when the motor turns.
+    // Both sweep directions, so that bricks stay valid when the motor reverses.
     let least = |k: usize| probe.slices.at(k as f64) - advance(k).abs();
     let most = |k: usize| probe.slices.at(k as f64) + advance(k).abs();
     if to < least(0) || from > most(count - 1) {

@@ -1,10 +1,11 @@
-//! The camera as rays: every pixel's origin and direction are affine in the pixel's place, in parallel and perspective alike.
+//! The camera as rays. The origin and direction of a pixel's ray are affine functions of the pixel's position, in parallel and
+//! perspective projection.
 
 use super::{Layout, Settings};
 use glam::DVec3;
 
-/// Ray of the pixel with its centre at (px, py): origin + px origin_dx + py origin_dy, and the direction likewise, then
-/// normalised. Distances along a ray are in mm.
+/// The ray of the point (px, py) in pixels: origin + px origin_dx + py origin_dy, and the direction likewise, then normalised. Distances
+/// along a ray are in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
     pub origin: DVec3,
@@ -17,7 +18,7 @@ pub struct Rays {
     pub right: DVec3,
     pub up: DVec3,
     pub forward: DVec3,
-    /// What the camera looks at, mm.
+    /// The camera's target, mm.
     pub target: DVec3,
     pub is_perspective: bool,
 }
@@ -30,14 +31,14 @@ impl Rays {
         (origin, direction.normalize())
     }
 
-    /// A direction given in the camera's axes (right, up, towards the viewer), in space.
+    /// Converts a direction from the camera's axes (right, up, towards the viewer) to space.
     pub fn from_camera(&self, v: DVec3) -> DVec3 {
         self.right * v.x + self.up * v.y - self.forward * v.z
     }
 }
 
-/// Width and height of the lattice of rays: a quarter of a 4-up picture (rounded up), and several rays for each pixel, or one
-/// for two along each edge (rounded up).
+/// Number of rays along each axis: a quarter of a 4-up picture (rounded up), times the rays per pixel, or half (rounded up) with half
+/// resolution.
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
     let full = full_size(settings);
     if settings.ray.half { full.map(|n| n.div_ceil(2)) } else { full }
@@ -51,8 +52,8 @@ fn full_size(settings: &Settings) -> [u32; 2] {
     tile.map(|n| n * settings.ray.rays)
 }
 
-/// Frames the box (`low`, `high`) as the settings say. `depth_offset` turns depths below the face into Y.
-/// A single frame is looked at from the side, as a B-mode picture is, with the probe on top.
+/// The camera that frames the box (`low`, `high`) by the settings. `depth_offset` converts depths below the face to Y.
+/// A single frame is viewed from the side like a B-mode picture, with the probe on top.
 pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, still: bool) -> Rays {
     let camera = &settings.camera;
     let azimuth = camera.azimuth.to_radians();
@@ -72,13 +73,13 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     let along = |axis: DVec3| axis.abs().dot(half);
     let [width, height] = full_size(settings).map(f64::from);
     let fit = (along(up) / height).max(along(right) / width);
-    // mm a pixel where the target is.
+    // mm per pixel at the target.
     let pixel = 2.0 * fit / camera.zoom;
     let away = along(forward) * 1.05 + 1.0;
 
-    // The picture's upper left corner, as seen from its middle, in pixels.
+    // Offset of the picture's upper left corner from its middle, pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);
-    // The ray of four pixels goes through their common corner.
+    // The ray of four pixels passes through their common corner.
     let apart = if settings.ray.half { 2.0 } else { 1.0 };
     if camera.field_of_view > 0.0 {
         let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;

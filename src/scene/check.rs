@@ -1,13 +1,14 @@
-//! What no scene may ask for, told by name and limit.
+//! Checks of settings. Each error names the setting and its limits.
 
+use super::planes::{MAX_SLAB, MAX_TILES};
 use super::{
     Clip, Conditioning, Distance, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW,
-    Noise, PeronaMalik, SceneError, Scheme, Settings, Sigma, refuse, transfer,
+    Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
 
-/// Everything that can be told without a geometry.
+/// Checks that need no geometry.
 pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     let [width, height] = settings.picture.size;
     if !(1..=MAX_PICTURE).contains(&width) || !(1..=MAX_PICTURE).contains(&height) {
@@ -82,7 +83,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("camera.zoom", c.zoom, 1e-3, 1e3)?;
     within("camera.field_of_view", c.field_of_view, 0.0, 150.0)?;
     if c.field_of_view > 0.0 && c.field_of_view < 1.0 {
-        // The camera would stand so far away that f32 has no digits left for the body.
+        // The camera would be so far away that f32 cannot resolve the body.
         return refuse(
             "camera.field_of_view",
             format!("is {}, must be 0 (parallel) or at least 1 deg", c.field_of_view),
@@ -133,7 +134,7 @@ fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Of lines: what makes no sense by itself, and what these frames cannot be conditioned by.
+/// Checks the conditioning of lines by itself and against the geometry of the frames.
 pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Result<(), SceneError> {
     for (i, point) in c.tgc.iter().enumerate() {
         within("conditioning.tgc", point.depth, 0.0, 1e4)?;
@@ -154,7 +155,7 @@ pub(super) fn check_conditioning(c: &Conditioning, geometry: &Geometry) -> Resul
     }
     match geometry {
         Geometry::Cartesian(_) => {
-            // `samples` is a limit of lines: without lines there is nothing that it could touch.
+            // `samples` limits the length of lines. Without lines it has no effect and is allowed.
             for (field, asked) in [
                 ("conditioning.tgc", !c.tgc.is_empty()),
                 ("conditioning.dynamic_range", c.dynamic_range.is_some()),
@@ -236,7 +237,7 @@ fn check_window(field: &'static str, window: u32) -> Result<(), SceneError> {
 fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
     let Some(sigma) = sigma else { return Ok(()) };
     check_window(field, sigma.window)?;
-    // Infinity is allowed: it is the box mean.
+    // Infinity is allowed: the filter is then the box mean.
     match sigma.sigma >= 0.0 {
         true => Ok(()),
         false => refuse(field, format!("sigma is {}, must be at least 0", sigma.sigma)),
@@ -260,7 +261,7 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
     let noises =
         [("distance.sigma", d.sigma.map(|s| s.noise)), ("distance.enhanced_sigma", d.enhanced_sigma.map(|e| e.noise))];
     for (field, noise) in noises {
-        // The noise of a distance does not grow with the distance.
+        // The noise of a distance does not depend on the distance.
         if noise == Some(Noise::Multiplicative) {
             return refuse(
                 field,
@@ -297,7 +298,7 @@ fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Res
         return refuse(field, format!("repeat is {}, must lie in 1..=1000", p.repeat));
     }
     match p.scheme {
-        // With four neighbours, above 1/4 a checkerboard grows at every step.
+        // With four neighbours and a step above 1/4, a checkerboard grows at every step.
         Scheme::Explicit if !(p.step > 0.0 && p.step <= 0.25) => refuse(
             field,
             format!(
@@ -312,10 +313,72 @@ fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Res
     }
 }
 
-/// Infinity is allowed: no difference is an edge then.
+/// Checks an edge constant. Infinity is allowed: no difference is then an edge.
 fn check_edge(field: &'static str, edge: f64) -> Result<(), SceneError> {
     match edge >= 0.0 {
         true => Ok(()),
         false => refuse(field, format!("edge is {edge}, must be at least 0")),
     }
+}
+
+/// Checks of planes, tiles and the block that need no geometry.
+pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
+    let p = &settings.planes;
+    for value in p.position.iter().flatten() {
+        within("planes.position", *value, -1e6, 1e6)?;
+    }
+    for (field, value) in [("planes.azimuth", p.azimuth), ("planes.tilt", p.tilt), ("planes.roll", p.roll)] {
+        within(field, value, -360.0, 360.0)?;
+    }
+    within("planes.thickness", p.thickness, 0.0, 1e6)?;
+    within("planes.zoom", p.zoom, 1e-3, 1e3)?;
+    within("planes.columns", f64::from(p.columns), 1.0, f64::from(MAX_TILES))?;
+    within("planes.rows", f64::from(p.rows), 1.0, f64::from(MAX_TILES))?;
+    if let Some(spacing) = p.spacing {
+        within("planes.spacing", spacing, 1e-4, 1e4)?;
+    }
+    let (inset, tilt) = (&settings.cube.inset, &settings.cube.tilt);
+    for (field, inset, tilt) in [
+        ("cube.inset.left, cube.tilt.left", inset.left, tilt.left),
+        ("cube.inset.right, cube.tilt.right", inset.right, tilt.right),
+        ("cube.inset.near, cube.tilt.near", inset.near, tilt.near),
+        ("cube.inset.far, cube.tilt.far", inset.far, tilt.far),
+        ("cube.inset.bottom, cube.tilt.bottom", inset.bottom, tilt.bottom),
+        ("cube.inset.top, cube.tilt.top", inset.top, tilt.top),
+    ] {
+        within(field, inset, 0.0, 1e6)?;
+        // A face that is tilted to 90 degrees would no longer bound its side.
+        tilt.iter().try_for_each(|angle| within(field, *angle, -80.0, 80.0))?;
+    }
+    within("cube.shading", settings.cube.shading, 0.0, 1.0)
+}
+
+/// Checks that need the volume: number of tiles and samples, and whether anything is left of the block.
+pub(super) fn check_planes_resolved(scene: &Scene) -> Result<(), SceneError> {
+    if scene.settings.mode == Mode::Cube {
+        scene.check_block()?;
+    }
+    if !scene.cuts_planes() {
+        return Ok(());
+    }
+    let tiles = scene.tile_count();
+    if tiles > MAX_TILES {
+        return refuse("planes.columns, planes.rows", format!("make {tiles} tiles, at most {MAX_TILES} can be drawn"));
+    }
+    let ([columns, rows], [width, height]) = (scene.tile_grid(), scene.picture_size());
+    if columns > width || rows > height {
+        return refuse(
+            "picture.size",
+            format!("is {width}x{height}: {columns} x {rows} tiles need at least one pixel each"),
+        );
+    }
+    let samples = scene.slab_samples();
+    if samples > MAX_SLAB {
+        let thickness = scene.settings.planes.thickness;
+        return refuse(
+            "planes.thickness",
+            format!("{thickness} mm makes {samples:.0} samples through the slab, at most {MAX_SLAB}"),
+        );
+    }
+    Ok(())
 }

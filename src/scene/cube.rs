@@ -1,9 +1,9 @@
-//! The solid block of mode cube: half-spaces in mm, from the visible box, its faces pushed in and turned, and clip planes.
+//! The solid block of mode cube as half-spaces in mm: the box, its moved and tilted faces, and the clip planes.
 
 use super::{Scene, SceneError, refuse};
 use glam::{DMat3, DQuat, DVec3};
 
-/// What lies beyond is no part of the block: dot(normal, p) > limit, the normal a unit vector that points out of it.
+/// A half-space. Points p with dot(normal, p) > limit are outside; the normal is a unit vector that points outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
     pub normal: DVec3,
@@ -11,25 +11,25 @@ pub struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// How far inside a place lies, mm; negative outside.
+    /// Distance of a point to the plane, mm; positive inside.
     pub fn room(&self, place: DVec3) -> f64 {
         self.limit - self.normal.dot(place)
     }
 }
 
-/// Names of the faces, the axis across each, and the way out along it.
+/// Names of the faces, the axis perpendicular to each, and the outward sign.
 const SIDES: [(&str, usize, f64); 6] =
     [("left", 0, -1.0), ("right", 0, 1.0), ("near", 1, -1.0), ("far", 1, 1.0), ("bottom", 2, -1.0), ("top", 2, 1.0)];
 
 impl Scene {
-    /// The half-spaces whose common part is shown.
+    /// The half-spaces whose intersection is shown.
     pub fn block(&self) -> Vec<HalfSpace> {
         let mut faces = self.faces();
         faces.extend(self.clips().map(|(normal, limit)| HalfSpace { normal, limit }));
         faces
     }
 
-    /// Those of the faces, and of the box where a face that is turned lets it through.
+    /// The half-spaces of the faces, and those of the box that tilted faces leave in effect.
     fn faces(&self) -> Vec<HalfSpace> {
         let (inset, tilt) = (&self.settings.cube.inset, &self.settings.cube.tilt);
         let insets = [inset.left, inset.right, inset.near, inset.far, inset.bottom, inset.top];
@@ -54,7 +54,7 @@ impl Scene {
         faces
     }
 
-    /// Refuses faces that leave nothing between them.
+    /// Refuses faces with nothing left between them.
     pub(super) fn check_block(&self) -> Result<(), SceneError> {
         let faces = self.faces();
         match middle_of(&faces) {
@@ -67,7 +67,7 @@ impl Scene {
     }
 }
 
-/// The mean of the corners of a convex solid: strictly inside it unless it is flat or empty.
+/// The mean of the corners of a convex solid, a point strictly inside it. None if the solid is flat or empty.
 fn middle_of(faces: &[HalfSpace]) -> Option<DVec3> {
     let (mut sum, mut count) = (DVec3::ZERO, 0.0);
     for (i, a) in faces.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Settings from layers: defaults, a preset, a scene file, and the command line, each overriding the one before.
+//! Layers of settings: defaults, presets, a scene file and the command line. Each layer overrides the one before.
 
 use super::{Settings, TransferPoint};
 use crate::files;
@@ -6,10 +6,10 @@ use serde::Deserialize;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Longest file of settings, bytes.
-const LONGEST: u64 = 1 << 20;
+/// Maximum size of a settings file, bytes.
+const MAX_BYTES: u64 = 1 << 20;
 
-/// Settings that suit a kind of picture, as TOML.
+/// The presets as TOML.
 pub const PRESETS: &[(&str, &str)] = &[
     ("bmode", include_str!("presets/bmode.toml")),
     ("bone", include_str!("presets/bone.toml")),
@@ -28,12 +28,12 @@ pub enum LoadError {
     Layer { layer: String, fault: String },
 }
 
-/// Layers of TOML tables, merged key by key.
+/// Layers of settings as TOML tables, merged key by key.
 #[derive(Clone, Default)]
 pub struct Layers(Table);
 
 impl Layers {
-    /// One layer of settings that are there already; none where they cannot be written as TOML.
+    /// One layer that holds all of `settings`. Empty if they cannot be written as TOML.
     pub fn of(settings: &Settings) -> Option<Layers> {
         Table::try_from(settings).ok().map(Layers)
     }
@@ -49,17 +49,17 @@ impl Layers {
         self.add(&path.display().to_string(), &text, path.parent())
     }
 
-    /// A table that holds what a scene file does; `layer` is what messages call it, `folder` where the files lie that it names.
+    /// Adds a table with the keys of a scene file. `layer` names it in messages; relative file names refer to `folder`.
     pub fn table(&mut self, layer: &str, table: Table, folder: &Path) -> Result<(), LoadError> {
         self.merge_checked(layer, table, Some(folder))
     }
 
-    /// One `key.path=value` of `--set`; the value is TOML, or a plain word.
+    /// Adds one `key.path=value` of `--set`. The value is TOML, or a plain word.
     pub fn set(&mut self, assignment: &str) -> Result<(), LoadError> {
         self.set_by(&format!("--set {assignment}"), assignment)
     }
 
-    /// Whether the setting that an assignment names has been asked for.
+    /// True if an earlier layer sets the key of this assignment.
     pub fn has(&self, assignment: &str) -> bool {
         let path = assignment.split_once('=').map_or(assignment, |(path, _)| path);
         let mut at = Some(&self.0);
@@ -74,7 +74,7 @@ impl Layers {
         false
     }
 
-    /// The same for a flag that stands for a setting: messages name the flag as it was typed.
+    /// Like [`Layers::set`], for a flag that stands for a setting. Messages name the flag as it was typed.
     pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
         let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
         let (path, text) = assignment.split_once('=').ok_or_else(|| fault("must read key.path=value"))?;
@@ -102,14 +102,14 @@ impl Layers {
     fn add(&mut self, layer: &str, text: &str, folder: Option<&Path>) -> Result<(), LoadError> {
         let fault = |e: &toml::de::Error| LoadError::Layer { layer: layer.into(), fault: one_line(e, text) };
         let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
-        // Read by itself first: only then does a message know its line.
+        // Check this layer alone first: only then can a message name its line.
         if transfer_file(&table).is_none() {
             toml::from_str::<Settings>(text).map_err(|e| fault(&e))?;
         }
         self.merge_checked(layer, table, folder)
     }
 
-    /// Checks after every layer, so that the message names the layer at fault.
+    /// Checks the merged settings after every layer, so that the message names the layer at fault.
     fn merge_checked(&mut self, layer: &str, mut table: Table, folder: Option<&Path>) -> Result<(), LoadError> {
         if let Some(name) = transfer_file(&table) {
             let path = folder.unwrap_or(Path::new("")).join(name);
@@ -131,18 +131,18 @@ impl Layers {
     }
 }
 
-/// A small text file, whole. `what` it is: said of one that is too long.
+/// Reads a small text file. `what` names its kind in messages.
 pub(crate) fn read(path: &Path, what: &str) -> Result<String, LoadError> {
-    files::read_text(path, LONGEST, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
+    files::read_text(path, MAX_BYTES, what).map_err(|fault| LoadError::File { path: path.display().to_string(), fault })
 }
 
-/// The file that a layer names as its transfer function.
+/// The transfer function file that a layer names.
 pub(crate) fn transfer_file(table: &Table) -> Option<String> {
     let name = table.get("volume")?.get("transfer")?.as_str()?;
     name.ends_with(".toml").then(|| name.to_string())
 }
 
-/// The points of a transfer function's own file: a list `points` of { at, colour, opacity }.
+/// Reads a transfer function file: a list `points` of { at, colour, opacity }.
 fn points(path: &Path) -> Result<Value, LoadError> {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -155,7 +155,7 @@ fn points(path: &Path) -> Result<Value, LoadError> {
     Value::try_from(listed.points).map_err(|e| fault(&e))
 }
 
-/// The word `none` over a table switches off what the table asked for.
+/// Merges `over` into `table`. The word `none` in place of a table removes it.
 fn merge(under: &mut Table, over: Table) {
     for (key, value) in over {
         match (under.get_mut(&key), value) {
@@ -177,12 +177,12 @@ fn one_line(error: &toml::de::Error, text: &str) -> String {
     place + &plain(error.message())
 }
 
-/// The line in which a byte of a text lies, from 1.
+/// The line number of a byte in a text, from 1.
 pub(crate) fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
 }
 
-/// A message on one line: a key that it names may hold anything.
+/// `text` on one line without control characters. Keys in messages may contain anything.
 pub(crate) fn plain(message: &str) -> String {
     let mut line = String::new();
     for c in message.lines().collect::<Vec<_>>().join(" ").chars() {

@@ -1,10 +1,9 @@
-//! Everything that determines a picture: the probe's geometry, the kind of samples, and the user's [`Settings`], checked
-//! and resolved into what the passes ask for. Pure data, no Vulkan.
+//! The scene: everything that determines a picture. It combines the geometry of the probe, the type of the samples and the user's
+//! [`Settings`], checked and resolved to the values that the passes need. Pure data, no Vulkan.
 
 mod bricks;
 pub mod camera;
 mod check;
-mod check_planes;
 pub mod cube;
 pub mod load;
 pub mod planes;
@@ -25,27 +24,27 @@ use crate::source::StoredType;
 use glam::DVec3;
 use region::{depth_offset, framed_low, is_still, slice_grid, visible_box};
 
-/// Largest edge of a picture, pixels.
+/// Maximum width and height of a picture, pixels.
 pub const MAX_PICTURE: u32 = 16384;
-/// Ring of the surface detector, samples (n of thesis 4-3).
+/// Length of the surface detector's ring, samples (n of thesis 4-3).
 pub const RING: u32 = 8;
-/// Largest standard deviation of a Gaussian, pixels: 193 taps.
+/// Maximum standard deviation of a Gaussian, pixels: 193 taps.
 pub const MAX_DEVIATION: f64 = 32.0;
-/// Widest window of a filter, pixels.
+/// Maximum window of a filter, pixels.
 pub const MAX_WINDOW: u32 = 63;
 
-/// Most planes that cut a scene.
+/// Maximum number of clip planes.
 pub const MAX_CLIPS: usize = 4;
 
-/// How the arriving samples are stored and what they mean.
+/// Type and value range of the samples of a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     pub stored: StoredType,
-    /// Stored values that become 0 and 1.
+    /// The stored values that map to 0 and 1.
     pub range: [f64; 2],
 }
 
-/// The pixel lattice of a slice: pixel (0, 0) has its centre at `origin`, in-plane (x, y) in mm.
+/// The pixel grid of a slice. The centre of pixel (0, 0) lies at `origin`, in-plane (x, y) in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceGrid {
     pub size: [u32; 2],
@@ -59,12 +58,11 @@ impl SliceGrid {
     }
 }
 
-/// What a pass of stage 2 looks at: start depth and grey window belong to the mode, since rays that start at the probe meet the
-/// wall first.
+/// The region, grey window and start depth of a pass of stage 2. They belong to the mode: rays that start at the probe meet the wall first.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub window: [f64; 2],
-    /// Lower corner of the region from the start depth on, mm in space.
+    /// Lower corner of the region, cut at the start depth, mm in space.
     pub low: DVec3,
 }
 
@@ -74,20 +72,20 @@ pub struct Scene {
     pub input: Input,
     pub settings: Settings,
     pub grid: SliceGrid,
-    /// Corners of what is rendered, mm in space: the insonified box within the region of interest.
+    /// Corners of the rendered box, mm in space: the bounds of the insonified region within the region of interest.
     pub low: DVec3,
     pub high: DVec3,
     pub rays: Rays,
-    /// Distance between samples on a ray, mm.
+    /// Step along a ray, mm.
     pub step: f64,
-    /// How the volume is sampled: as asked for, and where that is `Auto` as [`Scene::sampled`] was told last.
+    /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
     pub sampling: Sampling,
-    /// Pixels outside the sector take the nearest sample inside, as far out as the filters reach; 0 is the strict rule of
-    /// the PLUS toolkit, which keeps a pixel only when all four neighbours exist.
+    /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
+    /// of the PLUS toolkit, which keeps a pixel only if all four neighbours exist.
     pub apron: f64,
-    /// Filters of the distance map, in pixels of rays.
+    /// Filters of the distance map, sizes in rays.
     pub distance: Distance,
-    /// The texels of the volume that stage 2 can look at: stage 1 makes these.
+    /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
     pub seen: visible_bounds::VisibleBounds,
 }
 
@@ -103,13 +101,13 @@ pub(crate) fn refuse<T>(field: &'static str, fault: impl Into<String>) -> Result
 }
 
 impl Settings {
-    /// What can be told before there is anything to render.
+    /// Checks settings without a geometry.
     ///
     /// # Errors
-    /// Names the first setting that no geometry could be drawn with, and its limits.
+    /// Names the first setting that is invalid for every geometry, and its limits.
     pub fn check(&self) -> Result<(), SceneError> {
         check::check(self)?;
-        check_planes::check(self)
+        check::check_planes(self)
     }
 }
 
@@ -117,7 +115,7 @@ impl Scene {
     /// Checks the settings against the geometry and resolves them.
     ///
     /// # Errors
-    /// Names the first setting that cannot be drawn, and its limits.
+    /// Names the first setting that cannot be rendered, and its limits.
     pub fn new(geometry: Geometry, input: Input, settings: Settings) -> Result<Scene, SceneError> {
         match &geometry {
             Geometry::Sweep(probe) => {
@@ -171,7 +169,7 @@ impl Scene {
             }
         }
         scene.apron = 2.0 + scene.filter_reach();
-        check_planes::check_resolved(&scene)?;
+        check::check_planes_resolved(&scene)?;
         scene.seen = visible_bounds::seen(&scene);
         Ok(scene)
     }
@@ -187,81 +185,81 @@ impl Scene {
         self.geometry.slices() as u32
     }
 
-    /// Width and height of an arriving frame: samples x lines, or columns x rows.
+    /// Width and height of a frame of the source: samples x lines, or columns x rows.
     pub fn frame_size(&self) -> [u32; 2] {
         self.geometry.frame_size().map(|n| n as u32)
     }
 
-    /// Whether lines are conditioned before scan conversion.
+    /// True if lines are conditioned before scan conversion.
     pub fn conditions(&self) -> bool {
         let c = &self.settings.conditioning;
         let on = !c.tgc.is_empty() || c.dynamic_range.is_some() || c.deviation(1) > 0.0 || self.decimation() > 1;
         on && self.probe().is_some()
     }
 
-    /// Samples of an arriving line that become one.
+    /// Decimation factor of the lines of a frame.
     pub fn decimation(&self) -> u32 {
         self.probe().map_or(1, |probe| self.settings.conditioning.factor(probe.samples))
     }
 
-    /// Samples and lines of what is scan-converted.
+    /// Samples per line and number of lines at scan conversion.
     pub fn line_lattice(&self) -> [u32; 2] {
         let [samples, lines] = self.frame_size();
         [(samples - 1) / self.decimation() + 1, lines]
     }
 
-    /// Width, height and slices of the volume.
+    /// Width, height and number of slices of the volume.
     pub fn volume_size(&self) -> [u32; 3] {
         [self.grid.size[0], self.grid.size[1], self.slices()]
     }
 
-    /// Width and height of the result.
+    /// Width and height of the picture.
     pub fn picture_size(&self) -> [u32; 2] {
         self.settings.picture.size
     }
 
-    /// Width and height of what stages 2 and 3 work on: a tile of a 4-up picture, and several rays for each pixel.
+    /// Number of rays along each axis, the size of the pictures of stages 2 and 3: one tile of a 4-up picture, and several rays per pixel.
     pub fn ray_size(&self) -> [u32; 2] {
         camera::ray_size(&self.settings)
     }
 
-    /// Whether a surface detector runs.
+    /// True if the scene runs a surface detector.
     pub fn detects_surface(&self) -> bool {
         matches!(self.settings.mode, Mode::Surface | Mode::Mixed)
     }
 
-    /// Whether stage 3 has a distance map to light.
+    /// True if stage 3 lights a distance map.
     pub fn has_distance(&self) -> bool {
         self.detects_surface() || self.lights_volume()
     }
 
-    /// Whether the place where each ray of a volume becomes opaque is lit.
+    /// True if volume rendering lights the first hit of each ray.
     pub fn lights_volume(&self) -> bool {
         self.settings.mode == Mode::Volume && self.settings.volume.shading == Shading::FirstHit
     }
 
-    /// Whether steps along a ray grow with the range.
+    /// True if steps along a ray grow with the range.
     pub fn spreads(&self) -> bool {
         let curved = self.probe().is_some_and(|p| matches!(p.array, Array::Curved { .. }));
         curved && self.settings.ray.spread > 0.0
     }
 
-    /// What the surface detector looks at.
+    /// The view of the surface detector.
     pub fn surface_view(&self) -> View {
         self.view(self.settings.surface.window, self.settings.surface.start_depth)
     }
 
-    /// What is composited.
+    /// The view of volume rendering.
     pub fn volume_view(&self) -> View {
         self.view(self.settings.volume.window, self.settings.volume.start_depth)
     }
 
-    /// What is projected.
+    /// The view of projections.
     pub fn projection_view(&self) -> View {
         self.view(self.settings.projection.window, self.settings.projection.start_depth)
     }
 
-    /// All of the region through a window.
+    /// The whole region with a grey window.
     pub fn whole_view(&self, window: [f64; 2]) -> View {
         self.view(window, None)
     }
@@ -271,7 +269,7 @@ impl Scene {
         View { window, low: self.low.with_y(self.low.y.max(start)) }
     }
 
-    /// Clip planes in space: what lies beyond is cut away, dot(n, p) > w for (n, w).
+    /// Clip planes (n, w) in space. Points p with dot(n, p) > w are removed.
     pub fn clips(&self) -> impl Iterator<Item = (DVec3, f64)> {
         let offset = depth_offset(&self.geometry);
         self.settings.clip.iter().map(move |c| {
@@ -280,22 +278,22 @@ impl Scene {
         })
     }
 
-    /// Whether samples are composited through the transfer function.
+    /// True if samples are composited through the transfer function.
     pub fn composites(&self) -> bool {
         matches!(self.settings.mode, Mode::Volume | Mode::Mixed)
     }
 
-    /// Whether one value of each ray is kept.
+    /// True if the mode is a projection: one value per ray.
     pub fn projects(&self) -> bool {
         matches!(self.settings.mode, Mode::Mip | Mode::MinIp | Mode::Mean)
     }
 
-    /// Whether planes are cut: a mode of planes, or the three of a 4-up picture.
+    /// True if the picture has planes: a mode of planes, or 4-up.
     pub fn cuts_planes(&self) -> bool {
         self.is_flat() || self.settings.layout == Layout::Four
     }
 
-    /// Whether the mode cuts planes and casts no ray.
+    /// True if the mode cuts planes and casts no rays.
     pub fn is_flat(&self) -> bool {
         self.settings.mode.is_flat()
     }
@@ -312,7 +310,7 @@ impl Scene {
         [smooth.lateral / self.grid.pitch[0], smooth.depth / self.grid.pitch[1], smooth.elevation]
     }
 
-    /// Taps of that Gaussian on one side, along each axis.
+    /// Taps of the 3D Gaussian on one side, along each axis.
     pub fn smoothing_radius(&self) -> [u32; 3] {
         if let Some(taps) = self.settings.slices.smooth.and_then(|s| s.kernel) {
             return [taps / 2; 3];
@@ -321,19 +319,19 @@ impl Scene {
         if self.blurs() { [1, 1, elevation] } else { [lateral, depth, elevation] }
     }
 
-    /// Whether slices get the slight blur against wood grain: asked for, and no smoothing does as much in their plane.
+    /// True if slices get the slight blur against wood grain: it is set, and no smoothing blurs them in their plane.
     fn blurs(&self) -> bool {
         let smooth = self.settings.slices.smooth.unwrap_or_default();
         self.settings.slices.blur && smooth.kernel.is_none() && smooth.lateral == 0.0 && smooth.depth == 0.0
     }
 
-    /// What estimates the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
+    /// Estimator of the centre of an enhanced sigma filter: Perona-Malik for planes, the median otherwise (thesis 5.5).
     pub fn centre(&self, enhanced: EnhancedSigma) -> Estimator {
         let usual = if self.is_flat() { Estimator::PeronaMalik } else { Estimator::Median };
         enhanced.centre.unwrap_or(usual)
     }
 
-    /// Samples behind the surface whose mean echo the skin look wants; 0 for none.
+    /// Number of samples behind the surface whose mean echo skin shading needs; 0 for none.
     pub fn samples_behind(&self) -> u32 {
         match self.settings.light.skin {
             Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.step).ceil() as u32).min(256),
@@ -341,22 +339,22 @@ impl Scene {
         }
     }
 
-    /// The look of skin, if it is one: without wrapping and translucency nothing is left of it.
+    /// Skin shading, if it has an effect: wrap or translucency is above 0.
     pub fn skin(&self) -> Option<Skin> {
         self.settings.light.skin.filter(|s| s.wrap > 0.0 || s.translucency > 0.0)
     }
 
-    /// Distances of neighbouring rays that lie further apart belong to two surfaces, mm.
+    /// Largest difference of neighbouring distances within one surface, mm.
     pub fn cliff(&self) -> f64 {
         self.settings.light.cliff * if self.settings.ray.half { 2.0 } else { 1.0 }
     }
 
-    /// Where a near light is, in space.
+    /// Position of a near light in space, mm.
     pub fn light_place(&self) -> Option<DVec3> {
         self.settings.light.position.map(|p| self.rays.target + self.rays.from_camera(p))
     }
 
-    /// How many pixels away a slice's filters look.
+    /// Reach of the slice filters, pixels.
     fn filter_reach(&self) -> f64 {
         let [lateral, depth, _] = self.smoothing_radius().map(f64::from);
         let median = if self.settings.slices.median { 1.0 } else { 0.0 };
@@ -369,18 +367,18 @@ impl Scene {
             None => 0.0,
         };
         let diffusion = slices.perona_malik.map_or(0.0, |p| p.reach());
-        // To the corners of square windows, one filter after another.
+        // The reach of a chain of square windows extends to their corners.
         let gaussian = lateral.hypot(depth);
         std::f64::consts::SQRT_2 * (median + estimator + sigma + enhanced) + diffusion + gaussian
     }
 }
 
-/// Standard deviation of the binomial of that many taps.
+/// Standard deviation of the binomial kernel of `taps` taps.
 fn binomial_deviation(taps: u32) -> f64 {
     f64::from(taps - 1).sqrt() / 2.0
 }
 
-/// Taps on one side of a Gaussian: three standard deviations hold 99.7 % of it.
+/// Taps on one side of a Gaussian, cut off at three standard deviations, which hold 99.7 % of it.
 pub fn gaussian_radius(deviation: f64) -> u32 {
     if deviation > 0.0 { ((3.0 * deviation).ceil() as u32).max(1) } else { 0 }
 }

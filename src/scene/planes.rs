@@ -1,16 +1,16 @@
-//! Planes that are cut through the volume, resolved to the tiles of a picture: which pixel shows which place in space.
+//! Planes through the volume, resolved to the tiles of a picture: which pixel shows which point in space.
 
 use super::{Layout, Mode, PlaneName, Scene, Slab};
 use glam::{DMat3, DVec3};
 
-/// Most tiles of a picture.
+/// Maximum number of tiles of a picture.
 pub const MAX_TILES: u32 = 64;
-/// Most samples through a slab.
+/// Maximum number of samples through a slab.
 pub const MAX_SLAB: f64 = 4096.0;
-/// How a tile is kept in a buffer: vectors of four floats.
+/// Size of a tile in the buffer, in vectors of four floats.
 pub const TILE_VECTORS: u32 = 9;
 
-/// A plane through the volume: a point of it, and three unit axes.
+/// A plane through the volume: a point on it and three unit axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub at: DVec3,
@@ -22,37 +22,37 @@ pub struct Plane {
 /// A tile of the picture and the plane that it shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// `at` is what the middle of the tile shows.
+    /// The plane. `at` is the point in the middle of the tile.
     pub plane: Plane,
-    /// Columns and rows of pixels before the tile, and in it.
+    /// Position of the tile in the picture and its size, pixels.
     pub corner: [u32; 2],
     pub size: [u32; 2],
     pub frame: Frame,
-    /// The planes whose cross-lines are drawn, with their colours.
+    /// The planes whose cross-lines are drawn, and their colours.
     pub crossed_by: Vec<(Plane, [f64; 3])>,
 }
 
-/// What surrounds a tile.
+/// The border of a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Frame {
     None,
-    /// A line of this colour on its outermost pixels.
+    /// A line of this colour on the outermost pixels.
     Around([f64; 3]),
-    /// A line of this colour towards the tiles above and to the left.
+    /// A line of this colour towards the tiles above and on the left.
     Between([f64; 3]),
 }
 
-/// The tiles of a picture, on a grid of columns and rows; cells beyond the last tile are empty.
+/// The tiles of a picture on a grid of columns and rows. Cells after the last tile are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
     pub columns: u32,
     pub rows: u32,
-    /// mm a pixel, the same in every tile.
+    /// Scale of every tile, mm per pixel.
     pub pixel: f64,
     pub tiles: Vec<Tile>,
 }
 
-/// Colour of a plane's frame and of its cross-lines: told apart by every kind of sight, and never grey.
+/// Colour of a plane's frame and cross-lines. The colours are distinguishable with any colour vision, and none is grey.
 pub fn colour(plane: PlaneName) -> [f64; 3] {
     match plane {
         PlaneName::A => [1.0, 0.8, 0.1],
@@ -64,14 +64,14 @@ pub fn colour(plane: PlaneName) -> [f64; 3] {
 /// Colour between the tiles of tomography.
 pub const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
 
-/// Pixels before the n-th of `count` cells along an edge. Cells differ by at most one pixel, and the last of two is the
-/// larger, as the tile of a 4-up picture's rendering is.
+/// Number of pixels before the n-th of `count` cells along an axis. Cell sizes differ by at most one pixel; of two cells the last is the
+/// larger one, like the rendering in a 4-up picture.
 pub fn cell(edge: u32, n: u32, count: u32) -> u32 {
     (u64::from(edge) * u64::from(n) / u64::from(count.max(1))) as u32
 }
 
 impl Scene {
-    /// Columns and rows of the tiles.
+    /// Number of columns and rows of tiles.
     pub fn tile_grid(&self) -> [u32; 2] {
         match (self.settings.layout, self.settings.mode) {
             (Layout::Four, _) | (_, Mode::Orthogonal) => [2, 2],
@@ -80,38 +80,38 @@ impl Scene {
         }
     }
 
-    /// How many tiles show a plane.
+    /// Number of tiles that show a plane.
     pub fn tile_count(&self) -> u32 {
         let [columns, rows] = self.tile_grid();
         if self.shows_three() { 3 } else { columns.saturating_mul(rows) }
     }
 
-    /// Whether three planes that cross are shown.
+    /// True if three crossing planes are shown.
     pub fn shows_three(&self) -> bool {
         self.settings.layout == Layout::Four || self.settings.mode == Mode::Orthogonal
     }
 
-    /// Whether lines are drawn over the planes of the picture: cross-lines and frames, or what stands between tiles.
+    /// True if lines are drawn over the planes: cross-lines and frames, or the lines between tiles.
     pub fn draws_lines(&self) -> bool {
         let several = self.shows_three() || self.settings.mode == Mode::Tomography;
         several && self.settings.planes.lines
     }
 
-    /// Whether planes become 8 bits as they are cut: nothing else of stage 4 looks at them.
+    /// True if planes are converted to 8 bits when they are cut, since no other pass of stage 4 reads them.
     pub fn tones_planes(&self) -> bool {
         let post = &self.settings.post;
         let filtered = post.sigma.is_some() || post.enhanced_sigma.is_some() || post.perona_malik.is_some();
         self.is_flat() && !filtered && !post.floats
     }
 
-    /// Samples through the slab: at most one slice pixel apart, both faces included.
+    /// Number of samples through the slab, at most one slice pixel apart, both faces included.
     pub fn slab_samples(&self) -> f64 {
         let thickness = self.settings.planes.thickness;
         let pixel = self.grid.pitch[0].min(self.grid.pitch[1]);
         if thickness > 0.0 { (thickness / pixel).ceil() + 1.0 } else { 1.0 }
     }
 
-    /// One of the three planes, where they meet.
+    /// One of the three planes through their common point.
     pub fn plane(&self, name: PlaneName) -> Plane {
         let settings = &self.settings.planes;
         let at = match settings.position {
@@ -131,7 +131,7 @@ impl Scene {
         Plane { at, right: turned * right, down: turned * down, normal: turned * normal }
     }
 
-    /// The planes of this scene as tiles.
+    /// The tiles of this scene.
     pub fn sheet(&self) -> Sheet {
         let [columns, rows] = self.tile_grid();
         let [width, height] = self.picture_size();
@@ -168,7 +168,7 @@ impl Scene {
         Sheet { columns, rows, pixel, tiles: (0..).zip(&planes).map(tile).collect() }
     }
 
-    /// `count` parallel planes about the position.
+    /// `count` parallel planes centred on the position.
     fn stepped(&self, count: u32) -> Vec<Plane> {
         let settings = &self.settings.planes;
         let plane = self.plane(settings.plane);
@@ -180,9 +180,9 @@ impl Scene {
 }
 
 impl Sheet {
-    /// What the shaders read of each tile: its upper left corner in space and one pixel right and down, the way through the
-    /// slab, the frame's colour and kind, and two cross-lines (a, b, c, there) with their colours, where a x + b y + c is the
-    /// distance in pixels from the line, (x, y) counted from the tile's corner.
+    /// The data of each tile for the shaders: the upper left corner in space and the vectors of one pixel right and down, the vector through
+    /// the slab, the frame's colour and kind, and two cross-lines (a, b, c, present) with their colours, where a x + b y + c is the distance
+    /// from the line in pixels, with (x, y) relative to the tile's corner.
     pub fn table(&self, thickness: f64) -> Vec<f64> {
         let mut table = Vec::with_capacity(self.tiles.len() * 4 * TILE_VECTORS as usize);
         for tile in &self.tiles {
@@ -215,7 +215,7 @@ impl Sheet {
 }
 
 impl Slab {
-    /// As the shader's constant has it.
+    /// The value of the shader's constant.
     pub fn number(self) -> i32 {
         match self {
             Slab::Mean => 0,

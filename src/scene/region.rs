@@ -1,10 +1,10 @@
-//! What of a volume is rendered: the insonified box, the region of interest within it, and the lattice of its slices.
+//! The rendered part of a volume: the insonified box, the region of interest, and the pixel grid of the slices.
 
 use super::{Mode, SceneError, Settings, SliceGrid, refuse};
 use crate::probe::{Geometry, Motion, Probe};
 use glam::DVec3;
 
-/// What is added to a depth below the face to get Y.
+/// Offset from a depth below the probe's face to Y, mm.
 pub(super) fn depth_offset(geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Sweep(probe) => probe.array_radius(),
@@ -21,7 +21,7 @@ pub fn insonified_box(geometry: &Geometry) -> (DVec3, DVec3) {
     match geometry {
         Geometry::Sweep(probe) => probe.bounds(),
         Geometry::Cartesian(grid) => {
-            // Half a voxel beyond the outer centres, so that a volume of one slice has a thickness.
+            // Half a voxel beyond the outer voxel centres, so that a volume of one slice has a thickness.
             let (origin, spacing) = (DVec3::from(grid.origin), DVec3::from(grid.spacing));
             let count = DVec3::new(grid.size[0] as f64, grid.size[1] as f64, grid.size[2] as f64);
             (origin - spacing / 2.0, origin + (count - 0.5) * spacing)
@@ -71,7 +71,7 @@ pub(super) fn visible_box(geometry: &Geometry, settings: &Settings) -> Result<(D
     Ok((low, high))
 }
 
-/// Upper end of what the camera frames: the shallowest start depth that the mode uses.
+/// Upper bound of the box that the camera frames: the shallowest start depth that the mode uses.
 pub(super) fn framed_low(
     geometry: &Geometry,
     settings: &Settings,

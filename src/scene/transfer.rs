@@ -1,15 +1,15 @@
-//! The transfer function and the colour maps as tables, made in f64.
+//! The transfer function and the colour maps as tables, computed in f64.
 
 use super::settings::{ColourMap, Transfer, TransferName, TransferPoint};
 
-/// Entries of the transfer table: between two of them the shader interpolates.
+/// Entries of the transfer table. The shader interpolates between them.
 pub const ENTRIES: usize = 256;
 
-/// Absorption of a fully opaque voxel: -ln(1 - a) is infinite, and e^-1e6 is 0 in any float format.
+/// Absorption of a fully opaque voxel, in place of the infinite -ln(1 - a): e^-1e6 is 0 in any float format.
 pub const OPAQUE: f64 = 1e6;
 
-/// Absorption kappa over one reference length for an opacity a: min(-ln(1 - a), 1e6). `ln_1p` keeps every digit of a small a,
-/// where GLSL's pow(1 - a, x) loses them all.
+/// Absorption kappa of opacity a over one reference length: min(-ln(1 - a), 1e6). `ln_1p` keeps all digits of a small a, unlike
+/// GLSL's pow(1 - a, x).
 pub fn absorption(opacity: f64) -> f64 {
     (-(-opacity.clamp(0.0, 1.0)).ln_1p()).min(OPAQUE)
 }
@@ -19,7 +19,7 @@ pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
 }
 
-/// Red, green, blue and absorption at `ENTRIES` even sample values from 0 to 1. Below `threshold` nothing is absorbed.
+/// Red, green, blue and absorption at `ENTRIES` equidistant sample values from 0 to 1. Below `threshold` the absorption is 0.
 pub fn table(transfer: &Transfer, threshold: f64) -> Vec<[f64; 4]> {
     let points = match transfer {
         Transfer::Named(name) => named(*name),
@@ -34,11 +34,10 @@ pub fn table(transfer: &Transfer, threshold: f64) -> Vec<[f64; 4]> {
         .collect()
 }
 
-/// Mean absorption, and mean colour weighted by it, over the sample values between entries `front` and `back` of a table whose
-/// entries are joined by straight lines: what a step sees along which the value goes evenly from one to the other. Row
-/// `front`, column `back`.
+/// The pre-integrated table: mean absorption, and mean colour weighted by it, over the sample values between entries `front` (row) and
+/// `back` (column) of a piecewise linear table. It holds for a step along which the value changes linearly.
 pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
-    // Integrals from entry 0: absorption, and colour times absorption. The product of two straight lines is a parabola.
+    // Integrals from entry 0: absorption, and colour times absorption. The product of two linear functions is a parabola.
     let mut integrals = vec![[0.0; 4]];
     for pair in table.windows(2) {
         let [low, high] = [pair[0], pair[1]];
@@ -52,7 +51,7 @@ pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
     let between = |front: usize, back: usize| {
         let (low, high) = (front.min(back), front.max(back));
         let absorbed = integrals[high][3] - integrals[low][3];
-        // Nothing absorbed has the colour of what lies in the middle; it is not seen.
+        // Without absorption the colour is that of the middle entry; it has no effect.
         if low == high || absorbed <= 0.0 {
             let middle = table[(low + high) / 2];
             return [
@@ -69,7 +68,7 @@ pub fn pre_integrated(table: &[[f64; 4]]) -> Vec<[f64; 4]> {
     (0..n * n).map(|i| between(i / n, i % n)).collect()
 }
 
-/// Why these points are no transfer function.
+/// The fault of an invalid transfer function, if any.
 pub fn fault(transfer: &Transfer) -> Option<String> {
     let Transfer::Points(points) = transfer else { return None };
     if points.is_empty() {
@@ -142,7 +141,7 @@ fn named(name: TransferName) -> Vec<TransferPoint> {
     }
 }
 
-/// Colour of a brightness in 0..1 as control points at even places: dark, middle, bright. Interpolated linearly.
+/// Control points of a colour map at equidistant brightness from dark to bright, interpolated linearly.
 pub fn colour_map(map: ColourMap) -> [[f64; 3]; 5] {
     match map {
         ColourMap::None | ColourMap::Grey => std::array::from_fn(|i| [i as f64 / 4.0; 3]),

@@ -1,15 +1,15 @@
-//! What of the volume can be seen: the texels that any sample of stage 2 may touch. Stage 1 makes no others (after Solteszova
-//! and others 2017, who filter only what a picture shows). The camera does not enter: it may turn at any time.
+//! Visible bounds: the texels of the volume that any sample of stage 2 may touch. Stage 1 computes only these (after Solteszova and
+//! others 2017, who filter only what a picture shows). They do not depend on the camera, which may move at any time.
 
 use super::{Layout, Mode, RING, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 
-/// Texels by which a place may be off in f32, and in the device's filter.
+/// Margin for rounding of positions in f32 and in the device's filter, texels.
 const SLACK: f64 = 0.5;
 
-/// A box of texels of the volume, columns, rows and slices: from `low` up to `high`, which is no part of it. Empty: all zero.
+/// A box of texels: columns, rows and slices from `low` up to, but not including, `high`. All zero if empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VisibleBounds {
     pub low: [u32; 3],
@@ -17,7 +17,7 @@ pub struct VisibleBounds {
 }
 
 impl VisibleBounds {
-    /// All of a volume of that size.
+    /// The bounds of a whole volume.
     pub fn all(size: [u32; 3]) -> VisibleBounds {
         VisibleBounds { low: [0; 3], high: size }
     }
@@ -26,7 +26,7 @@ impl VisibleBounds {
         (0..3).any(|a| self.low[a] >= self.high[a])
     }
 
-    /// Whether every texel of the other is one of this.
+    /// True if `other` lies within these bounds.
     pub fn holds(&self, other: &VisibleBounds) -> bool {
         other.is_empty() || (0..3).all(|a| self.low[a] <= other.low[a] && other.high[a] <= self.high[a])
     }
@@ -35,7 +35,7 @@ impl VisibleBounds {
         self.low[2]..self.high[2]
     }
 
-    /// The box around both.
+    /// The smallest bounds that contain both.
     pub fn with(self, other: VisibleBounds) -> VisibleBounds {
         if self.is_empty() || other.is_empty() {
             return if self.is_empty() { other } else { self };
@@ -47,38 +47,38 @@ impl VisibleBounds {
     }
 }
 
-/// Where samples of a pass lie: in a box, on the near side of every plane, or at most `reach` mm outside of all that.
+/// The positions of the samples of a pass: inside a box and all half-spaces, or at most `reach` mm outside.
 struct Look {
     low: DVec3,
     high: DVec3,
-    /// Outward unit normals and limits, mm.
+    /// Half-spaces: outward unit normals and limits, mm.
     planes: Vec<(DVec3, f64)>,
     reach: f64,
 }
 
 impl Scene {
-    /// The same scene with slices on another lattice.
+    /// The scene with another pixel grid of the slices.
     pub fn on_grid(mut self, grid: SliceGrid) -> Scene {
         self.grid = grid;
         self.seen = seen(&self);
         self
     }
 
-    /// The frames that stage 1 needs: what is seen, and the slices that smoothing across slices reaches.
+    /// The frames that stage 1 needs: those of the visible slices, and the neighbours within reach of smoothing across slices.
     pub fn frames_seen(&self) -> Range<u32> {
         let reach = self.smoothing_radius()[2];
         let Range { start, end } = self.seen.slices();
         if self.seen.is_empty() { 0..0 } else { start.saturating_sub(reach)..(end + reach).min(self.slices()) }
     }
 
-    /// Share of the volume's texels that are seen.
+    /// Share of the volume's texels within the visible bounds.
     pub fn share_seen(&self) -> f64 {
         let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();
         texels(std::array::from_fn(|a| self.seen.high[a] - self.seen.low[a])) / texels(self.volume_size())
     }
 }
 
-/// The texels that the samples of a scene may touch.
+/// The visible bounds of a scene.
 pub(super) fn seen(scene: &Scene) -> VisibleBounds {
     let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
     if scene.settings.slices.everything || counts_growth {
@@ -91,7 +91,7 @@ fn looks(scene: &Scene) -> Vec<Look> {
     let clips: Vec<(DVec3, f64)> = scene.clips().collect();
     let look =
         |low, planes: &[_], steps| Look { low, high: scene.high, planes: planes.to_vec(), reach: reach(scene, steps) };
-    // Of a filter that slides along the ray: its taps along and across, beyond the last step that begins within the region.
+    // The sliding filter reaches along and across the ray, beyond the last step that starts within the region.
     let sliding = match scene.settings.ray.sliding {
         0 => 0,
         edge => edge + 1,
@@ -120,12 +120,12 @@ fn looks(scene: &Scene) -> Vec<Look> {
     looks
 }
 
-/// How far that many steps of a ray lead at most, mm. Steps that grow go on growing outside of the region.
+/// Maximum length of `steps` steps of a ray, mm. Growing steps keep growing outside the region.
 pub(super) fn reach(scene: &Scene, steps: u32) -> f64 {
     let steps = f64::from(steps);
     let (mut widest, mut growth) = (1.0, 0.0);
     if let Some(probe) = scene.probe().filter(|_| scene.spreads()) {
-        // As the ray casters have it: in proportion to the range, from this one on.
+        // The same rule as in the ray casters: proportional to the range, starting here.
         let (spread, from) = (scene.settings.ray.spread, probe.first_range().max(probe.last_range() / 8.0).max(1e-6));
         widest = 1.0 + spread * 7.0;
         growth = scene.step * spread / from;
@@ -133,7 +133,7 @@ pub(super) fn reach(scene: &Scene, steps: u32) -> f64 {
     (scene.step * widest * steps * ((steps + 1.0) * growth).exp()).min(1e7)
 }
 
-/// Lowest and highest of what is added to it.
+/// An interval that grows to contain the values added to it.
 #[derive(Clone, Copy)]
 struct Span(f64, f64);
 
@@ -146,7 +146,7 @@ impl Span {
         Span(self.0.max(low), self.1.min(high))
     }
 
-    /// The number of it that is nearest to zero.
+    /// The value in the interval that is nearest to zero.
     fn least(self) -> f64 {
         0f64.clamp(self.0, self.1.max(self.0))
     }
@@ -159,7 +159,7 @@ impl Span {
 fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
     let (mut low, mut high) = (look.low - look.reach, look.high + look.reach);
     if let Geometry::Sweep(probe) = &scene.geometry {
-        // What is not insonified is not sampled. A single frame is, wherever it is looked at along its thickness.
+        // Only the insonified region is sampled. A single frame is sampled anywhere along its thickness.
         let (first, last) = probe.bounds();
         let thick = matches!(probe.motion, Motion::Still { .. });
         let nudge = 1e-9 * (1.0 + first.abs().max(last.abs()).max_element());
@@ -195,23 +195,23 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
         low: std::array::from_fn(|a| texel(spans[a].0 - SLACK, a)),
         high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0, a) + 1),
     };
-    // The sector may leave nothing of what lies within its bounds.
+    // The bounds may intersect the sector's bounding box but not the sector.
     Some(seen).filter(|seen| !seen.is_empty())
 }
 
-/// In-plane x and y and slice positions of a convex solid that has these corners.
+/// Bounds of in-plane x and y and of slice positions of a convex solid with these corners.
 fn unswept(probe: &Probe, corners: &[DVec3], x: Span, y: Span, z: Span) -> (Span, Span, Span) {
     let Motion::Fan { .. } = probe.motion else { return (x, y, z) };
     let axis = probe.axis_depth();
-    // All of the sector lies beyond the axis, and with it the solid. There a plane of constant angle cuts the solid in two, so
-    // that angles, as the largest distance from the axis, are extreme at corners; the least distance need not be.
+    // The whole sector, and with it the solid, lies beyond the wobble axis. A plane of constant angle divides the solid there, so that the
+    // extremes of the angle and the maximum distance from the axis lie at corners. The minimum distance may not.
     let beyond = Span((y.0 - axis).max(0.0), y.1 - axis);
     let angle = Span::of(corners.iter().map(|c| c.z.atan2((c.y - axis).max(1e-12))));
     let farthest = corners.iter().map(|c| (c.y - axis).hypot(c.z)).fold(0.0, f64::max);
     (x, Span(beyond.least().hypot(z.least()) + axis, farthest + axis), angle)
 }
 
-/// What the sector leaves of a rectangle in the plane of a frame.
+/// The part of an in-plane rectangle that lies within the sector.
 fn in_sector(probe: &Probe, x: Span, y: Span) -> (Span, Span) {
     let (low, high) = probe.plane_bounds();
     let (mut x, mut y) = (x.within(low[0], high[0]), y.within(low[1], high[1]));
@@ -226,26 +226,26 @@ fn in_sector(probe: &Probe, x: Span, y: Span) -> (Span, Span) {
     (x, y)
 }
 
-/// Slice indices at slice positions, whichever line shows them.
+/// Range of slice indices at slice positions, over all lines.
 fn slices(scene: &Scene, probe: &Probe, position: Span) -> Span {
     let (first, last) = probe.slice_bounds();
     let slack = match probe.motion {
         Motion::Still { .. } => return Span(0.0, 0.0),
         Motion::Translated => 0.0,
-        // The ray casters go between entries of a table over the half tangent t: off by h^2/8 of (2 atan t)'' at most.
+        // The ray casters interpolate a table over the half tangent t. The error is at most h^2/8 of (2 atan t)''.
         Motion::Fan { .. } => {
             let h = ((last / 2.0).tan() - (first / 2.0).tan()) / f64::from(scene.settings.ray.entries - 1);
             1.3 * h * h / 8.0
         }
     };
-    // The slice that is at a place when a line fires falls or rises with the line all the way.
+    // The slice index at a position is monotone in the line.
     let lines = [0.0, (probe.lines.len() - 1) as f64];
     let at = |position: f64| lines.map(|line| probe.slice_index(position, line));
     let ([a, b], [c, d]) = (at(position.0 - slack), at(position.1 + slack));
     Span(a.min(b), c.max(d))
 }
 
-/// Corners of what planes (outward normals and limits) leave of a box.
+/// Corners of the intersection of a box with half-spaces (outward normals and limits).
 fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
     if (0..3).any(|a| low[a] > high[a]) {
         return Vec::new();
@@ -258,7 +258,7 @@ fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
         for (j, b) in all.iter().enumerate().skip(i + 1) {
             for c in all.iter().skip(j + 1) {
                 let across = DMat3::from_cols(a.0, b.0, c.0).transpose();
-                // Planes that are nearly parallel add no corner that another two do not.
+                // Nearly parallel planes add no corner that others do not give.
                 if across.determinant().abs() < 1e-6 {
                     continue;
                 }

@@ -2,7 +2,7 @@
 
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
-use super::{region, view};
+use super::view;
 use crate::scene::planes::MAX_TILES;
 use crate::scene::{Camera, Cube, Inset, Layout, MAX_PICTURE, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer};
 use std::borrow::Cow;
@@ -141,7 +141,7 @@ impl Controls {
             }
             Command::Light(by) if finite(&by) && !now.is_flat() => view::light(&mut new, by),
             Command::Face(face, by) if finite(&[by]) && face.axis < 3 => {
-                return view::held(now, region::moved(now, face, by));
+                return view::held(now, view::move_face(now, face, by));
             }
             Command::Clip(by) if finite(&[by]) && !now.is_flat() => {
                 new.clip = view::clip(now, self.start.clip.len(), by)?

@@ -1,11 +1,10 @@
-//! Gestures on the picture: a mouse with three buttons and a wheel, or fingers. Known by nothing but what was done before.
+//! Gestures on the picture: a mouse with three buttons and a wheel, or fingers. They become commands; the only state is what is pressed.
 
-use super::command::{Command, Tool};
-use super::drag::Press;
+use super::command::{Command, Face, Tool};
 use super::input::{Button, Input, Modifiers, Phase};
-use super::picture::{Picture, Spot};
+use super::picking::{Picker, Picture, Spot, along};
 use super::sliders::PLANES_ZOOM;
-use super::{touch, view};
+use super::view;
 use crate::scene::{Layout, Mode};
 use std::time::Duration;
 
@@ -166,7 +165,7 @@ impl Gestures {
         self.fingers[n].at = at;
         match (&old[..], &self.fingers[..]) {
             // A third finger rests.
-            ([a, b, ..], [first, second, ..]) if n < 2 => touch::pair([*a, *b], [first.at, second.at], first.spot, on),
+            ([a, b, ..], [first, second, ..]) if n < 2 => pinch([*a, *b], [first.at, second.at], first.spot, on),
             ([_], _) => self.finger.as_mut().and_then(|press| press.moved(at, on)).into_iter().collect(),
             _ => Vec::new(),
         }
@@ -204,4 +203,179 @@ impl Gestures {
             Spot::Plane(n) => on.name(n).map(Command::Plane).into_iter().chain([Command::Mode(Mode::Plane)]).collect(),
         }
     }
+}
+
+/// How far a drag across what is shown turns it, deg a height. The front of a volume that fills the picture would need 115: this
+/// saves going over twice, and is still slow enough for a hand to stop where it means to.
+pub const TURN: f64 = 200.0;
+
+/// What is held.
+#[derive(Clone, Debug)]
+enum Drag {
+    /// A place where this tool has nothing to hold.
+    Nothing,
+    Pan,
+    Turn,
+    Light,
+    Clip,
+    /// A face of the region.
+    Face(Face),
+    TurnPlanes,
+    /// The place where three planes meet, on a tile of them.
+    Meet(usize),
+    /// A stack of planes.
+    Step,
+}
+
+/// A button or a finger that is down.
+#[derive(Clone, Debug)]
+pub(super) struct Press {
+    grip: Drag,
+    spot: Spot,
+    begin: [f64; 2],
+    last: [f64; 2],
+    /// How far it moves before it is a drag, pixels of the window.
+    slop: f64,
+    is_drag: bool,
+    /// A face: where along its axis it was grasped, how far it may go from there, and how far it went, mm.
+    along: Option<f64>,
+    room: [f64; 2],
+    gone: f64,
+}
+
+impl Press {
+    /// By a button; a finger is a left one.
+    pub fn new(button: Button, tool: Tool, held: Modifiers, slop: f64, at: [f64; 2], on: &Picture) -> Option<Press> {
+        let spot = on.spot(at)?;
+        let (scene, pixel) = on.place(at)?;
+        // Only a plain press may be a click: others take hold at once.
+        let is_plain = button == Button::Left && !held.shift && !held.control;
+        let grip = match (spot, tool) {
+            (Spot::Rendering, _) if button != Button::Left || held.shift => Drag::Pan,
+            (Spot::Rendering, _) if held.control => Drag::Light,
+            (Spot::Rendering, Tool::Turn) => Drag::Turn,
+            (Spot::Rendering, Tool::Light) => Drag::Light,
+            (Spot::Rendering, Tool::Clip) => Drag::Clip,
+            (Spot::Rendering, Tool::Region) => view::nearest_face(scene, pixel).map_or(Drag::Nothing, Drag::Face),
+            (Spot::Rendering, Tool::Plane) => {
+                if scene.cuts_planes() {
+                    Drag::TurnPlanes
+                } else {
+                    Drag::Turn
+                }
+            }
+            (Spot::Plane(_), _) if !is_plain => Drag::Nothing,
+            (Spot::Plane(_), Tool::Turn) => Drag::TurnPlanes,
+            (Spot::Plane(n), Tool::Plane) => {
+                if scene.shows_three() {
+                    Drag::Meet(n)
+                } else {
+                    Drag::Step
+                }
+            }
+            (Spot::Plane(_), _) => Drag::Nothing,
+        };
+        let room = if let Drag::Face(face) = grip { view::face_travel(scene, face) } else { [0.0; 2] };
+        let slop = if is_plain { slop } else { 0.0 };
+        Some(Press { grip, spot, begin: at, last: at, slop, is_drag: !is_plain, along: None, room, gone: 0.0 })
+    }
+
+    /// Where it began, if that is all it did.
+    pub fn click(&self) -> Option<([f64; 2], Spot)> {
+        (!self.is_drag).then_some((self.begin, self.spot))
+    }
+
+    pub fn moved(&mut self, to: [f64; 2], on: &Picture) -> Option<Command> {
+        if !self.is_drag {
+            let [x, y] = [to[0] - self.begin[0], to[1] - self.begin[1]];
+            let gone = x.hypot(y);
+            if gone < self.slop {
+                return None;
+            }
+            // It holds from where it became a drag: what is held does not jump.
+            self.is_drag = true;
+            self.last = [self.begin[0] + x / gone * self.slop, self.begin[1] + y / gone * self.slop];
+        }
+        let from = std::mem::replace(&mut self.last, to);
+        if from == to { None } else { self.dragged(from, to, on) }
+    }
+
+    fn dragged(&mut self, from: [f64; 2], to: [f64; 2], on: &Picture) -> Option<Command> {
+        let (scene, pixel) = on.place(to)?;
+        let [x, y] = [to[0] - from[0], to[1] - from[1]];
+        let of_picture = |n: f64| n / on.size[1];
+        let turned = |x: f64, y: f64| [x, y].map(|n| n / on.height(self.spot) * TURN);
+        let command = match self.grip {
+            Drag::Nothing => return None,
+            Drag::Pan => Command::Pan([x, y].map(of_picture)),
+            Drag::Light => Command::Light([x, y].map(of_picture)),
+            Drag::Turn => {
+                // The front follows the hand also where the picture is rolled.
+                let (sin, cos) = view::upright(&scene.settings.camera, &scene.geometry).roll.to_radians().sin_cos();
+                Command::Turn(turned(x * cos + y * sin, x * sin - y * cos))
+            }
+            Drag::TurnPlanes => Command::PlaneTurn(turned(-x, -y)),
+            // Up is away from whoever looks down on a table: further in.
+            Drag::Clip => Command::Clip(-y * on.scale() * Picker::of(scene).pixel()),
+            Drag::Step => Command::PlaneBy(-y * on.scale() * scene.sheet().pixel),
+            Drag::Meet(tile) => Command::Meet(view::below_face(scene, on.on_plane(tile, to)?.0).to_array()),
+            Drag::Face(face) => {
+                let eye = Picker::of(scene);
+                let line = view::face_axis(scene, face);
+                // Along the axis from the origin, which stays while the face moves.
+                let place = |pixel| along((line.0 - line.1 * line.0.dot(line.1), line.1), eye.ray(pixel));
+                if self.along.is_none() {
+                    self.along = place(on.place(from)?.1);
+                }
+                // From where it was grasped, not from the last place: beyond its room the face waits for the hand to come back.
+                let gone = (place(pixel)? - self.along?).clamp(self.room[0], self.room[1]);
+                let by = gone - std::mem::replace(&mut self.gone, gone);
+                if by == 0.0 {
+                    return None;
+                }
+                Command::Face(face, by)
+            }
+        };
+        Some(command)
+    }
+}
+
+/// Fingers that are nearer to one another only move the picture, pixels: what they say of scale and angle is noise.
+const NEAR: f64 = 24.0;
+
+/// What two fingers ask for that went from two places of the window to two others. `spot` is where they came down.
+fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], spot: Spot, on: &Picture) -> Vec<Command> {
+    let Some(scene) = on.scene else { return Vec::new() };
+    let between = |[a, b]: [[f64; 2]; 2]| [b[0] - a[0], b[1] - a[1]];
+    let (was, is) = (between(old), between(new));
+    let (length, longer) = (was[0].hypot(was[1]), is[0].hypot(is[1]));
+    let settings = &scene.settings;
+    let zoom = if spot == Spot::Rendering { settings.camera.zoom } else { settings.planes.zoom };
+    let (mut times, mut angle) = (1.0, 0.0);
+    if length.min(longer) >= NEAR {
+        // Beyond the last zoom the picture only moves and turns.
+        times = view::zoomed(zoom, longer / length) / zoom;
+        angle = (was[0] * is[1] - was[1] * is[0]).atan2(was[0] * is[0] + was[1] * is[1]);
+    }
+    let mut commands = Vec::new();
+    match spot {
+        Spot::Plane(_) if !scene.is_flat() => commands.push(Command::Slide(PLANES_ZOOM, zoom * times)),
+        Spot::Plane(_) => commands.extend([Command::Zoom(times), Command::Roll(angle.to_degrees())]),
+        Spot::Rendering => {
+            // Zoom and roll are about the middle of the rendering; the rest of what leads from one pair to the other is a pan.
+            let middle = on.middle();
+            let from_middle = |[a, b]: [[f64; 2]; 2]| [0, 1].map(|i| (a[i] + b[i]) / 2.0 - middle[i]);
+            let ([x, y], [to_x, to_y]) = (from_middle(old), from_middle(new));
+            let (sin, cos) = angle.sin_cos();
+            let pan = [to_x - times * (x * cos - y * sin), to_y - times * (x * sin + y * cos)];
+            commands.extend([
+                Command::Zoom(times),
+                Command::Roll(angle.to_degrees()),
+                Command::Pan(pan.map(|n| n / on.size[1])),
+            ]);
+        }
+    }
+    let does_nothing = [Command::Zoom(1.0), Command::Roll(0.0), Command::Pan([0.0; 2])];
+    commands.retain(|command| !does_nothing.contains(command));
+    commands
 }

@@ -12,7 +12,6 @@ pub mod controls;
 pub mod devices;
 #[cfg(target_os = "linux")]
 pub mod direct;
-mod drag;
 pub mod export;
 pub mod frame_budget;
 pub mod gestures;
@@ -20,14 +19,11 @@ pub mod input;
 pub mod keys;
 pub mod panels;
 mod picking;
-pub mod picture;
 pub mod quality_ladder;
 mod recovery;
-mod region;
 pub mod sliders;
 pub mod source_supervisor;
 pub mod times;
-mod touch;
 mod view;
 pub mod window;
 

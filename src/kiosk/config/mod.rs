@@ -3,19 +3,18 @@
 //! Every key may be left out. Paths are relative to the folder of the file. What cannot be meant is refused in one line that names the
 //! file, the line, the key, and what is allowed.
 
-mod arguments;
-mod check;
 mod error;
-mod places;
-mod spoken;
+mod flags;
 
 pub use error::ConfigError;
 
 use super::chord::Chord;
 use crate::live::Update;
-use crate::scene::load::{self, Layers, LoadError};
-use places::Places;
-use serde::{Deserialize, Serialize};
+use crate::scene::Settings;
+use crate::scene::load::{self, Layers, LoadError, transfer_file};
+use error::{Places, allowed};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -116,7 +115,7 @@ pub struct Display {
     /// Of letters and what is pressed, 0.5 to 4. Default: 1.
     pub scale: f64,
     /// Longest time that a picture may take while the view moves, 1 ms to 10 s; none where the file says `none`. Default: 33 ms.
-    #[serde(with = "spoken::perhaps")]
+    #[serde(with = "optional_duration")]
     pub budget: Option<Duration>,
     /// The error.json of `echolume report error` that the budget is kept by. Default: dials that are built in.
     pub report: Option<PathBuf>,
@@ -138,7 +137,7 @@ pub enum Present {
 #[serde(deny_unknown_fields, default)]
 pub struct Keys {
     /// Ends the program; none where the file says `none`. Default: ctrl+alt+q.
-    #[serde(with = "spoken::keys")]
+    #[serde(with = "optional_chord")]
     pub exit: Option<Chord>,
 }
 
@@ -153,7 +152,7 @@ pub struct Live {
     /// Memory that those may take, 16 to 65536 MiB; where it is short there are fewer of them. Default: 512.
     pub cine_memory_mb: u32,
     /// Between attempts to open the source, 100 ms to 10 min. Default: 2 s.
-    #[serde(with = "spoken::always")]
+    #[serde(with = "duration")]
     pub retry: Duration,
     /// Every frame that arrives is written into this folder. Default: none, and nothing is kept.
     pub record: Option<PathBuf>,
@@ -297,6 +296,123 @@ impl Config {
             *file = folder.join(&*file);
         }
         Ok(())
+    }
+}
+
+impl Config {
+    /// A recording is the source.
+    fn is_file(&self) -> bool {
+        self.source != PHANTOM && !self.source.contains("://")
+    }
+
+    fn check(&self, text: &str) -> Result<(), ConfigError> {
+        let unless = |right: bool, key: &str| match (right, allowed(key)) {
+            (true, _) => Ok(()),
+            (false, allowed) => {
+                Err(self.places.fault(key, &format!("must be {}", allowed.unwrap_or("something else"))))
+            }
+        };
+        // A service has no standard input.
+        let network = self.source.strip_prefix("igtl://").is_some_and(|host| !host.is_empty());
+        let is_source = network || self.source == PHANTOM || (self.is_file() && !["", "-"].contains(&&*self.source));
+        unless(is_source, "source")?;
+        if self.forever && self.rounds.is_some() {
+            return Err(self.places.fault("loop", "cannot be true beside rounds: set one of them"));
+        }
+        let whole = self.motor.as_ref().is_none_or(|motor| motor.port.is_some() && motor.sweeps.is_some());
+        unless(whole, "motor")?;
+        let display = &self.display;
+        unless(display.size.iter().all(|edge| (64..=16384).contains(edge)), "display.size")?;
+        unless((0.5..=4.0).contains(&display.scale), "display.scale")?;
+        let time = |time: Duration, [from, to]: [u64; 2]| {
+            (Duration::from_millis(from)..=Duration::from_millis(to)).contains(&time)
+        };
+        unless(display.budget.is_none_or(|budget| time(budget, [1, 10_000])), "display.budget")?;
+        unless(display.report.is_none() || display.budget.is_some(), "display.report")?;
+        let (live, files) = (&self.live, &self.files);
+        unless((1..=1000).contains(&live.cine_volumes), "live.cine_volumes")?;
+        unless((16..=65536).contains(&live.cine_memory_mb), "live.cine_memory_mb")?;
+        unless(time(live.retry, [100, 600_000]), "live.retry")?;
+        unless((1..=1024).contains(&files.log_size_mb), "files.log_size_mb")?;
+        unless((1..=100).contains(&files.log_files), "files.log_files")?;
+        self.check_scene(text)
+    }
+
+    /// As a scene file is, with the line.
+    fn check_scene(&self, text: &str) -> Result<(), ConfigError> {
+        #[derive(Deserialize)]
+        struct Rest {
+            #[serde(default, rename = "scene")]
+            _scene: Settings,
+        }
+        // By itself first: merged settings no longer know their lines. A transfer function that lies in a file is none yet.
+        if transfer_file(&self.scene).is_none() {
+            toml::from_str::<Rest>(text).map_err(|e| self.places.refuse(&e))?;
+        }
+        for preset in &self.preset {
+            let known = crate::scene::load::Layers::default().preset(preset);
+            known.map_err(|e| self.places.fault("preset", &e.to_string()))?;
+        }
+        let settings = self.layers().and_then(|layers| layers.finish());
+        let settings = settings.map_err(|e| self.places.fault("scene", &e.to_string()))?;
+        settings.check().map_err(|e| self.places.fault(&format!("scene.{}", e.field), &e.fault))
+    }
+}
+
+fn time<E: Error>(text: &str) -> Result<Duration, E> {
+    humantime::parse_duration(text).map_err(|fault| E::custom(format!("{text:?} is no time: {fault}")))
+}
+
+fn say<S: Serializer>(time: Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&humantime::format_duration(time))
+}
+
+/// A time that is always there.
+mod duration {
+    use super::*;
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
+        time(&String::deserialize(deserializer)?)
+    }
+
+    pub fn serialize<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+        say(*time, serializer)
+    }
+}
+
+/// A time, or the word `none`.
+mod optional_duration {
+    use super::*;
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Duration>, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        if text == "none" { Ok(None) } else { time(&text).map(Some) }
+    }
+
+    pub fn serialize<S: Serializer>(time: &Option<Duration>, serializer: S) -> Result<S::Ok, S::Error> {
+        match time {
+            Some(time) => say(*time, serializer),
+            None => serializer.serialize_str("none"),
+        }
+    }
+}
+
+/// Keys, or the word `none`.
+mod optional_chord {
+    use super::*;
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Chord>, D::Error> {
+        match String::deserialize(deserializer)?.as_str() {
+            "none" => Ok(None),
+            text => Chord::parse(text).map(Some).map_err(Error::custom),
+        }
+    }
+
+    pub fn serialize<S: Serializer>(keys: &Option<Chord>, serializer: S) -> Result<S::Ok, S::Error> {
+        match keys {
+            Some(chord) => serializer.collect_str(chord),
+            None => serializer.serialize_str("none"),
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-use super::check::ALLOWED;
+use super::error::ALLOWED;
 use super::*;
 use std::collections::BTreeSet;
 

@@ -1,88 +1,99 @@
-//! What a user may ask of a picture: the TOML scene file, its presets and defaults. Lengths in mm, angles in degrees,
-//! samples and opacities in 0..1. Every struct refuses unknown keys, so that a typing error is not silently a default.
+//! The settings of a scene: keys, types, defaults and units of the TOML scene file. Lengths are in mm, angles in degrees, samples and
+//! opacities in 0..1. Every struct refuses unknown keys, so that a typing error does not silently become a default.
 
-mod conditioning;
-mod modes;
 mod planes;
-mod post;
-mod rays;
-mod shade;
-mod slices;
+mod preprocess;
+mod raycast;
+mod shading;
 
-pub use conditioning::*;
-pub use modes::*;
 pub use planes::*;
-pub use post::*;
-pub use rays::*;
-pub use shade::*;
-pub use slices::*;
+pub use preprocess::*;
+pub use raycast::*;
+pub use shading::*;
 
 use serde::{Deserialize, Serialize};
 
+/// All settings of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
+    /// What a pixel shows.
     pub mode: Mode,
+    /// How the picture is divided.
     pub layout: Layout,
+    /// Size of the picture.
     pub picture: Picture,
+    /// Stage 1: conditioning of polar lines.
     pub conditioning: Conditioning,
+    /// Stage 1: filters of slices and storage of the volume.
     pub slices: Slices,
+    /// Region of interest.
     pub region: Region,
-    /// Planes that cut away what lies on the side that their normal points to; at most 4.
+    /// Clip planes, at most 4. Each removes the side that its normal points to.
     pub clip: Vec<Clip>,
+    /// Stage 2: the camera.
     pub camera: Camera,
+    /// Stage 2: the rays of every mode.
     pub ray: Ray,
+    /// Stage 2: volume rendering (modes volume and mixed).
     pub volume: Volume,
+    /// Stage 2: surface rendering (modes surface and mixed).
     pub surface: Surface,
+    /// Stage 2: projections (modes mip, minip and mean).
     pub projection: Projection,
+    /// Stage 2: planes (modes plane, orthogonal and tomography, and 4-up).
     pub planes: Planes,
+    /// Stage 2: the solid block (mode cube).
     pub cube: Cube,
+    /// Stage 3: filters of the distance map.
     pub distance: Distance,
+    /// Stage 3: light, shadow, occlusion and skin.
     pub light: Light,
+    /// Stage 4: filters, tone and colour of the picture.
     pub post: Post,
 }
 
 impl Settings {
-    /// What is shown while the view moves: a quarter of the rays at most. Stage 1 stays as it is.
+    /// The settings while the view moves: one ray for four pixels. Stage 1 stays the same.
     pub fn moving(&self) -> Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
 }
 
-/// What a pixel holds.
+/// What a pixel shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// VR: emission and absorption through a transfer function.
+    /// VR: volume rendering, emission and absorption through a transfer function.
     #[serde(alias = "vr")]
     Volume,
-    /// SR: the first surface on each ray, lit.
+    /// SR: surface rendering, the first surface on each ray, lit.
     #[default]
     #[serde(alias = "sr")]
     Surface,
-    /// VR in front of SR: what lies before the surface is a veil over it.
+    /// VR over SR: the volume in front of the surface is composited over it.
     Mixed,
-    /// Largest sample on the ray.
+    /// Maximum intensity projection: the largest sample on the ray.
     Mip,
-    /// Smallest sample on the ray, within the insonified region.
+    /// Minimum intensity projection: the smallest sample on the ray, within the insonified region.
     #[serde(alias = "minip")]
     MinIp,
-    /// Mean of the samples on the ray within the insonified region: an X-ray.
+    /// X-ray: the mean of the samples on the ray, within the insonified region.
     #[serde(alias = "xray")]
     Mean,
     /// MPR: one free plane through the volume.
     #[serde(alias = "mpr")]
     Plane,
-    /// Three orthogonal planes with cross-lines.
+    /// MPR: three orthogonal planes with cross-lines.
     Orthogonal,
-    /// Parallel planes side by side.
+    /// Tomographic view: parallel planes side by side.
     Tomography,
-    /// The volume as a solid block, seen from outside; each face can be pushed in and tilted.
+    /// The volume as a solid block seen from outside. Each face can be moved inwards and tilted.
     Cube,
 }
 
 impl Mode {
-    /// Cuts planes and casts no ray.
+    /// True for modes that cut planes and cast no rays.
     pub fn is_flat(self) -> bool {
         matches!(self, Mode::Plane | Mode::Orthogonal | Mode::Tomography)
     }
@@ -92,13 +103,15 @@ impl Mode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
+    /// One picture.
     #[default]
     Single,
-    /// 4-up: the three orthogonal planes, and what the mode renders.
+    /// 4-up: the three orthogonal planes and the rendering of the mode.
     #[serde(alias = "4up", alias = "4-up")]
     Four,
 }
 
+/// The picture.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Picture {
@@ -112,23 +125,25 @@ impl Default for Picture {
     }
 }
 
-/// The box that is rendered, mm: lateral from the middle, depth from the probe's face, elevation from the middle frame
-/// (Cartesian volumes: along their own axes). Absent: all there is.
+/// Region of interest: the box that is rendered, mm. Lateral counts from the middle, depth from the probe's face, elevation from the
+/// middle frame; a Cartesian volume uses its own axes. Absent: the whole volume.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Region {
+    /// Lateral bounds, mm.
     pub lateral: Option<[f64; 2]>,
+    /// Depth bounds, mm.
     pub depth: Option<[f64; 2]>,
+    /// Elevation bounds, mm.
     pub elevation: Option<[f64; 2]>,
 }
 
-/// Cuts away the side of a plane that its normal points to. Place and normal as lateral, depth (from the probe's face),
-/// elevation.
+/// A clip plane. It removes the side that its normal points to. Coordinates are lateral, depth (from the probe's face), elevation.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clip {
     /// A point of the plane, mm.
     pub at: [f64; 3],
-    /// Of any length but 0.
+    /// Normal of the plane, of any length but 0.
     pub normal: [f64; 3],
 }

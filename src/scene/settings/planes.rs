@@ -1,40 +1,41 @@
-//! Settings of the modes that show sections: planes that are cut without casting a ray, and the volume as a solid block.
+//! Settings of the modes that show sections: planes, and the volume as a solid block.
 
 use serde::{Deserialize, Serialize};
 
-/// Modes plane, orthogonal and tomography, and the planes of a 4-up picture. All planes belong to one frame of three axes,
-/// which a place and three angles set: plane A is the B-mode picture (lateral to the right, depth down), B crosses it
-/// (elevation to the right, depth down), C is the coronal plane (lateral to the right, elevation up) that no 2D probe shows.
-/// Every tile of a picture has the same scale and is centred on the middle of the region, so that scrolling does not shift it.
+/// Modes plane, orthogonal and tomography, and the planes of a 4-up picture. A position and three angles define one coordinate frame for
+/// all planes: A is the B-mode plane (lateral to the right, depth down), B is perpendicular to it (elevation to the right, depth down),
+/// C is the coronal plane (lateral to the right, elevation up). All tiles have the same scale and are centred on the middle of the
+/// region, so that scrolling does not shift them.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Planes {
-    /// Samples are stretched from this interval to 0..1.
+    /// Grey window: samples in this interval are stretched to 0..1.
     pub window: [f64; 2],
-    /// Where the three planes meet: lateral, depth, elevation in mm as in [`super::Region`]. Absent: the middle of the region.
+    /// The common point of the three planes: lateral, depth, elevation in mm as in `region`. Absent: the middle of the region.
     pub position: Option<[f64; 3]>,
-    /// Turns the frame about its depth axis, deg: +90 lays the right of plane A along elevation.
+    /// Rotation about the depth axis, deg: +90 turns the right of plane A towards elevation.
     pub azimuth: f64,
-    /// Turns it about the lateral axis that it has then, deg: plane A's lower edge goes towards +elevation.
+    /// Rotation about the resulting lateral axis, deg: moves the lower edge of plane A towards +elevation.
     pub tilt: f64,
-    /// Turns it about the elevation axis that it has then, deg: the picture of plane A turns clockwise.
+    /// Rotation about the resulting elevation axis, deg: rotates the picture of plane A clockwise.
     pub roll: f64,
-    /// Thickness of the slab that makes one picture, mm, half of it on either side of the plane; 0 is a thin plane.
+    /// Slab thickness, mm, half on either side of the plane; 0 is a thin plane.
     pub thickness: f64,
-    /// What is made of the samples through the slab.
+    /// How the samples through the slab are combined.
     pub slab: Slab,
-    /// 1 fits the region into a tile; larger is closer.
+    /// Zoom factor; 1 fits the region into a tile.
     pub zoom: f64,
-    /// The plane of mode plane, and the one that tomography steps.
+    /// The plane of mode plane and of tomography.
     pub plane: PlaneName,
-    /// Tiles of tomography side by side and below one another, at most 64 in all.
+    /// Columns of tomography; at most 64 tiles in all.
     pub columns: u32,
+    /// Rows of tomography.
     pub rows: u32,
-    /// Distance between neighbouring tiles' planes, mm. The middle of the tiles is at `position`; A steps towards +elevation,
-    /// B towards +lateral, C into the depth. Absent: the region is divided evenly.
+    /// Distance between the planes of neighbouring tiles, mm. The middle tile is at `position`. A moves towards +elevation, B towards
+    /// +lateral, C along depth. Absent: the planes divide the region evenly.
     pub spacing: Option<f64>,
-    /// Draws where the other planes cut a tile and frames it in its plane's colour: A yellow, B magenta, C cyan. Tomography
-    /// has thin grey lines between tiles instead.
+    /// Draws cross-lines where the other planes cut a tile, and a frame in the plane's colour: A yellow, B magenta, C cyan. Tomography has
+    /// thin grey lines between tiles.
     pub lines: bool,
 }
 
@@ -58,19 +59,20 @@ impl Default for Planes {
     }
 }
 
-/// What becomes of the samples through a slab. Only those inside the insonified region count.
+/// How the samples through a slab are combined. Only samples inside the insonified region count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Slab {
-    /// Less speckle: contrast of soft tissue.
+    /// Mean: less speckle, contrast of soft tissue.
     #[default]
     Mean,
-    /// Bright structures: bone.
+    /// Maximum: bright structures such as bone.
     Max,
-    /// Dark structures: vessels, cysts.
+    /// Minimum: dark structures such as vessels and cysts.
     Min,
 }
 
+/// The three orthogonal planes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PlaneName {
@@ -83,19 +85,19 @@ pub enum PlaneName {
     C,
 }
 
-/// Mode cube: the region as a solid block whose faces show the samples that they cut.
+/// Mode cube: the region as a solid block. Its faces show the samples that they cut.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Cube {
-    /// Samples are stretched from this interval to 0..1.
+    /// Grey window: samples in this interval are stretched to 0..1.
     pub window: [f64; 2],
-    /// How far each face is pushed in, mm; together they must leave something.
+    /// Distance that each face is moved inwards, mm. Something must remain.
     pub inset: Inset,
-    /// How each face is turned about its middle.
+    /// Tilt of each face about its middle.
     pub tilt: Tilt,
-    /// How much darker a face is that is seen edge-on, 0..1; 0 shows samples as they are.
+    /// Darkening of a face that is seen edge-on, 0..1; 0 shows samples unchanged.
     pub shading: f64,
-    /// Draws thin lines where two faces meet; the borders of the insonified region are faces too.
+    /// Draws thin lines where two faces meet. The borders of the insonified region count as faces.
     pub edges: bool,
 }
 
@@ -105,7 +107,7 @@ impl Default for Cube {
     }
 }
 
-/// A distance for each face of the block, mm.
+/// Inset of each face of the block, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Inset {
@@ -113,9 +115,9 @@ pub struct Inset {
     pub left: f64,
     /// +lateral.
     pub right: f64,
-    /// Towards the probe.
+    /// Nearest to the probe.
     pub near: f64,
-    /// Away from it.
+    /// Farthest from the probe.
     pub far: f64,
     /// -elevation.
     pub bottom: f64,
@@ -123,15 +125,21 @@ pub struct Inset {
     pub top: f64,
 }
 
-/// Two angles for each face of the block, deg, right-handed about the two axes that lie in the face, the first one first:
-/// (depth, elevation) of left and right, (lateral, elevation) of near and far, (lateral, depth) of bottom and top.
+/// Tilt of each face of the block: two angles in deg, right-handed about the two axes in the face, applied in this order: (depth,
+/// elevation) for left and right, (lateral, elevation) for near and far, (lateral, depth) for bottom and top.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tilt {
+    /// -lateral.
     pub left: [f64; 2],
+    /// +lateral.
     pub right: [f64; 2],
+    /// Nearest to the probe.
     pub near: [f64; 2],
+    /// Farthest from the probe.
     pub far: [f64; 2],
+    /// -elevation.
     pub bottom: [f64; 2],
+    /// +elevation.
     pub top: [f64; 2],
 }

@@ -1,24 +1,24 @@
 //! Keyboards, mice and touch screens straight from the kernel (evdev), where there is no windowing system. [`translator`] makes inputs
-//! of what they say, [`profile`] knows what each is, [`open`] reads them.
+//! of what they say, [`profile`] knows what each is, [`reader`] reads them.
 //!
 //! One thread waits for all of them at once and for the clock, and hands on what they do through a channel of bounded length. Were it a
 //! thread for each, one that nobody touches could not be ended, and would hold its device as long as the program lives; were they read
 //! between pictures, the kernel would drop a gesture whenever one takes long. Where the channel is full the thread waits, and what the
 //! kernel then drops is known as lost.
 
-mod device;
-mod fingers;
-mod layout;
-mod open;
-mod pad;
+mod keymap;
 mod profile;
+mod reader;
 #[cfg(test)]
 mod tests;
+mod touch;
 mod translator;
+
+pub use reader::Told;
 
 use super::input::Input;
 use crate::gpu::Wake;
-use open::Opened;
+use reader::Opened;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use std::io;
 use std::os::fd::OwnedFd;
@@ -33,15 +33,6 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_secs(2);
 /// What may wait to be asked for: half a second of a quick mouse.
 const MOST: usize = 512;
-
-/// What comes from devices, or from whoever woke us.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Told {
-    Input(Input),
-    /// Something is amiss.
-    Note(String),
-    Woken,
-}
 
 /// All input devices of this machine, until it is dropped.
 pub struct Devices {

@@ -1,6 +1,6 @@
 //! What a device is, of what it says that it can do.
 
-use super::layout::{meaning, of_pen};
+use super::keymap::{meaning, of_pen};
 use evdev::{AbsoluteAxisCode as Abs, KeyCode, RelativeAxisCode as Rel};
 use std::collections::{BTreeMap, BTreeSet};
 

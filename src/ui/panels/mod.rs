@@ -1,61 +1,19 @@
 //! Panels around and over the picture, laid out by egui: what they show comes in as [`Facts`], what is asked of them goes out as
 //! commands. Their places follow from the size of the window alone, so that the picture's size is known before anything is drawn.
 
-mod arrow;
-mod bar;
-mod column;
-mod hands;
-mod help;
-mod hud;
-mod marks;
-mod notes;
-mod rail;
+mod annotations;
+mod controls;
+mod overlays;
+mod state;
 mod theme;
 
-pub use notes::{Banner, Note};
+pub use state::{Banner, Facts, Note, place};
 
 use super::command::Command;
-use super::controls::Controls;
-use super::input::Input;
-use super::times::Times;
+use super::input::{Button, Input, Modifiers, Phase};
 use crate::gpu;
-use crate::scene::Scene;
-use egui::{Rect, pos2, vec2};
+use egui::{Event, Modifiers as Held, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
 use std::time::Duration;
-
-/// Points: of the buttons on the left, the sliders on the right, the cine loop below.
-const RAIL: f32 = 208.0;
-const COLUMN: f32 = 330.0;
-const BAR: f32 = 76.0;
-/// Below this the window shows the picture alone, whatever is asked for.
-const LEAST: [f32; 2] = [760.0, 420.0];
-
-/// What panels show.
-pub struct Facts<'a> {
-    pub controls: &'a Controls,
-    pub scene: Option<&'a Scene>,
-    pub times: &'a Times,
-    /// Upper left corner and size of the picture, pixels.
-    pub picture: ([u32; 2], [u32; 2]),
-    pub is_panelled: bool,
-    pub help: bool,
-    pub hud: bool,
-    pub is_frozen: bool,
-    pub is_playing: bool,
-    /// Volumes in the cine loop, and the place of the one that is shown.
-    pub cine: (usize, Option<usize>),
-    /// A picture has been drawn.
-    pub is_drawn: bool,
-    /// The dials that the view stands on, and its budget.
-    pub quality: &'a str,
-    pub budget: Option<Duration>,
-    pub banner: Option<Banner>,
-    pub notes: &'a [Note],
-    /// Keys that are said in the help besides those of the table.
-    pub exit_key: &'a str,
-    /// Where a pointer is drawn, pixels of the window: none where a windowing system has its own.
-    pub pointer: Option<[f64; 2]>,
-}
 
 /// What became of laying them out.
 pub struct Laid {
@@ -68,19 +26,9 @@ pub struct Laid {
 /// The panels of one window.
 pub struct Panels {
     context: egui::Context,
-    hands: hands::Hands,
+    hands: Hands,
     /// Pixels a point.
     scale: f32,
-}
-
-/// Where the picture lies on a window of this size: its upper left corner and its size, pixels.
-pub fn place(size: [u32; 2], scale: f32, is_panelled: bool) -> ([u32; 2], [u32; 2]) {
-    let points = size.map(|n| n as f32 / scale);
-    if !is_panelled || points[0] < LEAST[0] || points[1] < LEAST[1] {
-        return ([0, 0], size.map(|n| n.max(1)));
-    }
-    let [left, right, below] = [RAIL, COLUMN, BAR].map(|edge| (edge * scale).round() as u32);
-    ([left, 0], [(size[0] - left - right).max(1), (size[1] - below).max(1)])
 }
 
 impl Panels {
@@ -88,7 +36,7 @@ impl Panels {
     pub fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
         theme::dress(&context);
-        Panels { context, hands: hands::Hands::default(), scale: scale.clamp(0.5, 4.0) }
+        Panels { context, hands: Hands::default(), scale: scale.clamp(0.5, 4.0) }
     }
 
     pub fn scale(&self) -> f32 {
@@ -127,7 +75,7 @@ impl Panels {
         };
         // An event of any kind has egui lay out once more.
         if !input.events.is_empty() {
-            input.events.insert(0, egui::Event::ModifiersChanged(modifiers));
+            input.events.insert(0, Event::ModifiersChanged(modifiers));
         }
         if let Some(viewport) = input.viewports.get_mut(&egui::ViewportId::ROOT) {
             viewport.native_pixels_per_point = Some(self.scale);
@@ -138,21 +86,21 @@ impl Panels {
             let ask = &mut |command| commands.push(command);
             let is_panelled = facts.is_panelled && facts.picture.1 != size;
             if is_panelled {
-                bar::show(ui, facts, ask);
-                rail::show(ui, facts, ask);
-                column::show(ui, facts, ask);
+                controls::show_cine_bar(ui, facts, ask);
+                controls::show_modes(ui, facts, ask);
+                controls::show_sliders(ui, facts, ask);
             }
             if facts.is_drawn && facts.is_panelled {
-                marks::paint(ui, facts, self.scale);
+                annotations::paint(ui, facts, self.scale);
             }
             if facts.hud {
-                hud::show(ui, facts, self.scale);
+                overlays::show_times(ui, facts, self.scale);
             }
-            notes::show(ui, facts, self.scale);
+            overlays::show_notes(ui, facts, self.scale);
             if facts.help {
-                help::show(ui, facts, ask);
+                overlays::show_help(ui, facts, ask);
             }
-            arrow::paint(ui, facts, self.scale);
+            overlays::paint_pointer(ui, facts, self.scale);
         });
         let again = output.viewport_output.values().map(|v| v.repaint_delay).min().unwrap_or(Duration::MAX);
         let shapes = self.context.tessellate(output.shapes, output.pixels_per_point);
@@ -161,9 +109,83 @@ impl Panels {
     }
 }
 
-/// The picture's place in points.
-fn rect(facts: &Facts, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = facts.picture;
-    let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
-    Rect::from_min_size(pos2(x, y), vec2(w, h))
+/// Between our inputs and egui's events: places in points, and fingers that press like a pointer.
+#[derive(Default)]
+struct Hands {
+    events: Vec<Event>,
+    pointer: Pos2,
+    held: Held,
+    /// The finger that is taken for the pointer.
+    finger: Option<u64>,
+}
+
+impl Hands {
+    /// `scale`: pixels a point.
+    fn input(&mut self, input: &Input, scale: f32) {
+        let at = |[x, y]: [f64; 2]| pos2(x as f32 / scale, y as f32 / scale);
+        match *input {
+            Input::Moved(place) => self.moved(at(place)),
+            Input::Button { button, pressed } => self.button(button, pressed),
+            Input::Scroll(notches) => self.events.push(Event::MouseWheel {
+                unit: MouseWheelUnit::Line,
+                delta: vec2(0.0, notches as f32),
+                phase: TouchPhase::Move,
+                modifiers: self.held,
+            }),
+            // Keys are the kiosk's own: no panel has a field to type into.
+            Input::Key { .. } => {}
+            Input::Modifiers(Modifiers { shift, control, alt }) => {
+                self.held = Held { alt, ctrl: control, shift, mac_cmd: false, command: control };
+            }
+            Input::Touch { finger, phase, at: place } => self.touch(finger, phase, at(place)),
+            Input::Left => {
+                self.finger = None;
+                self.events.push(Event::PointerGone);
+            }
+        }
+    }
+
+    fn moved(&mut self, to: Pos2) {
+        self.pointer = to;
+        self.events.push(Event::PointerMoved(to));
+    }
+
+    fn button(&mut self, button: Button, pressed: bool) {
+        let button = match button {
+            Button::Left => PointerButton::Primary,
+            Button::Right => PointerButton::Secondary,
+            Button::Middle => PointerButton::Middle,
+        };
+        self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.held });
+    }
+
+    fn touch(&mut self, finger: u64, phase: Phase, at: Pos2) {
+        match phase {
+            Phase::Down if self.finger.is_none() => {
+                self.finger = Some(finger);
+                self.moved(at);
+                self.button(Button::Left, true);
+            }
+            _ if self.finger != Some(finger) => {}
+            Phase::Down | Phase::Moved => self.moved(at),
+            Phase::Up | Phase::Gone => {
+                self.finger = None;
+                // A finger that is taken for something else presses nothing.
+                if phase == Phase::Up {
+                    self.moved(at);
+                    self.button(Button::Left, false);
+                }
+                self.events.push(Event::PointerGone);
+            }
+        }
+    }
+
+    /// Whether egui has not been told of something.
+    fn is_waiting(&self) -> bool {
+        !self.events.is_empty()
+    }
+
+    fn take(&mut self) -> (Vec<Event>, Held) {
+        (std::mem::take(&mut self.events), self.held)
+    }
 }

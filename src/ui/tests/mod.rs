@@ -1,19 +1,19 @@
 //! Hands, keys and settings together, without a window.
 
-mod controls;
-mod fingers;
-mod mouse;
+mod gestures;
 mod sequences;
 
-use super::command::{Command, Tool};
-use super::controls::Controls;
+use super::command::{Command, Face, Tool};
+use super::controls::{Change, Controls};
 use super::gestures::Gestures;
 use super::input::{Button, Input, Modifiers};
-use super::picture::Picture;
+use super::picking::Picture;
+use super::sliders::{GAIN, PLANES_ZOOM, SLIDERS, THRESHOLD};
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use crate::scene::load::{Layers, PRESETS};
-use crate::scene::{Input as Samples, Scene, Settings};
+use crate::scene::{Input as Samples, Layout, Mode, PlaneName, Scene, Settings};
 use crate::source::StoredType;
+use glam::DVec3;
 use std::time::Duration;
 
 const BYTES: Samples = Samples { stored: StoredType::U8, range: [0.0, 255.0] };
@@ -141,4 +141,189 @@ impl Desk {
         self.input(Input::Button { button: Button::Left, pressed: true });
         self.input(Input::Button { button: Button::Left, pressed: false })
     }
+}
+
+fn ask(desk: &mut Desk, command: Command) -> Change {
+    let scene = desk.scene();
+    desk.controls.apply(&command, Some(&scene))
+}
+
+#[test]
+fn names_of_sliders_are_where_keys_look_for_them_and_none_is_twice() {
+    assert_eq!([GAIN, THRESHOLD, PLANES_ZOOM].map(|n| SLIDERS[n].name), ["Gain", "Threshold", "Planes zoom"]);
+    for (i, slider) in SLIDERS.iter().enumerate() {
+        assert!(SLIDERS[..i].iter().all(|other| other.name != slider.name), "{}", slider.name);
+        assert!(slider.range[0] < slider.range[1] && slider.step > 0.0);
+    }
+}
+
+#[test]
+fn a_slider_shows_what_it_was_set_to() {
+    for mode in ["surface", "volume", "mixed", "mip", "plane", "tomography", "cube"] {
+        for preset in ["phantom", "thesis", "bmode"] {
+            let desk = settings(preset, &format!("mode='{mode}'"));
+            for slider in SLIDERS.iter().filter(|s| s.applies(&desk)) {
+                for share in [0.3, 0.8] {
+                    let mut set = desk.clone();
+                    let value = slider.range[0] + share * (slider.range[1] - slider.range[0]);
+                    slider.set(&mut set, value);
+                    // Windows keep their order, and some values are whole.
+                    let is_window = slider.name.contains("indow");
+                    assert!(is_window || (slider.get(&set) - value).abs() <= 1.0, "{} {mode} {value}", slider.name);
+                    let mut same = desk.clone();
+                    slider.set(&mut same, f64::NAN);
+                    assert_eq!(same, desk, "{}", slider.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_slider_is_dead_within_its_range_in_a_volume() {
+    use Mode::*;
+    let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube];
+    for (geometry, mode) in geometries().iter().flat_map(|g| modes.map(|mode| (g, mode))) {
+        let start = Settings { mode, ..settings("", "distance.bilateral={ pixels = 2, distance = 1 }") };
+        for (n, slider) in SLIDERS.iter().enumerate().filter(|(_, s)| s.applies(&start)) {
+            let shown = scene(geometry, &start);
+            let [low, high] = slider.range_in(&shown);
+            for value in [low, low + 0.37 * (high - low), high] {
+                let mut controls = Controls::new(start.clone());
+                controls.apply(&Command::Slide(n, value), Some(&shown));
+                let mut asked = start.clone();
+                slider.set(&mut asked, value);
+                assert_eq!(controls.settings(), &asked, "{} at {value} {mode:?}: {:?}", slider.name, shown.geometry);
+            }
+        }
+    }
+}
+
+#[test]
+fn threshold_window_and_start_depth_are_those_of_the_mode_that_is_shown() {
+    let named = |name: &str| SLIDERS.iter().find(|s| s.name == name).unwrap();
+    let mut s = settings("", "mode='mixed'");
+    named("Threshold").set(&mut s, 0.4);
+    named("Start depth").set(&mut s, 12.0);
+    assert_eq!((s.surface.threshold, s.volume.threshold, s.surface.start_depth), (0.4, 0.0, Some(12.0)));
+    s.mode = Mode::Volume;
+    named("Threshold").set(&mut s, 0.3);
+    named("Window low").set(&mut s, 0.9);
+    named("Window high").set(&mut s, 0.2);
+    assert!((s.volume.window[0], s.surface.window) == (0.9, [0.0, 1.0]) && s.volume.window[1] > 0.9);
+    assert_eq!((s.surface.threshold, s.volume.threshold), (0.4, 0.3));
+    named("Start depth").set(&mut s, 0.0);
+    assert_eq!((s.volume.start_depth, s.surface.start_depth), (None, Some(12.0)));
+    let mut s = settings("fetal", "");
+    named("Smoothing").set(&mut s, 0.7);
+    let smooth = s.slices.smooth.unwrap();
+    assert!((smooth.depth - 0.4).abs() < 1e-9 && (smooth.elevation - 0.7).abs() < 1e-9, "in proportion");
+    named("Smoothing").set(&mut s, 0.0);
+    assert_eq!(s.slices.smooth, None);
+}
+
+#[test]
+fn planes_and_four_pictures_lead_to_one_another() {
+    let mut desk = Desk::new("mode='volume'");
+    let shows = |desk: &Desk| (desk.controls.settings().mode, desk.controls.settings().layout);
+    ask(&mut desk, Command::Layout(Layout::Four));
+    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
+    ask(&mut desk, Command::Plane(PlaneName::C));
+    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
+    ask(&mut desk, Command::Mode(Mode::Tomography));
+    assert_eq!(shows(&desk), (Mode::Tomography, Layout::Single));
+    ask(&mut desk, Command::Layout(Layout::Four));
+    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
+    ask(&mut desk, Command::Layout(Layout::Single));
+    ask(&mut desk, Command::Plane(PlaneName::B));
+    assert_eq!(shows(&desk), (Mode::Plane, Layout::Single));
+}
+
+#[test]
+fn a_key_that_shows_a_mode_is_not_dead_for_what_the_mode_alone_asks() {
+    let mut desk = Desk::new("projection.start_depth=500\ncube.inset.near=900\nplanes.columns=64\nplanes.rows=64");
+    for mode in [Mode::Mip, Mode::Cube, Mode::Tomography] {
+        assert_eq!(ask(&mut desk, Command::Mode(mode)), Change::Settings);
+        assert_eq!(desk.scene().settings.mode, mode);
+    }
+}
+
+#[test]
+fn the_region_is_never_thin_nor_beyond_the_echoes() {
+    let mut desk = Desk::new("surface.start_depth=30");
+    let (low, high) = crate::scene::insonified_box(&desk.geometry);
+    for axis in 0..3 {
+        for is_high in [true, false] {
+            ask(&mut desk, Command::Face(Face { axis, high: is_high }, 1e4));
+        }
+    }
+    assert!((desk.scene().low - low).length() < 1e-9 && (desk.scene().high - high).length() < 1e-9);
+    for axis in 0..3 {
+        ask(&mut desk, Command::Face(Face { axis, high: true }, -1e4));
+    }
+    let scene = desk.scene();
+    let left = scene.high - scene.low.with_y(scene.surface_view().low.y);
+    assert!((left - DVec3::splat(2.0)).length() < 1e-9, "{left}");
+}
+
+#[test]
+fn the_viewers_plane_lies_across_the_view_and_is_one() {
+    let mut desk = Desk::new("clip=[{ at = [0, 0, 0], normal = [0, -1, 0] }]");
+    ask(&mut desk, Command::Clip(5.0));
+    ask(&mut desk, Command::Clip(7.0));
+    let clips = desk.controls.settings().clip.clone();
+    assert_eq!(clips.len(), 2);
+    assert_eq!(DVec3::from(clips[1].normal), -DVec3::Y);
+    let near = desk.scene().low.y - 40.0;
+    assert!((clips[1].at[1] - near - 12.0).abs() < 1e-9);
+    ask(&mut desk, Command::Turn([60.0, 10.0]));
+    ask(&mut desk, Command::Clip(0.5));
+    let turned = desk.controls.settings().clip.clone();
+    let moved = DVec3::from(turned[1].at) - DVec3::from(clips[1].at);
+    assert!(turned.len() == 2 && (moved - desk.scene().rays.forward * 0.5).length() < 1e-9, "{moved}");
+    ask(&mut desk, Command::Clip(-1e5));
+    assert_eq!(desk.controls.settings().clip, clips[..1]);
+    let mut full = Desk::new(&format!("clip=[{}]", ["{ at = [0, 0, 0], normal = [0, -1, 0] }"; 4].join(", ")));
+    assert_eq!(ask(&mut full, Command::Clip(5.0)), Change::Nothing);
+}
+
+#[test]
+fn the_light_follows_the_hand_and_stays_on_the_viewers_side() {
+    for toml in ["", "light.position=[0, 30, 40]"] {
+        let mut desk = Desk::new(toml);
+        let place = |desk: &Desk| {
+            let light = &desk.controls.settings().light;
+            light.position.unwrap_or(light.direction).normalize()
+        };
+        let before = place(&desk);
+        ask(&mut desk, Command::Light([0.1, -0.05]));
+        assert!((place(&desk) - before).truncate().distance(glam::DVec2::new(0.2, 0.1)) < 1e-9);
+        ask(&mut desk, Command::Light([-40.0, 90.0]));
+        assert!(place(&desk).z > 0.1 && place(&desk).y < 0.0);
+        let near = desk.controls.settings().light.position;
+        assert!(near.is_none_or(|near| (near.length() - 50.0).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn what_is_no_matter_of_settings_is_for_who_asked() {
+    let mut controls = Controls::new(Settings::default());
+    for command in [Command::Freeze, Command::Cine(-1), Command::SavePicture, Command::Help, Command::Exit] {
+        assert_eq!(controls.apply(&command, None), Change::Screen(command));
+    }
+    assert_eq!(controls.apply(&Command::Tool(Tool::Light), None), Change::Tool);
+    assert_eq!(controls.apply(&Command::Zoom(2.0), None), Change::Nothing, "nothing is shown");
+    controls.resize([1920, 0]);
+    controls.reset();
+    assert_eq!((controls.tool(), controls.settings().picture.size), (Tool::Turn, [1920, 64]));
+}
+
+#[test]
+fn a_shadow_comes_back_as_it_was() {
+    let mut desk = Desk::new("light.shadow={ strength = 0.5, softness = 0 }");
+    let before = desk.controls.settings().clone();
+    ask(&mut desk, Command::Shadow(false));
+    assert_eq!(desk.controls.settings().light.shadow.map(|s| s.strength), Some(0.0));
+    ask(&mut desk, Command::Shadow(true));
+    assert_eq!(desk.controls.settings(), &before);
 }

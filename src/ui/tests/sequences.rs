@@ -1,11 +1,9 @@
 //! Whatever is done, in whatever order: settings can be drawn, and numbers are numbers.
 
 use super::*;
-use crate::scene::{ColourMap, Layout, Mode, PlaneName, TransferName};
-use crate::ui::command::Face;
+use crate::scene::{ColourMap, TransferName};
 use crate::ui::input::Phase;
 use crate::ui::keys::{KEYS, Keys};
-use crate::ui::sliders::SLIDERS;
 use proptest::prelude::*;
 
 /// Numbers as hands make them, and as broken drivers do.

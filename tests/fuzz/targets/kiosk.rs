@@ -2,7 +2,7 @@
 
 use super::told;
 use echolume::kiosk::config::Config;
-use echolume::kiosk::redacted::Redactor;
+use echolume::kiosk::redaction::Redactor;
 use std::path::Path;
 
 /// What is taken is written out and read back, makes arguments, and layers.

@@ -1,9 +1,7 @@
 //! The devices that are open: those of /dev/input that mean something to us, as they come and go.
 
-use super::Told;
-use super::device::{Event, State};
 use super::profile::{Abilities, Profile, Span};
-use super::translator::Translator;
+use super::translator::{Event, State, Translator};
 use crate::ui::input::Input;
 use evdev::raw_stream::RawDevice;
 use evdev::{AbsoluteAxisCode as Abs, PropType};
@@ -16,6 +14,15 @@ use std::path::{Path, PathBuf};
 const FOLDER: &str = "/dev/input";
 /// More are not opened.
 const MOST: usize = 32;
+
+/// What comes from devices, or from whoever woke us.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    Input(Input),
+    /// Something is amiss.
+    Note(String),
+    Woken,
+}
 
 struct Reader {
     path: PathBuf,

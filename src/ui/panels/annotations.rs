@@ -1,6 +1,6 @@
 //! What a picture is read by: a scale in every tile, which way the volume is turned, and what its colours mean.
 
-use super::Facts;
+use super::state::{Facts, rect};
 use super::theme::{FAINT, SMALL, TEXT};
 use crate::passes::postprocess::tone;
 use crate::scene::{Layout, Mode, Scene, transfer};
@@ -12,7 +12,7 @@ const LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
 pub fn paint(ui: &Ui, facts: &Facts, scale: f32) {
     let Some(scene) = facts.scene else { return };
-    let picture = super::rect(facts, scale);
+    let picture = rect(facts, scale);
     // While the window is being resized the scene has another size for a moment.
     if scene.picture_size() != facts.picture.1 {
         return;

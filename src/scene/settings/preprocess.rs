@@ -1,0 +1,311 @@
+//! Settings of stage 1: conditioning of polar lines, filters of slices, storage of the volume.
+
+use serde::{Deserialize, Serialize};
+
+/// Conditioning of the samples of polar frames before scan conversion (thesis 4.3), in this order: time gain compensation, low pass and
+/// decimation, log compression. Everything is off by default.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Conditioning {
+    /// Time gain compensation: gains at increasing depths. Linear in dB between them, constant beyond the first and the last.
+    pub tgc: Vec<Gain>,
+    /// Dynamic range of log compression, dB, 1..=200, for linear envelopes (20 dB per decade). Absent: the samples are compressed already.
+    pub dynamic_range: Option<f64>,
+    /// Dynamic range that 0..1 stands for in samples that are compressed already, dB, 1..=200. Scales the effect of a gain.
+    pub compressed_range: f64,
+    /// Standard deviation of the Gaussian low pass along each line, samples, 0..=32; 0 for none. Absent: half the decimation factor if
+    /// lines are decimated, else none.
+    pub low_pass: Option<f64>,
+    /// Most samples per line, 2..=65536. Longer lines are low-passed and decimated by the smallest integer factor that meets this.
+    pub samples: Option<u32>,
+}
+
+impl Default for Conditioning {
+    fn default() -> Self {
+        Conditioning { tgc: Vec::new(), dynamic_range: None, compressed_range: 60.0, low_pass: None, samples: None }
+    }
+}
+
+/// A point of the time gain compensation curve.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gain {
+    /// Depth along the line from the probe's face, mm.
+    pub depth: f64,
+    /// Gain, dB, -120..=120.
+    pub gain: f64,
+}
+
+impl Conditioning {
+    /// Gain at a depth in mm, dB.
+    pub fn gain(&self, depth: f64) -> f64 {
+        let after = self.tgc.partition_point(|g| g.depth <= depth);
+        match (after.checked_sub(1).and_then(|i| self.tgc.get(i)), self.tgc.get(after)) {
+            (Some(low), Some(high)) => {
+                low.gain + (high.gain - low.gain) * (depth - low.depth) / (high.depth - low.depth)
+            }
+            (Some(end), None) | (None, Some(end)) => end.gain,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// Decimation factor for lines of `samples` samples.
+    pub fn factor(&self, samples: usize) -> u32 {
+        let most = self.samples.map_or(samples, |most| most.max(1) as usize);
+        samples.div_ceil(most).max(1) as u32
+    }
+
+    /// Standard deviation of the low pass for a decimation factor, samples.
+    ///
+    /// By default half the factor M: a Gaussian of deviation s passes exp(-2 pi^2 s^2 f^2), so what would alias onto a constant
+    /// (f = 1/M) is 43 dB down and what stays below half the new Nyquist frequency (f < 1/(4 M)) loses less than 3 dB.
+    pub fn deviation(&self, factor: u32) -> f64 {
+        self.low_pass.unwrap_or(if factor > 1 { f64::from(factor) / 2.0 } else { 0.0 })
+    }
+}
+
+/// Stage 1: how a frame becomes a slice. The filters run in the order of their keys.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Slices {
+    /// Pixels along the longer edge of a slice (sweeps only; a Cartesian volume keeps its voxels).
+    pub pixels: u32,
+    /// Median filter of 3x3 pixels.
+    pub median: bool,
+    /// A local estimator as a filter.
+    pub estimator: Option<Estimator>,
+    /// Edge constant k of a Perona-Malik estimator, 0..1.
+    pub estimator_edge: f64,
+    /// Sigma filter.
+    pub sigma: Option<Sigma>,
+    /// Enhanced sigma filter.
+    pub enhanced_sigma: Option<EnhancedSigma>,
+    /// Perona-Malik diffusion.
+    pub perona_malik: Option<PeronaMalik>,
+    /// Gaussian smoothing.
+    pub smooth: Option<Smooth>,
+    /// Slight Gaussian blur of 3x3 against wood grain, the trace of the pixel lattice on a tilted surface (thesis Fig. 32, 33). Has no
+    /// effect where `smooth` blurs slices already.
+    pub blur: bool,
+    /// Storage of the volume.
+    pub format: VolumeFormat,
+    /// Converts and filters the whole volume, not only the part that the region, start depths and clip planes leave visible. The picture
+    /// is the same; a region that grows then needs no new frames.
+    pub everything: bool,
+    /// The volume is rendered many times before it changes, which makes precomputed data worth its cost. The picture is the same except
+    /// for the last digit of its samples.
+    pub still: bool,
+}
+
+impl Default for Slices {
+    fn default() -> Self {
+        Slices {
+            pixels: 512,
+            median: false,
+            estimator: None,
+            estimator_edge: 0.1,
+            sigma: None,
+            enhanced_sigma: None,
+            perona_malik: None,
+            smooth: None,
+            blur: false,
+            format: VolumeFormat::R16f,
+            everything: false,
+            still: false,
+        }
+    }
+}
+
+/// Texel format of the volume: memory against error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VolumeFormat {
+    /// 8 bits, normalised.
+    R8,
+    /// 16 bits, normalised.
+    R16,
+    /// Half-precision float.
+    #[default]
+    R16f,
+    /// Single-precision float.
+    R32f,
+}
+
+/// Lee's sigma filter: the mean of the pixels of a window whose values lie within 2 sigma of the centre.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Sigma {
+    /// Window size, pixels; odd.
+    pub window: u32,
+    /// Standard deviation of the noise. A neighbour counts within 2 sigma. In 0..1 on slices and pictures, in mm on distances; relative to
+    /// the centre's value if the noise is multiplicative.
+    pub sigma: f64,
+    /// Model of the noise.
+    pub noise: Noise,
+}
+
+impl Default for Sigma {
+    fn default() -> Self {
+        Sigma { window: 7, sigma: 0.1, noise: Noise::Additive }
+    }
+}
+
+/// Noise model (Lee 1983): how the noise depends on the value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    /// Independent of the value: speckle after log compression. A neighbour counts within 2 sigma.
+    #[default]
+    Additive,
+    /// Proportional to the value: speckle of linear envelopes. A neighbour counts within 2 sigma times the centre.
+    Multiplicative,
+}
+
+/// The enhanced sigma filter (thesis 5.4): the window grows where too few neighbours are similar to the centre, and the centre is
+/// estimated first.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EnhancedSigma {
+    /// Starting window size, pixels; odd.
+    pub window: u32,
+    /// Largest window size, pixels; odd. Thesis Tables 7-9: 17, 19, 19, 21, 21, 23 for starts of 3, 5, 7, 9, 11, 13.
+    pub largest: u32,
+    /// Standard deviation of the noise. A neighbour counts within 2 sigma of the centre. In 0..1 on slices and on the brightness of
+    /// pictures, in mm on distances; relative to the centre if the noise is multiplicative.
+    pub sigma: f64,
+    /// Model of the noise.
+    pub noise: Noise,
+    /// Estimator of the centre. Absent: Perona-Malik in modes of planes, the median in all others (thesis 5.5).
+    pub centre: Option<Estimator>,
+    /// Edge constant k of a Perona-Malik centre, in the units of sigma.
+    pub edge: f64,
+    /// Records by how many rings each pixel's window grew (thesis Tables 7-9). Slices only.
+    pub growth: bool,
+}
+
+impl Default for EnhancedSigma {
+    fn default() -> Self {
+        EnhancedSigma {
+            window: 5,
+            largest: 19,
+            sigma: 0.1,
+            noise: Noise::Additive,
+            centre: None,
+            edge: 0.1,
+            growth: false,
+        }
+    }
+}
+
+/// Estimate of a pixel without noise from its neighbourhood (thesis 5.4).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// Median of 3x3.
+    #[default]
+    Median,
+    /// One explicit step of 0.2 with four neighbours (Perona and Malik 1990).
+    PeronaMalik,
+    /// Half the pixel, half its eight neighbours weighted by the inverse of their difference (Wang, Vagnucci and Li 1981).
+    GradientInverse,
+    /// Mean of the mask with the least variance, of nine masks in 5x5 (Nagao and Matsuyama 1979).
+    NagaoMatsuyama,
+}
+
+/// Anisotropic diffusion with four neighbours (Perona and Malik 1990; thesis 5-9..5-12).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PeronaMalik {
+    /// Time stepping.
+    pub scheme: Scheme,
+    /// Edge constant k: differences above it are preserved. In 0..1 on slices and pictures, in mm on distances. Infinity preserves none
+    /// (the heat equation), 0 preserves all.
+    pub edge: f64,
+    /// Conductance function.
+    pub conductance: Conductance,
+    /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4; tau of AOS, unlimited.
+    pub step: f64,
+    /// Number of steps, 1..=1000.
+    pub repeat: u32,
+}
+
+impl Default for PeronaMalik {
+    fn default() -> Self {
+        PeronaMalik { scheme: Scheme::Explicit, edge: 0.1, conductance: Conductance::Quotient, step: 0.2, repeat: 5 }
+    }
+}
+
+impl PeronaMalik {
+    /// Reach of the diffusion, pixels: three standard deviations of the heat equation, whose variance is twice the time. The explicit
+    /// scheme reaches at most one pixel per step. At most 64.
+    pub fn reach(&self) -> f64 {
+        let steps = f64::from(self.repeat);
+        let spread = 3.0 * (2.0 * self.step * steps).sqrt();
+        let carried = if self.scheme == Scheme::Explicit { spread.min(steps) } else { spread };
+        carried.min(64.0)
+    }
+}
+
+/// Time stepping of the diffusion equation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scheme {
+    /// Forward Euler: one dispatch per step.
+    #[default]
+    Explicit,
+    /// Additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998): semi-implicit, stable at any step, inaccurate at large
+    /// ones; four dispatches per step.
+    Aos,
+}
+
+/// Conductance as a function of the difference g of two neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Conductance {
+    /// 1 / (1 + (g/k)^2): favours wide regions.
+    #[default]
+    Quotient,
+    /// exp(-(g/k)^2): favours edges of high contrast.
+    Exponential,
+}
+
+/// Separable 3D Gaussian in texture space: standard deviations (0 for none), or the size of a small kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Smooth {
+    /// Standard deviation along lateral, mm.
+    pub lateral: f64,
+    /// Standard deviation along depth, mm.
+    pub depth: f64,
+    /// Standard deviation along elevation, slices.
+    pub elevation: f64,
+    /// Taps along each axis, 3 or 5, in place of the deviations above: a Gaussian in pixels, pixels and slices with the deviation
+    /// sqrt(n - 1) / 2 of the binomial of n taps, cut off there.
+    pub kernel: Option<u32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_are_linear_between_points_and_level_beyond() {
+        let tgc = vec![Gain { depth: 10.0, gain: -6.0 }, Gain { depth: 30.0, gain: 4.0 }];
+        let c = Conditioning { tgc, ..Conditioning::default() };
+        assert_eq!([0.0, 10.0, 15.0, 30.0, 99.0].map(|d| c.gain(d)), [-6.0, -6.0, -3.5, 4.0, 4.0]);
+        assert_eq!(Conditioning::default().gain(5.0), 0.0);
+    }
+
+    #[test]
+    fn a_line_keeps_at_most_the_samples_asked_for_and_is_not_cut_further_than_needed() {
+        for samples in [2usize, 3, 5, 97, 512, 513, 3640] {
+            for most in [2u32, 3, 96, 512, 4096] {
+                let c = Conditioning { samples: Some(most), ..Conditioning::default() };
+                let kept = |factor: u32| (samples - 1) / factor as usize + 1;
+                let factor = c.factor(samples);
+                assert!((2..=most as usize).contains(&kept(factor)), "{samples} to {most}");
+                assert!(factor == 1 || kept(factor - 1) > most as usize, "{samples} to {most}");
+            }
+        }
+    }
+}

@@ -1,0 +1,308 @@
+//! Settings of stage 2, ray casting: camera, rays, volume rendering, surface rendering and projections.
+
+use serde::{Deserialize, Serialize};
+
+/// The camera. With all angles zero it looks from the probe into the body, with lateral to the right.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Camera {
+    /// Rotation of the view towards +lateral, deg.
+    pub azimuth: f64,
+    /// Rotation of the view towards +elevation, deg.
+    pub elevation: f64,
+    /// Clockwise rotation of the picture, deg.
+    pub roll: f64,
+    /// Zoom factor; 1 fits the region into the picture.
+    pub zoom: f64,
+    /// Vertical field of view, deg; 0 is parallel projection.
+    pub field_of_view: f64,
+    /// The point that the camera looks at: lateral, depth, elevation in mm as in `region`. Absent: the middle of the region.
+    pub target: Option<[f64; 3]>,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Camera { azimuth: 0.0, elevation: 0.0, roll: 0.0, zoom: 1.0, field_of_view: 0.0, target: None }
+    }
+}
+
+/// The rays of every mode that casts some.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Ray {
+    /// Distance between samples, mm. Absent: one slice pixel.
+    pub step: Option<f64>,
+    /// Early ray termination of VR: a ray ends when its transmittance falls below this. The error is at most this; 0 never ends early.
+    pub early_end: f64,
+    /// How a sample is interpolated.
+    pub sampling: Sampling,
+    /// Growth of the step with the range, as the samples of a convex sweep spread apart: 0 keeps the step constant, 1 makes it
+    /// proportional to the distance from the array's apex, up to 8 times. Curved arrays only.
+    pub spread: f64,
+    /// The 3D filter of the thesis (4.3): a Gaussian of 3 or 5 samples along each axis, applied at every sample while the ray is
+    /// cast; 0 for none.
+    pub sliding: u32,
+    /// Entries of the look-up tables of the sweep and the lines, 2..=65536. The error of linear interpolation is h^2/8 times the second
+    /// derivative of the half tangent: with 1025 entries under 1e-6 slices for a sweep of 142 frames over 85 deg.
+    pub entries: u32,
+    /// Rays per pixel along each axis, 1..=4: the picture is rendered larger and averaged.
+    pub rays: u32,
+    /// Brick size of empty-space skipping, texels: 4..=64; 0 takes every sample. Rays skip bricks that cannot change the picture, so
+    /// that it stays the same bit for bit.
+    pub brick: u32,
+    /// Half resolution: one ray for four pixels, and the picture is enlarged, for a view that moves. The filters of the distance map
+    /// cover the same part of the picture with half as many rays per axis. `rays` must be 1.
+    pub half: bool,
+}
+
+impl Default for Ray {
+    fn default() -> Self {
+        Ray {
+            step: None,
+            early_end: 1.0 / 512.0,
+            sampling: Sampling::Auto,
+            spread: 0.0,
+            sliding: 0,
+            entries: 1025,
+            rays: 1,
+            brick: 8,
+            half: false,
+        }
+    }
+}
+
+/// How a sample is interpolated between texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sampling {
+    /// The fastest for the device. A GPU filters in hardware. A CPU loads texels faster than it emulates a sampler; it uses quads if a
+    /// picture takes at least six samples per texel, or with `slices.still`, and if at most 2^27 of them are needed.
+    #[default]
+    Auto,
+    /// The trilinear filter of the device. Its weights may have only 8 bits.
+    Hardware,
+    /// Eight texels, interpolated in f32 by the shader.
+    Exact,
+    /// Like `exact`, from two texels that hold four packed neighbours each. For volumes of 8 or 16 bits. Needs four times the volume's
+    /// memory in addition, and one more pass over every new slice.
+    Quads,
+}
+
+impl Sampling {
+    /// Description for `--explain` and profiles.
+    pub fn words(self) -> &'static str {
+        match self {
+            Sampling::Auto => "the fastest for the device",
+            Sampling::Hardware => "by the device's trilinear filter",
+            Sampling::Exact => "eight texels each, interpolated in f32",
+            Sampling::Quads => "two texels of four neighbours each, interpolated in f32",
+        }
+    }
+}
+
+/// Volume rendering.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Volume {
+    /// Grey window: samples in this interval are stretched to 0..1 first.
+    pub window: [f64; 2],
+    /// Start depth: rays ignore everything above it, mm below the probe's face (Cartesian: along the depth axis).
+    pub start_depth: Option<f64>,
+    /// Transfer function.
+    pub transfer: Transfer,
+    /// Samples below this are transparent, 0..1 after the window.
+    pub threshold: f64,
+    /// Compositing rule.
+    pub compositing: Compositing,
+    /// Shading.
+    pub shading: Shading,
+    /// Depth-coded shading: factor of the colours at the nearest point of the box, 0..10.
+    pub near_tint: [f64; 3],
+    /// Depth-coded shading: factor of the colours at the farthest point of the box, 0..10.
+    pub far_tint: [f64; 3],
+    /// First-hit shading: the accumulated opacity that counts as the hit, 0.001..1.
+    pub hit: f64,
+    /// Mode mixed: opacity factor of the volume layer over the surface, 0..1.
+    pub veil: f64,
+}
+
+impl Default for Volume {
+    fn default() -> Self {
+        Volume {
+            window: [0.0, 1.0],
+            start_depth: None,
+            transfer: Transfer::Named(TransferName::Grey),
+            threshold: 0.0,
+            compositing: Compositing::Corrected,
+            shading: Shading::None,
+            near_tint: [1.05, 1.0, 0.9],
+            far_tint: [0.3, 0.42, 0.75],
+            hit: 0.3,
+            veil: 1.0,
+        }
+    }
+}
+
+/// Compositing rule: the opacity a of a step of length h, with y = kappa h and kappa the absorption of the transfer function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Compositing {
+    /// a = min(y, 1): accurate for thin steps only.
+    Riemann,
+    /// a = 1 - exp(-y): exact for any step in a homogeneous medium.
+    #[default]
+    Corrected,
+    /// Like `corrected`, with the mean absorption between the values at both ends of the step and the mean colour weighted by it. No
+    /// narrow feature of the transfer function is missed (Engel, Kraus, Ertl 2001).
+    PreIntegrated,
+}
+
+/// Shading of volume rendering.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shading {
+    /// Colours of the transfer function alone.
+    #[default]
+    None,
+    /// Colours change from a near tint to a far tint.
+    DepthCoded,
+    /// The point where a ray's opacity reaches `hit` is lit like a surface, by stage 3.
+    FirstHit,
+}
+
+/// A named transfer function, or its points.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(
+    untagged,
+    expecting = "must be grey, sepia, skin, bone, cool, warm, a .toml file of points, or a list of points { at, colour, opacity }"
+)]
+pub enum Transfer {
+    Named(TransferName),
+    Points(Vec<TransferPoint>),
+}
+
+/// The named transfer functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TransferName {
+    /// Grey ramp.
+    Grey,
+    /// Sepia ramp.
+    Sepia,
+    /// Skin tones.
+    Skin,
+    /// Bone: brown to white, bright samples almost opaque.
+    Bone,
+    /// Blue to white.
+    Cool,
+    /// Red to yellow.
+    Warm,
+}
+
+/// A point of a transfer function. Colour and opacity are linear between points.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct TransferPoint {
+    /// Sample value, 0..1.
+    pub at: f64,
+    /// Colour, red, green and blue in 0..1.
+    pub colour: [f64; 3],
+    /// Opacity of one voxel (one slice pixel), 0..1.
+    pub opacity: f64,
+}
+
+/// Surface rendering: the surface detector (thesis 4-3).
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Surface {
+    /// Grey window: samples in this interval are stretched to 0..1 first.
+    pub window: [f64; 2],
+    /// Start depth: rays ignore everything above it, mm below the probe's face.
+    pub start_depth: Option<f64>,
+    /// Detection rule.
+    pub detector: Detector,
+    /// Adaptive and lasting detector: an edge counts at once if it exceeds this many standard deviations of the noise before it, 0..=10.
+    pub noise: f64,
+    /// Detection threshold on the difference of the means of the newer and the older half of the ring of samples.
+    pub threshold: f64,
+    /// Threshold of the rough detector. Absent: that of the fine one.
+    pub rough_threshold: Option<f64>,
+    /// Step of the rough detector in fine steps, 1..=8; 1 disables it.
+    pub rough: u32,
+    /// Sign of the edge.
+    pub sign: Sign,
+    /// Location of the surface within the edge.
+    pub place: Place,
+    /// Which surface along the ray, 1..=8; 1 is the outermost.
+    pub number: u32,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        Surface {
+            window: [0.0, 1.0],
+            start_depth: None,
+            detector: Detector::Threshold,
+            noise: 2.5,
+            threshold: 0.1,
+            rough_threshold: None,
+            rough: 2,
+            sign: Sign::Bright,
+            place: Place::Peak,
+            number: 1,
+        }
+    }
+}
+
+/// Detection rule of a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Detector {
+    /// The difference exceeds the threshold (thesis).
+    #[default]
+    Threshold,
+    /// The difference also stands out from the noise before it. A ray without such an edge takes its largest edge above the threshold, if
+    /// the echo behind it lasts.
+    Adaptive,
+    /// Like `adaptive`, and ignores edges whose echo has gone half a ring behind them (specks in fluid, thin shells before a wall) unless
+    /// the ray has no other.
+    Lasting,
+}
+
+/// Sign of the edge at a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sign {
+    /// Bright tissue in dark fluid.
+    #[default]
+    Bright,
+    /// A dark cavity in bright tissue.
+    Dark,
+}
+
+/// Location of the surface within the edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Place {
+    /// The maximum of the difference within a ring's length, refined by a parabola. Independent of the edge's height.
+    #[default]
+    Peak,
+    /// The point where the difference first exceeds the threshold (thesis).
+    FirstCrossing,
+}
+
+/// Projections: modes mip, minip and mean.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Projection {
+    /// Grey window: samples in this interval are stretched to 0..1 first.
+    pub window: [f64; 2],
+    /// Start depth: rays ignore everything above it, mm below the probe's face.
+    pub start_depth: Option<f64>,
+}
+
+impl Default for Projection {
+    fn default() -> Self {
+        Projection { window: [0.0, 1.0], start_depth: None }
+    }
+}

@@ -1,0 +1,223 @@
+//! Settings of stages 3 and 4: filters of the distance map, light, shadow, occlusion and skin; filters, tone and colour of the picture.
+
+use super::preprocess::{EnhancedSigma, PeronaMalik, Sigma};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Stage 3: edge-preserving filters of the distance map, in the order of their keys.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Distance {
+    /// Window size of the median filter, pixels; odd, 0 for none.
+    pub median: u32,
+    /// Bilateral filter.
+    pub bilateral: Option<Bilateral>,
+    /// Sigma filter; sigma in mm.
+    pub sigma: Option<Sigma>,
+    /// Enhanced sigma filter; sigma and edge in mm. A miss stays a miss and does not count.
+    pub enhanced_sigma: Option<EnhancedSigma>,
+    /// Perona-Malik diffusion; edge in mm, explicit scheme. Nothing flows to or from a miss.
+    pub perona_malik: Option<PeronaMalik>,
+}
+
+impl Distance {
+    /// The filters for half as many rays per axis. They cover the same part of the picture, and diffusion runs for the same time.
+    pub fn halved(&self) -> Distance {
+        let window = |edge: u32| 2 * (edge / 4).max(1) + 1;
+        Distance {
+            median: if self.median > 0 { window(self.median) } else { 0 },
+            bilateral: self.bilateral.map(|b| Bilateral { pixels: b.pixels / 2.0, ..b }),
+            sigma: self.sigma.map(|s| Sigma { window: window(s.window), ..s }),
+            enhanced_sigma: self.enhanced_sigma.map(|e| {
+                let (start, largest) = (window(e.window), window(e.largest));
+                EnhancedSigma { window: start, largest, ..e }
+            }),
+            perona_malik: self.perona_malik.map(|p| {
+                // Time goes as the square of a length.
+                let repeat = p.repeat.div_ceil(4);
+                PeronaMalik { step: p.step * f64::from(p.repeat) / (4.0 * f64::from(repeat)), repeat, ..p }
+            }),
+        }
+    }
+}
+
+/// Bilateral filter: Gaussian in space and in distance.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bilateral {
+    /// Standard deviation in the picture, pixels.
+    pub pixels: f64,
+    /// Standard deviation of the distance, mm.
+    pub distance: f64,
+    /// Number of repetitions, 1..=16.
+    #[serde(default = "once")]
+    pub repeat: u32,
+}
+
+fn once() -> u32 {
+    1
+}
+
+/// Stage 3: the light. Directions and positions use the camera's axes: right, up, towards the viewer.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Light {
+    /// Direction from the surface to a distant light.
+    pub direction: DVec3,
+    /// Position of a near (point) light, mm from the camera's target. Absent: the light is distant.
+    pub position: Option<DVec3>,
+    /// Ambient coefficient of Blinn-Phong shading, 0..10.
+    pub ambient: f64,
+    /// Diffuse coefficient, 0..10.
+    pub diffuse: f64,
+    /// Specular coefficient, 0..10.
+    pub specular: f64,
+    /// Specular exponent, 0..1e6.
+    pub shininess: f64,
+    /// Colour of the light, 0..10.
+    pub colour: [f64; 3],
+    /// Colour of the surface, 0..10.
+    pub surface_colour: [f64; 3],
+    /// How much a weak echo at the surface darkens its colour, 0..1.
+    pub texture: f64,
+    /// Neighbours whose distances differ by more than this belong to two surfaces, mm. Normals do not cross the gap.
+    pub cliff: f64,
+    /// Shadow.
+    pub shadow: Option<Shadow>,
+    /// Ambient occlusion.
+    pub occlusion: Option<Occlusion>,
+    /// Skin shading.
+    pub skin: Option<Skin>,
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Light {
+            direction: DVec3::new(-0.5, 0.6, 0.6),
+            position: None,
+            ambient: 0.18,
+            diffuse: 0.75,
+            specular: 0.18,
+            shininess: 24.0,
+            colour: [1.0, 1.0, 1.0],
+            surface_colour: [0.93, 0.72, 0.56],
+            texture: 0.0,
+            cliff: 2.0,
+            shadow: None,
+            occlusion: None,
+            skin: None,
+        }
+    }
+}
+
+/// Shadow by tracing the distance map towards the light (thesis Fig. 41).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Shadow {
+    /// Shadow coefficient: the share of diffuse and specular light that a shadow removes, 0..1.
+    pub strength: f64,
+    /// Width of the shadow's edge per mm of distance to the obstacle; 0 is a hard edge.
+    pub softness: f64,
+    /// Maximum distance of an obstacle, mm.
+    pub reach: f64,
+    /// Assumed thickness of the visible surface, mm.
+    pub thickness: f64,
+    /// Bias, mm: obstacles lower than this cast no shadow, so that noise of the distance map does not.
+    pub bias: f64,
+}
+
+impl Default for Shadow {
+    fn default() -> Self {
+        Shadow { strength: 0.6, softness: 0.15, reach: 40.0, thickness: 25.0, bias: 0.6 }
+    }
+}
+
+/// Ambient occlusion from the distance map around each pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Occlusion {
+    /// Radius, mm.
+    pub radius: f64,
+    /// Strength, 0..4; 1 is the share of the hemisphere that is hidden.
+    pub strength: f64,
+}
+
+impl Default for Occlusion {
+    fn default() -> Self {
+        Occlusion { radius: 6.0, strength: 1.0 }
+    }
+}
+
+/// Skin shading: light wraps around the terminator, red further than blue, and shines through thin tissue.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Skin {
+    /// Wrap-around of the light, 0..1.
+    pub wrap: f64,
+    /// Translucency: light that passes through thin tissue, 0..1.
+    pub translucency: f64,
+    /// Depth behind the surface over which echoes are averaged, mm.
+    pub depth: f64,
+    /// Colour of the light that passes through tissue.
+    pub colour: [f64; 3],
+}
+
+impl Default for Skin {
+    fn default() -> Self {
+        Skin { wrap: 0.35, translucency: 0.3, depth: 5.0, colour: [0.9, 0.25, 0.12] }
+    }
+}
+
+/// Stage 4, postprocessing. The filters run in the order of their keys, then contrast, brightness, gamma and the colour map.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Post {
+    /// Sigma filter.
+    pub sigma: Option<Sigma>,
+    /// Enhanced sigma filter.
+    pub enhanced_sigma: Option<EnhancedSigma>,
+    /// Perona-Malik diffusion.
+    pub perona_malik: Option<PeronaMalik>,
+    /// Added to the brightness, -1..1.
+    pub brightness: f64,
+    /// Contrast factor about middle grey, 0..10.
+    pub contrast: f64,
+    /// Gamma, 0.1..10: the exponent is 1 / gamma, so that values above 1 brighten dark parts.
+    pub gamma: f64,
+    /// Colour map.
+    pub colour_map: ColourMap,
+    /// Keeps a float picture in addition to the 8-bit one even if no pass needs it. Planes are then cut first and tone-mapped after.
+    pub floats: bool,
+}
+
+impl Default for Post {
+    fn default() -> Self {
+        Post {
+            sigma: None,
+            enhanced_sigma: None,
+            perona_malik: None,
+            brightness: 0.0,
+            contrast: 1.0,
+            gamma: 1.0,
+            colour_map: ColourMap::None,
+            floats: false,
+        }
+    }
+}
+
+/// Colour map of the picture's brightness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColourMap {
+    /// Keeps the colours.
+    #[default]
+    None,
+    /// Grey.
+    Grey,
+    /// Sepia.
+    Sepia,
+    /// Skin tones.
+    Skin,
+    /// Blue to white.
+    Ice,
+}
