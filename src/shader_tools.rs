@@ -83,7 +83,10 @@ impl Compiler {
                     None => made,
                     Some(program) => made.and_then(|module| {
                         let mut command = Command::new(program);
-                        pipe(command.args(["--target-env=vulkan1.3", "-O", "-", "-o", "-"]), &module)
+                        pipe(
+                            command.args(["--target-env=vulkan1.3", "--scalar-block-layout", "-O", "-", "-o", "-"]),
+                            &module,
+                        )
                     }),
                 }
             }

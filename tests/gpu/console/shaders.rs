@@ -72,7 +72,7 @@ fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture(
     let mut desk = Desk::new(&device, Options { shaders: Some(glsl.folder()), ..options() });
     desk.begin();
     let first = desk.live(0);
-    assert!(difference(&first, &headless(&device, &plain(), &body(0))).1 <= 1.0, "compiled with other options");
+    assert!(difference(&first, &headless(&device, &desk.drawn(), &body(0))).1 <= 1.0, "compiled with other options");
 
     // A shader of the picture.
     glsl.edit(TONE, "vec4(c, 1.0)", "vec4(1.0 - c, 1.0)");
