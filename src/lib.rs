@@ -38,6 +38,8 @@ pub mod kiosk;
 #[forbid(unsafe_code)]
 pub mod live;
 #[forbid(unsafe_code)]
+pub mod machine;
+#[forbid(unsafe_code)]
 pub mod passes;
 #[forbid(unsafe_code)]
 pub mod picture;
@@ -66,6 +68,8 @@ pub mod source;
 pub mod spirv;
 #[forbid(unsafe_code)]
 mod terminal;
+#[forbid(unsafe_code)]
+pub mod text;
 #[forbid(unsafe_code)]
 pub mod thesis_tables;
 #[cfg(feature = "view")]

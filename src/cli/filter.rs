@@ -4,13 +4,12 @@ use crate::args::{check_outputs, open_device};
 use crate::gpu::{Choice, Context, Options, Renderer};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
-use crate::picture::{self, grey::Grey};
-use crate::profile::pass_times;
+use crate::picture::{self, Grey};
+use crate::profile::export::pass_time_table;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
 use crate::terminal::{Failure, failed, input, say};
-use crate::thesis_tables::measure_growth::{Row, measure, scene};
-use crate::thesis_tables::window_growth;
+use crate::thesis_tables::growth::{self, GrowthSettings, measure, scene_of};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -107,7 +106,7 @@ impl Filter {
         let grey = Grey::load(&self.image).map_err(input)?;
         let region = self.region("--region", self.region.as_deref(), &grey)?;
         let background = self.region("--background", self.background.as_deref(), &grey)?;
-        let scene = scene(&grey, settings).map_err(input)?;
+        let scene = scene_of(&grey, settings).map_err(input)?;
         check_outputs(&[("-o", self.output.as_deref()), ("--csv", self.csv.as_deref())], [self.image.as_path()])?;
 
         let context = open_device(self.device.clone(), self.validate)?;
@@ -127,7 +126,7 @@ impl Filter {
             }
             if self.timings {
                 let measured = renderer.take_times().map_err(failed)?;
-                say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
+                say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
             }
         }
         if self.growth_table {
@@ -193,17 +192,17 @@ impl Filter {
     }
 
     /// The rows of the growth table: those of the filter if it has values of its own, else the thesis'.
-    fn growth_rows(&self) -> Result<Vec<Row>, Failure> {
+    fn growth_rows(&self) -> Result<Vec<GrowthSettings>, Failure> {
         let keys = self.filter.iter().filter_map(|f| f.split_once(':')).filter(|f| f.0 == ENHANCED);
         let keys: Vec<&str> = keys.flat_map(|f| f.1.split(',')).filter_map(|k| k.split('=').next()).collect();
         let given = |key: &str| keys.iter().any(|k| k.trim() == key);
         let asked = self.settings(&[])?.slices.enhanced_sigma.unwrap_or_default();
-        let sigmas = if given("sigma") { vec![asked.sigma] } else { window_growth::SIGMAS.to_vec() };
+        let sigmas = if given("sigma") { vec![asked.sigma] } else { growth::SIGMAS.to_vec() };
         if asked.sigma <= 0.0 {
             return Err(input("--growth-table: sigma must be above 0; at 0 the filter changes nothing"));
         }
         let is_one = given("window") || given("largest");
-        let windows = if is_one { vec![[asked.window, asked.largest]] } else { window_growth::WINDOWS.to_vec() };
+        let windows = if is_one { vec![[asked.window, asked.largest]] } else { growth::WINDOWS.to_vec() };
         let rows = sigmas.iter().flat_map(|sigma| windows.iter().map(move |windows| (*sigma, *windows)));
         rows.map(|(sigma, [window, largest])| {
             let set = format!("{{window={window},largest={largest},sigma={sigma:?},growth=true}}");
@@ -212,11 +211,11 @@ impl Filter {
         .collect()
     }
 
-    fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<Row>) -> Result<(), Failure> {
+    fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<GrowthSettings>) -> Result<(), Failure> {
         let rows = measure(context, grey, asked).map_err(failed)?;
-        say!("{}", window_growth::table(&rows).trim_end());
+        say!("{}", growth::table(&rows).trim_end());
         if let Some(csv) = &self.csv {
-            picture::replace(csv, window_growth::csv(&rows).as_bytes()).map_err(failed)?;
+            picture::replace(csv, growth::csv(&rows).as_bytes()).map_err(failed)?;
             say!("table: {}", csv.display());
         }
         Ok(())

@@ -7,7 +7,7 @@ use crate::error_report::{Measure, choose};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{GpuError, Options, Renderer};
 use crate::plan::Plan;
-use crate::profile::pass_times;
+use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
@@ -80,7 +80,7 @@ impl Render {
         say!("picture: {}", self.output.display());
         if self.timings {
             let measured = renderer.take_times().map_err(failed)?;
-            say!("{}", pass_times::table(&measured, renderer.scene()).trim_end());
+            say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }
         if let Some(folder) = &self.dump {
             self.write_dump(folder, &mut renderer)?;

@@ -1,15 +1,15 @@
 //! `echolume report error`.
 
 use crate::args::InputArgs;
-use crate::error_report::{self, Measure, choose, dials, measure, plot};
+use crate::error_report::{self, Measure, choose, dials, export, measure, plot};
 use crate::files::read_text;
 use crate::picture::replace;
 use crate::scene::Scene;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
-/// Longest report that is read, bytes.
-const LONGEST: u64 = 64 << 20;
+/// Maximum size of a report file, bytes.
+const MAX_REPORT: u64 = 64 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -62,7 +62,7 @@ impl ErrorReport {
             Some(file) => read(file)?,
             None => self.measured()?,
         };
-        say!("{}", error_report::summary_table::table(&report, measure).trim_end());
+        say!("{}", export::summary_table(&report, measure).trim_end());
         if let Some(folder) = &self.output {
             write(&report, measure, folder)?;
         }
@@ -76,10 +76,10 @@ impl ErrorReport {
     }
 
     fn measured(&self) -> Result<error_report::Report, Failure> {
-        let held = match self.against.as_str() {
-            "auto" => measure::Held::Auto,
-            "f64" => measure::Held::F64,
-            "converged" => measure::Held::Converged,
+        let reference = match self.against.as_str() {
+            "auto" => measure::ReferenceChoice::Auto,
+            "f64" => measure::ReferenceChoice::F64,
+            "converged" => measure::ReferenceChoice::Converged,
             other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
         };
         let (mut source, scene) = self.input.open()?;
@@ -96,12 +96,19 @@ impl ErrorReport {
         })?;
         let layers = self.input.layers()?;
         let (repeats, frames, shown) = (self.repeat, &frames[..], self.input.name());
-        let asked =
-            measure::Asked { context: &context, layers: &layers, scene: &scene, frames, input: &shown, repeats, held };
+        let measurement = measure::ErrorMeasurement {
+            context: &context,
+            layers: &layers,
+            scene: &scene,
+            frames,
+            input: &shown,
+            repeats,
+            reference,
+        };
         let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
         let bar = indicatif::ProgressBar::new(places as u64);
         bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
-        let report = asked.report(&dials, |dial, place| {
+        let report = measurement.report(&dials, |dial, place| {
             bar.set_message(format!("{dial}: {place}"));
             bar.inc(1);
         });
@@ -111,23 +118,23 @@ impl ErrorReport {
 
     /// The requested dials. For `all`, those that apply to the scene.
     fn dials(&self, scene: &Scene) -> Result<Vec<dials::Dial>, Failure> {
-        let mut turned = Vec::new();
+        let mut dials = Vec::new();
         if self.dial.iter().any(|d| d == "all") {
             for name in dials::NAMES {
                 match dials::dial(name, scene) {
-                    Ok(dial) => turned.push(dial),
+                    Ok(dial) => dials.push(dial),
                     Err(why) => say!("dial {name} left out: this scene {why}"),
                 }
             }
-            return Ok(turned);
+            return Ok(dials);
         }
         for name in &self.dial {
-            turned.push(dials::dial(name, scene).map_err(|why| match dials::NAMES.contains(&name.as_str()) {
+            dials.push(dials::dial(name, scene).map_err(|why| match dials::NAMES.contains(&name.as_str()) {
                 true => input(format!("--dial {name}: this scene {why}")),
                 false => input(format!("--dial {name}: {why}")),
             })?);
         }
-        Ok(turned)
+        Ok(dials)
     }
 }
 
@@ -135,7 +142,7 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
     std::fs::create_dir_all(folder).map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
     let size = [1200, 800];
     replace(&folder.join("error.json"), report.to_json().map_err(failed)?.as_bytes()).map_err(failed)?;
-    replace(&folder.join("error.csv"), report.to_csv().as_bytes()).map_err(failed)?;
+    replace(&folder.join("error.csv"), export::csv(report).as_bytes()).map_err(failed)?;
     replace(&folder.join("error.svg"), plot::svg(report, measure, size).map_err(failed)?.as_bytes()).map_err(failed)?;
     plot::picture(report, measure, size).map_err(failed)?.save(&folder.join("error.png")).map_err(failed)?;
     say!("written: error.json, error.csv, error.svg, error.png in {}", folder.display());
@@ -145,7 +152,7 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
 /// Reads a stored report.
 pub(crate) fn read(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, LONGEST, "report").map_err(|e| fault(&e))?;
+    let text = read_text(file, MAX_REPORT, "report").map_err(|e| fault(&e))?;
     error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }
 

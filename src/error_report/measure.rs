@@ -1,15 +1,15 @@
-//! Error against run time (SPEC of the thesis' trade-offs): every dial of a scene turned, each place rendered, timed, and held
+//! Error against run time (SPEC of the thesis' trade-offs): every dial of a scene turned, each place rendered, timed, and reference
 //! against the f64 reference, or where that is too slow against a converged picture whose own error is shown.
 
 use super::dials::{Dial, Place};
+use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
-use crate::error_report::orders::{self, Range};
 use crate::error_report::{self, Errors, FORMAT, Point, Reference, Report, Sizes, Time};
 use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::machine;
 use crate::passes::chain::distance_end;
 use crate::passes::shade::normal;
 use crate::passes::{Slot, Texels};
-use crate::profile::machine;
 use crate::reference;
 use crate::scene::load::{Layers, LoadError};
 use crate::scene::{Scene, SceneError};
@@ -17,7 +17,7 @@ use crate::source::Frame;
 use std::sync::Arc;
 
 #[derive(Debug, thiserror::Error)]
-pub enum Fault {
+pub enum MeasureError {
     #[error("{0}")]
     Gpu(#[from] GpuError),
     #[error("dial {dial} at {set}: {fault}")]
@@ -28,14 +28,14 @@ pub enum Fault {
 const AFFORDABLE: f64 = 6e7;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Held {
+pub enum ReferenceChoice {
     /// Against f64 where it is affordable.
     Auto,
     F64,
     Converged,
 }
 
-pub struct Asked<'a> {
+pub struct ErrorMeasurement<'a> {
     pub context: &'a Arc<Context>,
     /// Settings before any dial is turned.
     pub layers: &'a Layers,
@@ -44,23 +44,23 @@ pub struct Asked<'a> {
     /// What the frames came from, in words.
     pub input: &'a str,
     pub repeats: u32,
-    pub held: Held,
+    pub reference: ReferenceChoice,
 }
 
 /// What one scene looks like: the picture before stage 4's tone, and the distance map after its filters.
-struct Seen {
+struct Rendering {
     scene: Scene,
     picture: Texels,
     distance: Option<Texels>,
     times: Vec<f64>,
 }
 
-impl Asked<'_> {
-    /// Turns the dials one after the other. `said` hears of each place before it is rendered.
-    pub fn report(&self, dials: &[Dial], mut said: impl FnMut(&str, &str)) -> Result<Report, Fault> {
+impl ErrorMeasurement<'_> {
+    /// Turns the dials one after the other. `progress` hears of each place before it is rendered.
+    pub fn report(&self, dials: &[Dial], mut progress: impl FnMut(&str, &str)) -> Result<Report, MeasureError> {
         let mut measured = Vec::new();
         for dial in dials {
-            measured.push(self.turn(dial, &mut said)?);
+            measured.push(self.measure_dial(dial, &mut progress)?);
         }
         let machine = machine::device(self.context);
         Ok(Report {
@@ -75,47 +75,51 @@ impl Asked<'_> {
         })
     }
 
-    fn turn(&self, dial: &Dial, said: &mut impl FnMut(&str, &str)) -> Result<error_report::Dial, Fault> {
-        said(dial.name, "its reference");
+    fn measure_dial(
+        &self,
+        dial: &Dial,
+        progress: &mut impl FnMut(&str, &str),
+    ) -> Result<error_report::Dial, MeasureError> {
+        progress(dial.name, "its reference");
         let best = self.scene_at(dial, &dial.best)?;
-        let exact = match self.held {
-            Held::F64 => true,
-            Held::Converged => false,
-            Held::Auto => cost(&best) <= AFFORDABLE,
+        let exact = match self.reference {
+            ReferenceChoice::F64 => true,
+            ReferenceChoice::Converged => false,
+            ReferenceChoice::Auto => cost(&best) <= AFFORDABLE,
         };
-        let (held_against, reference) = match exact {
+        let (expected, reference) = match exact {
             true => (self.in_f64(&best), Reference::F64),
             false => {
-                let seen = self.rendered(&best, 0)?;
+                let rendering = self.rendered(&best, 0)?;
                 let nearly = self.rendered(&self.scene_at(dial, &dial.nearly)?, 0)?;
-                let own = compare(dial, &[], &nearly, &seen)?.rmse;
-                (seen, Reference::Converged { set: dial.best.clone(), rmse: own })
+                let own = compare(dial, &[], &nearly, &rendering)?.rmse;
+                (rendering, Reference::Converged { set: dial.best.clone(), rmse: own })
             }
         };
         let mut points = Vec::new();
         for (n, place) in dial.places.iter().enumerate() {
-            said(dial.name, &place.label);
-            let seen = self.rendered(&self.scene_at(dial, &place.set)?, self.repeats)?;
-            let errors = compare(dial, &place.set, &seen, &held_against)?;
-            points.push(point(place, errors, &seen, n == 0));
+            progress(dial.name, &place.label);
+            let rendering = self.rendered(&self.scene_at(dial, &place.set)?, self.repeats)?;
+            let errors = compare(dial, &place.set, &rendering, &expected)?;
+            points.push(point(place, errors, &rendering, n == 0));
         }
         let steps = dial.name == "step";
         // What the device is off by where nothing but its arithmetic differs.
         let floor = match exact && steps {
-            true => Some(compare(dial, &[], &self.rendered(&best, 0)?, &held_against)?.rmse),
+            true => Some(compare(dial, &[], &self.rendered(&best, 0)?, &expected)?.rmse),
             false => None,
         };
         let fitted = || {
             let pairs: Vec<[f64; 2]> = points.iter().map(|p| [p.value, p.errors.rmse]).collect();
             let pixel = self.scene.grid.pitch[0].min(self.scene.grid.pitch[1]);
-            orders::fit(&pairs, Range { step: [pixel / 64.0, 0.75 * pixel], floor: floor.unwrap_or(0.0) }).ok()
+            convergence::fit(&pairs, Range { step: [pixel / 64.0, 0.75 * pixel], floor: floor.unwrap_or(0.0) }).ok()
         };
         let order = if steps { fitted() } else { None };
         Ok(error_report::Dial { name: dial.name.into(), unit: dial.unit.into(), reference, points, order, floor })
     }
 
-    fn scene_at(&self, dial: &Dial, set: &[String]) -> Result<Scene, Fault> {
-        let fault = |fault: String| Fault::Place { dial: dial.name, set: set.join(" "), fault };
+    fn scene_at(&self, dial: &Dial, set: &[String]) -> Result<Scene, MeasureError> {
+        let fault = |fault: String| MeasureError::Place { dial: dial.name, set: set.join(" "), fault };
         let layered = || -> Result<_, LoadError> {
             let mut layers = self.layers.clone();
             // What is already off cannot be switched off.
@@ -132,7 +136,7 @@ impl Asked<'_> {
         made.map_err(|e| fault(e.to_string()))
     }
 
-    fn rendered(&self, scene: &Scene, repeats: u32) -> Result<Seen, GpuError> {
+    fn rendered(&self, scene: &Scene, repeats: u32) -> Result<Rendering, GpuError> {
         let scene = &in_floats(scene);
         let mut renderer = Renderer::new(self.context, scene.clone(), &Options::default())?;
         let mut times = Vec::new();
@@ -154,10 +158,10 @@ impl Asked<'_> {
             true => renderer.read(distance_end(scene))?,
             false => None,
         };
-        Ok(Seen { scene: scene.clone(), picture, distance, times })
+        Ok(Rendering { scene: scene.clone(), picture, distance, times })
     }
 
-    fn in_f64(&self, scene: &Scene) -> Seen {
+    fn in_f64(&self, scene: &Scene) -> Rendering {
         let scene = &in_floats(scene);
         let format = Slot::Frames.format(scene);
         let [width, height] = scene.frame_size().map(|n| n as usize);
@@ -167,7 +171,7 @@ impl Asked<'_> {
         let mut slots = reference::render(scene, &frames);
         let distance = if scene.has_distance() { slots.remove(&distance_end(scene)) } else { None };
         let picture = slots.remove(&Slot::Picture).unwrap_or_else(|| Texels::untouched([0; 3], 4));
-        Seen { scene: scene.clone(), picture, distance, times: Vec::new() }
+        Rendering { scene: scene.clone(), picture, distance, times: Vec::new() }
     }
 }
 
@@ -191,14 +195,14 @@ fn cost(scene: &Scene) -> f64 {
     rays * steps * taps + 0.1 * pixels * f64::from(16 + window + diffused)
 }
 
-fn compare(dial: &Dial, set: &[String], seen: &Seen, reference: &Seen) -> Result<Errors, Fault> {
-    let fault = |fault: String| Fault::Place { dial: dial.name, set: set.join(" "), fault };
-    let picture = enlarged(&seen.picture, reference.picture.size);
+fn compare(dial: &Dial, set: &[String], rendering: &Rendering, reference: &Rendering) -> Result<Errors, MeasureError> {
+    let fault = |fault: String| MeasureError::Place { dial: dial.name, set: set.join(" "), fault };
+    let picture = enlarged(&rendering.picture, reference.picture.size);
     let mut errors = Errors::from(metrics::pictures(&picture, &reference.picture).map_err(fault)?);
-    let maps = seen.distance.as_ref().zip(reference.distance.as_ref());
+    let maps = rendering.distance.as_ref().zip(reference.distance.as_ref());
     if let Some((measured, expected)) = maps.filter(|(a, b)| a.size == b.size) {
         errors.mm = Some(metrics::distances(measured, expected).map_err(fault)?);
-        let (measured, expected) = (normals(&seen.scene, measured), normals(&reference.scene, expected));
+        let (measured, expected) = (normals(&rendering.scene, measured), normals(&reference.scene, expected));
         errors.degrees = Some(metrics::normals(&measured, &expected).map_err(fault)?);
     }
     Ok(errors)
@@ -230,13 +234,13 @@ fn enlarged(picture: &Texels, size: [usize; 3]) -> Texels {
     })
 }
 
-fn point(place: &Place, errors: Errors, seen: &Seen, is_default: bool) -> Point {
+fn point(place: &Place, errors: Errors, rendering: &Rendering, is_default: bool) -> Point {
     Point {
         label: place.label.clone(),
         set: place.set.clone(),
         value: place.value,
         errors,
-        time: Time::of(&seen.times),
+        time: Time::of(&rendering.times),
         is_default,
     }
 }

@@ -1,20 +1,17 @@
 //! Error against run time: what a measurement of the dials is, as a file, as a table, as a picture, and as the settings to use.
 //! Every approximation is a dial; a dial's points are its settings, each with its errors and its time on the device.
 
-pub mod analytic;
-mod canvas;
 pub mod choose;
 pub(crate) mod command;
+pub mod convergence;
 pub mod dials;
+pub mod export;
 pub mod measure;
 pub mod metrics;
-pub mod orders;
-pub mod pareto_front;
 pub mod plot;
-pub mod summary_table;
 
+use convergence::Fit;
 use metrics::{PictureError, SurfaceError};
-use orders::Fit;
 use serde::{Deserialize, Serialize};
 
 /// What the first line of a stored report must say; another version is refused, not guessed.
@@ -188,7 +185,7 @@ impl Report {
     /// # Errors
     /// One line: no JSON, of another format or version, or with numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
-        Report::read(text).map_err(|e| crate::scene::load::single_line(&e))
+        Report::read(text).map_err(|e| crate::text::single_line(&e))
     }
 
     fn read(text: &str) -> Result<Report, String> {
@@ -236,46 +233,35 @@ impl Report {
         Ok(())
     }
 
-    /// One line a point after a line of names (RFC 4180). What does not apply is empty; times are in ms. `on_front`: no other
-    /// point of the report has both a smaller RMSE and a shorter time.
-    pub fn to_csv(&self) -> String {
-        let front = pareto_front::of_report(self, Measure::Rmse);
-        let mut text = String::from(
-            "dial,unit,value,label,set,default,rmse,max,psnr_db,ssim,mm_rms,mm_median,mm_p95,mm_max,mm_false_hits,mm_missed_hits,\
-             deg_rms,deg_median,deg_p95,deg_max,deg_false_hits,deg_missed_hits,time_ms,time_low_ms,time_high_ms,on_front,\
-             reference,reference_rmse,device,driver,date,repeats\r\n",
-        );
+    /// The front over all dials of a report: dial and point, from the fastest to the most accurate. Points without a time or
+    /// without this error are not on it.
+    pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
+        let mut places = Vec::new();
+        let mut pairs = Vec::new();
         for (d, dial) in self.dials.iter().enumerate() {
             for (p, point) in dial.points.iter().enumerate() {
-                let (e, number) = (&point.errors, |v: Option<f64>| v.map_or(String::new(), |v| v.to_string()));
-                let mut row = vec![dial.name.clone(), dial.unit.clone(), point.value.to_string(), point.label.clone()];
-                row.extend([point.set.join("; "), point.is_default.to_string()]);
-                row.extend([Some(e.rmse), Some(e.max), e.psnr, e.ssim].map(number));
-                for surface in [e.mm, e.degrees] {
-                    let spread = surface.and_then(|s| s.error);
-                    row.extend([spread.map(|s| s.rms), spread.map(|s| s.median)].map(number));
-                    row.extend([spread.map(|s| s.p95), spread.map(|s| s.max)].map(number));
-                    row.extend([surface.map(|s| s.false_hits), surface.map(|s| s.missed_hits)].map(number));
+                if let (Some(time), Some(error)) = (point.time, measure.of(&point.errors)) {
+                    places.push((d, p));
+                    pairs.push([time.median, error]);
                 }
-                let ms = |of: fn(&Time) -> f64| number(point.time.as_ref().map(|t| of(t) * 1e-6));
-                row.extend([ms(|t| t.median), ms(|t| t.low), ms(|t| t.high), front.contains(&(d, p)).to_string()]);
-                row.extend(match &dial.reference {
-                    Reference::F64 => ["f64".into(), String::new()],
-                    Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
-                });
-                row.extend([&self.device, &self.driver, &self.date].map(String::clone));
-                row.push(self.repeats.to_string());
-                text.push_str(&row.iter().map(|field| quoted(field)).collect::<Vec<_>>().join(","));
-                text.push_str("\r\n");
             }
         }
-        text
+        pareto_front(&pairs).into_iter().map(|i| places[i]).collect()
     }
 }
 
-fn quoted(field: &str) -> String {
-    match field.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", field.replace('"', "\"\"")),
-        false => field.to_string(),
+/// Indices of the pairs that no other pair dominates (is at most as large in both and smaller in one), in order of the first
+/// value; equal pairs all stay, in the order given. Pairs that are not finite are never on it.
+pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
+    // A stable sort: equal pairs keep their order.
+    order.sort_by(|a, b| pairs[*a][0].total_cmp(&pairs[*b][0]).then(pairs[*a][1].total_cmp(&pairs[*b][1])));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in order {
+        let beaten = kept.last().is_some_and(|last| pairs[*last][1] <= pairs[i][1] && pairs[*last] != pairs[i]);
+        if !beaten {
+            kept.push(i);
+        }
     }
+    kept
 }

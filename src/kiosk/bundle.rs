@@ -145,7 +145,7 @@ impl Bundle {
 
     /// A line of the first page: what is missing, and why.
     pub fn note(&mut self, note: &str) {
-        let note = self.redactor.text(&load::plain(note));
+        let note = self.redactor.text(&crate::text::printable(note));
         self.notes.push(note);
     }
 

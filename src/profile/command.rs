@@ -5,7 +5,7 @@ use crate::files::{read_text, replace};
 use crate::gpu::Choice;
 use crate::profile as model;
 use crate::profile::measure;
-use crate::profile::{compare, formats, table, trace};
+use crate::profile::{compare, export, trace};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
@@ -90,11 +90,11 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let asked = measure::Asked {
+        let asked = measure::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
-            turn: self.turn,
+            angle_step: self.turn,
             input: self.input.name(),
             ceilings: !self.no_ceilings,
         };
@@ -102,17 +102,17 @@ impl Profile {
             Some(choice) => Some(open_device(Some(choice.clone()), false)?),
             None => None,
         };
-        let run = |context| measure::Run::new(context, &scene, &asked).map_err(failed);
+        let run = |context| measure::ProfileRun::new(context, &scene, &asked).map_err(failed);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
-        while first.wants_more() {
+        while first.needs_more() {
             first.repeat(&frames).map_err(failed)?;
             second.as_mut().map_or(Ok(()), |s| s.repeat(&frames)).map_err(failed)?;
         }
         let (profile, spans) = first.finish();
-        say!("{}", table::profile(&profile).trim_end());
-        self.write(&self.json, || formats::to_json(&profile).map_err(failed))?;
-        self.write(&self.csv, || Ok(formats::csv(&profile)))?;
-        self.write(&self.csv_samples, || Ok(formats::csv_samples(&profile)))?;
+        say!("{}", export::profile_table(&profile).trim_end());
+        self.write(&self.json, || profile.to_json().map_err(failed))?;
+        self.write(&self.csv, || Ok(export::csv(&profile)))?;
+        self.write(&self.csv_samples, || Ok(export::csv_samples(&profile)))?;
         self.write(&self.trace, || trace::chrome(&profile, &spans).map_err(failed))?;
         match second {
             Some(second) => self.judge(&profile, &second.finish().0),
@@ -135,9 +135,13 @@ impl Profile {
 
     /// Prints the differences. Fails on a regression.
     fn judge(&self, old: &model::Profile, new: &model::Profile) -> Result<(), Failure> {
-        let options = compare::Options { threshold: self.threshold, force: self.force, ..compare::Options::default() };
+        let options = compare::CompareOptions {
+            threshold: self.threshold,
+            force: self.force,
+            ..compare::CompareOptions::default()
+        };
         let compared = compare::compare(old, new, &options).map_err(input)?;
-        say!("{}", table::comparison(&compared).trim_end());
+        say!("{}", export::comparison_table(&compared).trim_end());
         if let (Some(file), true) = (&self.json, self.compare.is_some()) {
             let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
             replace(file, text.as_bytes()).map_err(failed)?;
@@ -153,5 +157,5 @@ impl Profile {
 fn read(file: &Path) -> Result<model::Profile, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, LONGEST, "profile").map_err(|e| fault(&e))?;
-    formats::from_json(&text).map_err(|e| fault(&e))
+    model::Profile::from_json(&text).map_err(|e| fault(&e))
 }

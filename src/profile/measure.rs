@@ -1,72 +1,76 @@
-//! One scene rendered again and again: where the time goes.
+//! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
-use super::machine::CpuTime;
-use super::{ceilings, machine};
-use crate::gpu::{Context, GpuError, Options, Renderer};
-use crate::passes::{Bind, Frequency, Part, Pass, Span};
+use crate::gpu::{Context, GpuError, Options, Renderer, pass_runner};
+use crate::machine::{self, CpuTime};
+use crate::passes::measure as loops;
+use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer};
 use crate::plan::{Plan, Rerun, Step};
+use crate::profile::statistics::Sample;
 use crate::profile::trace::{self, Track};
-use crate::profile::{Acquisition, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use crate::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
 use crate::source::Frame;
 use std::sync::Arc;
 use std::time::Instant;
 
 #[derive(Clone, Debug)]
-pub struct Asked {
-    /// Pictures measured, and rendered before that.
+pub struct ProfileOptions {
+    /// Pictures measured.
     pub repeats: usize,
+    /// Pictures rendered before those, not measured.
     pub warm_up: usize,
-    /// The frames go through stage 1 once: only what follows is measured.
+    /// Runs the frames through stage 1 once, so that only the later stages are measured.
     pub still: bool,
-    /// The view turns by this much before each repeat, warm-up included, deg.
-    pub turn: f64,
-    /// What the frames came from, in words.
+    /// Rotation of the view before each repeat, warm-up included, deg.
+    pub angle_step: f64,
+    /// Description of the input.
     pub input: String,
-    /// Measure what bounds the device, too.
+    /// Also measure the roofline ceilings of the device.
     pub ceilings: bool,
 }
 
-/// A scene on a device, rendered once with every call of [`Run::repeat`]. Two of them may take turns, so that whatever else the
-/// machine does falls on both.
-pub struct Run {
+/// A profile in progress: each call of [`ProfileRun::repeat`] renders the scene once. Two runs can be interleaved, so that other
+/// load on the machine affects both alike.
+pub struct ProfileRun {
     context: Arc<Context>,
     renderer: Renderer,
-    /// As it was asked for, before the view turned.
+    /// The scene before any rotation of the view.
     scene: Scene,
-    asked: Asked,
+    options: ProfileOptions,
     began: Instant,
     done: usize,
     repeats: Vec<Repeat>,
     ceilings: Option<Ceilings>,
 }
 
-/// The profile, and every span of its repeats on one clock.
+/// Profiles a scene. Returns the profile, and the spans of all repeats on one clock.
 ///
 /// # Errors
-/// What the device cannot hold or do.
+/// The device cannot hold the scene, or fails.
 pub fn run(
     context: &Arc<Context>,
     scene: &Scene,
     frames: &[Frame],
-    asked: &Asked,
+    options: &ProfileOptions,
 ) -> Result<(Profile, Vec<trace::Span>), GpuError> {
-    let mut run = Run::new(context, scene, asked)?;
-    while run.wants_more() {
+    let mut run = ProfileRun::new(context, scene, options)?;
+    while run.needs_more() {
         run.repeat(frames)?;
     }
     Ok(run.finish())
 }
 
-impl Run {
-    pub fn new(context: &Arc<Context>, scene: &Scene, asked: &Asked) -> Result<Run, GpuError> {
-        let ceilings = if asked.ceilings { ceilings::measure(context)? } else { None };
-        let options = Options { spans: true, ..Options::default() };
-        Ok(Run {
+impl ProfileRun {
+    /// # Errors
+    /// The device cannot hold the scene, or fails.
+    pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
+        let ceilings = if options.ceilings { measure_ceilings(context)? } else { None };
+        let renderer_options = Options { spans: true, ..Options::default() };
+        Ok(ProfileRun {
             context: context.clone(),
-            renderer: Renderer::new(context, scene.clone(), &options)?,
+            renderer: Renderer::new(context, scene.clone(), &renderer_options)?,
             scene: scene.clone(),
-            asked: asked.clone(),
+            options: options.clone(),
             began: Instant::now(),
             done: 0,
             repeats: Vec::new(),
@@ -74,22 +78,26 @@ impl Run {
         })
     }
 
-    pub fn wants_more(&self) -> bool {
-        self.done < self.asked.warm_up + self.asked.repeats
+    /// True until all warm-up and measured repeats have run.
+    pub fn needs_more(&self) -> bool {
+        self.done < self.options.warm_up + self.options.repeats
     }
 
-    /// The volume once more.
+    /// Renders the volume once more and records its times, unless it is a warm-up.
+    ///
+    /// # Errors
+    /// The device fails.
     pub fn repeat(&mut self, frames: &[Frame]) -> Result<(), GpuError> {
         let cpu = CpuTime::now();
         let start = self.began.elapsed();
         let turned = self.rotate()?;
-        if self.done == 0 || !self.asked.still || matches!(turned, Some(Rerun::Frames | Rerun::Everything)) {
+        if self.done == 0 || !self.options.still || matches!(turned, Some(Rerun::Frames | Rerun::Everything)) {
             for frame in frames {
                 self.renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
             }
             self.renderer.show(0)?;
         } else if turned.is_none() {
-            // Nothing has changed: the picture is asked for anew.
+            // Nothing changed: request the picture again.
             self.renderer.show(0)?;
         }
         self.renderer.picture()?;
@@ -97,20 +105,19 @@ impl Run {
         let cpu = CpuTime::now().zip(cpu).map(|(now, then)| now.since(&then));
         let spans = self.renderer.take_spans()?;
         self.done += 1;
-        if self.done > self.asked.warm_up {
+        if self.done > self.options.warm_up {
             self.repeats.push(Repeat { wall, cpu, spans });
         }
         Ok(())
     }
 
-    /// The scene from the next angle, and what that runs again; None where nothing turns.
+    /// Rotates the view to the next angle and returns what has to run again; None if the view does not rotate.
     fn rotate(&mut self) -> Result<Option<Rerun>, GpuError> {
-        if self.asked.turn == 0.0 {
+        if self.options.angle_step == 0.0 {
             return Ok(None);
         }
         let mut settings = self.scene.settings.clone();
-        let angle = self.asked.turn * self.done as f64;
-        // As many turns as it takes.
+        let angle = self.options.angle_step * self.done as f64;
         let turned = |azimuth: f64| (azimuth + angle) % 360.0;
         settings.camera.azimuth = turned(settings.camera.azimuth);
         if self.scene.cuts_planes() {
@@ -121,6 +128,7 @@ impl Run {
         self.renderer.change(scene).map(Some)
     }
 
+    /// The profile of the measured repeats, and their spans.
     pub fn finish(self) -> (Profile, Vec<trace::Span>) {
         let device = machine::device(&self.context);
         let (scene, plan, repeats) = (&self.scene, self.renderer.plan(), self.repeats);
@@ -131,7 +139,7 @@ impl Run {
             date: machine::date(),
             scene: settings(scene),
             settings_hash: settings_hash(&settings(scene)),
-            input: self.asked.input,
+            input: self.options.input,
             sizes: Sizes {
                 frame: scene.frame_size(),
                 slices: scene.slices(),
@@ -142,8 +150,8 @@ impl Run {
                 .probe()
                 .map(|p| Acquisition { seconds: p.acquisition_time(), sound_speed: p.sound_speed }),
             repeats: repeats.len(),
-            warm_up: self.asked.warm_up,
-            turn: self.asked.turn,
+            warm_up: self.options.warm_up,
+            turn: self.options.angle_step,
             passes: passes(plan, scene, &repeats, stamped),
             host: hosts(&repeats),
             wall_ns: repeats.iter().map(|r| r.wall).collect(),
@@ -161,7 +169,7 @@ impl Run {
 struct Repeat {
     /// From the first frame's arrival to the picture, ns.
     wall: f64,
-    /// CPU time of the process over it, ns; None where the system does not tell.
+    /// CPU time of the process over the same interval, ns; None if the system does not report it.
     cpu: Option<f64>,
     spans: Vec<Span>,
 }
@@ -175,7 +183,7 @@ impl Repeat {
         self.of(name, on_device).map(|s| s.end - s.begin).sum()
     }
 
-    /// From the first pass' begin to the last one's end.
+    /// From the begin of the first pass to the end of the last, ns.
     fn on_device(&self) -> f64 {
         let spans = || self.spans.iter().filter(|s| s.on_device);
         let begin = spans().map(|s| s.begin).fold(f64::MAX, f64::min);
@@ -185,7 +193,7 @@ impl Repeat {
 }
 
 fn settings(scene: &Scene) -> String {
-    // Settings come from TOML, so they go back into it; a failure would only lose the words.
+    // Settings come from TOML, so writing them cannot fail; if it did, only the description would be lost.
     toml::to_string(&scene.settings).unwrap_or_default()
 }
 
@@ -199,7 +207,7 @@ fn traced(repeat: usize, span: Span) -> trace::Span {
     }
 }
 
-/// Names in the order in which they first appear.
+/// Names of spans in order of first appearance.
 fn names(repeats: &[Repeat], on_device: bool) -> Vec<&'static str> {
     let mut names: Vec<&'static str> = Vec::new();
     for span in repeats.iter().flat_map(|r| &r.spans).filter(|s| s.on_device == on_device) {
@@ -218,7 +226,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
         let steps: Vec<&Step> = plan.steps.iter().filter(|s| s.pass.name == name).collect();
         let first = repeats.first();
         let runs = first.map_or(0, |r| r.of(name, true).count() as u32);
-        // Frames that were not sent again ran no step of theirs.
+        // With `still`, steps of stage 1 run only once.
         let times = if steps.is_empty() { 0 } else { u64::from(runs) / steps.len() as u64 };
         let bytes = |binds: fn(&Step, &Scene) -> Vec<Bind>| -> u64 {
             times * steps.iter().flat_map(|s| binds(s, scene)).map(|b| touched(&b, scene)).sum::<u64>()
@@ -236,7 +244,7 @@ fn passes(plan: &Plan, scene: &Scene, repeats: &[Repeat], stamped: bool) -> Vec<
             invocations: first.and_then(|r| r.of(name, true).map(|s| s.invocations).sum()),
         }
     };
-    // In running order: the plan's, and what is copied where it happens.
+    // In running order: the plan's order, uploads first.
     let mut order = names(repeats, true);
     order.sort_by_key(|name| match *name {
         "upload" => -1,
@@ -260,7 +268,7 @@ fn hosts(repeats: &[Repeat]) -> Vec<PassProfile> {
     names(repeats, false).into_iter().map(host).collect()
 }
 
-/// Bytes of what a dispatch binds, each texel once.
+/// Bytes that a dispatch can reach through a binding, each texel counted once.
 fn touched(bind: &Bind, scene: &Scene) -> u64 {
     let all = bind.slot.bytes(scene);
     match bind.part {
@@ -269,12 +277,11 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
     }
 }
 
-/// What so many uploads or readbacks move each way.
+/// Bytes that `runs` uploads or readbacks copy in each direction.
 fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
-    use crate::passes::{Slot, chain, layer};
     let frame = touched(&layer("frames", Slot::Frames), scene);
     match name {
-        // Several slices at once.
+        // One copy uploads several slices.
         "upload" if chain::copied(scene).is_some() && runs > 0 => scene.frames_seen().len() as u64 * frame,
         "upload" => runs * frame,
         "readback" => runs * Slot::Screen.bytes(scene),
@@ -282,21 +289,58 @@ fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
     }
 }
 
-/// Texels that one step fetches: known of filters whose window does not depend on the data.
+/// Texels that one step fetches; None unless it is a filter whose window does not depend on the data.
 fn fetches(pass: &Pass, scene: &Scene, step: &Step) -> Option<u64> {
-    let args = crate::passes::DispatchArgs { slices: scene.slices(), ..step.args() };
+    let args = DispatchArgs { slices: scene.slices(), ..step.args() };
     let constants = (pass.constants)(scene, &args);
     let radius = constants.iter().find(|(name, _)| *name == "RADIUS").map(|(_, r)| *r as u64)?;
     let edge = 2 * radius + 1;
     let invocations: u64 = pass.invocations(scene, &args).iter().map(|n| u64::from(*n)).product();
-    // Of an invocation's run of neighbours.
-    let along = edge + u64::from(crate::passes::RUN) - 1;
+    // One invocation filters a run of neighbours and shares their window.
+    let along = edge + u64::from(RUN) - 1;
     let window = match pass.name.split('_').next()? {
         "gaussian" => along,
         "sigma" => edge * along,
         _ => return None,
     };
-    // A slice's filter runs once a frame; the caller counts those.
+    // The filter of a slice runs once a frame; the caller multiplies by the number of frames.
     debug_assert!(pass.frequency != Frequency::Frame || args.slice == 0);
     Some(invocations * window)
+}
+
+/// Repeats of each ceiling loop; the median is reported.
+const CEILING_REPEATS: u32 = 15;
+
+/// Measures the device's roofline ceilings with the loops of [`crate::passes::measure`]; None if it has no time stamps.
+///
+/// # Errors
+/// The device cannot hold a volume of 128^3 and pictures of 2048^2, or fails.
+fn measure_ceilings(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError> {
+    let broken = |e: crate::scene::SceneError| GpuError::Broken(format!("the scene that measures: {e}"));
+    // Larger than the caches of a GPU; on a software device the smallest size with steady times.
+    let pixels = if context.candidate.is_software() { 256 } else { 2048 };
+    let sampled = loops::scene(128, pixels).map_err(broken)?;
+    let copied = loops::scene(2, 2048).map_err(broken)?;
+    let rate = |pass: &'static Pass, scene: &Scene, count: f64| -> Result<Option<Ceiling>, GpuError> {
+        let rates: Vec<f64> = pass_runner::time(context, scene, pass, CEILING_REPEATS)?
+            .iter()
+            .filter(|ns| **ns > 0.0)
+            .map(|ns| count / ns * 1e9)
+            .collect();
+        Ok(Sample::new(&rates).ok().map(|s| Ceiling {
+            median: s.median(),
+            low: s.quantile(0.05),
+            high: s.quantile(0.95),
+        }))
+    };
+    let samples = f64::from(pixels) * f64::from(pixels) * f64::from(loops::SAMPLES);
+    let bytes = 2.0 * Slot::Picture.bytes(&copied) as f64;
+    let copy = rate(&loops::COPY, &copied, bytes)?;
+    let sampling = rate(&loops::FILTERED, &sampled, samples)?;
+    let exact = rate(&loops::EIGHT_FETCHES, &sampled, samples)?;
+    let fetch = rate(&loops::ONE_FETCH, &sampled, samples)?;
+    Ok(match (copy, sampling, fetch) {
+        (Some(copy), Some(sampling), Some(fetch)) => Some(Ceilings { copy, sampling, exact, fetch }),
+        _ => None,
+    })
 }

@@ -1,45 +1,40 @@
-//! What `echolume profile` measured: the numbers themselves, and what they were measured on. Tables, comparisons and traces
-//! follow from it; nothing here measures.
+//! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
+//! compares two, [`export`] and [`trace`] write them as text and as Chrome traces.
 
-pub mod ceilings;
 pub(crate) mod command;
 pub mod compare;
-pub mod differences;
-pub mod formats;
-pub(crate) mod judgement;
-pub mod machine;
+pub mod export;
 pub mod measure;
-pub mod pass_times;
-pub mod ranks;
 pub mod statistics;
-pub mod table;
 pub mod trace;
 
+use crate::machine::Device;
 use serde::{Deserialize, Serialize};
 use statistics::Sample;
 
-/// Version of the JSON; another layout gets another name.
+/// Version of the JSON format.
 pub const FORMAT: &str = "echolume-profile-2";
-/// Still read: knows no CPU time, and no camera that turns.
+/// The previous version, still read: it has no CPU time and no rotating camera.
 pub const FORMAT_BEFORE: &str = "echolume-profile-1";
 
-/// Coverage that intervals aim at.
+/// Target coverage of confidence intervals.
 pub const LEVEL: f64 = 0.95;
 
+/// Why a profile cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ProfileError {
     #[error("format is {found:?}, this program reads {FORMAT:?}; profile again with it")]
     Format { found: String },
     #[error("not a profile: {0}")]
     Json(String),
-    /// Contents that contradict themselves.
+    /// Inconsistent contents.
     #[error("{field}: {fault}")]
     Contents { field: String, fault: String },
 }
 
 impl ProfileError {
     fn on_one_line(self) -> ProfileError {
-        let line = |text: String| crate::scene::load::single_line(&text);
+        let line = |text: String| crate::text::single_line(&text);
         match self {
             ProfileError::Format { found } => ProfileError::Format { found: line(found) },
             ProfileError::Json(fault) => ProfileError::Json(line(fault)),
@@ -50,7 +45,7 @@ impl ProfileError {
     }
 }
 
-/// One run of `echolume profile`. Every list of times has one entry a repeat, in the order measured, all in ns.
+/// One run of `echolume profile`. Lists of times have one entry per repeat, in the order measured, in ns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -58,66 +53,48 @@ pub struct Profile {
     pub format: String,
     /// Name, version and build of the program.
     pub program: String,
-    /// When, by RFC 3339.
+    /// Time of the run, RFC 3339.
     pub date: String,
     pub device: Device,
     /// All settings, resolved, as TOML.
     pub scene: String,
     /// [`settings_hash`] of `scene`.
     pub settings_hash: String,
-    /// What the frames came from, in words.
+    /// Description of the input.
     pub input: String,
     pub sizes: Sizes,
-    /// What acquiring the volume takes, where a probe swept it.
+    /// Time to acquire the volume; None for volumes that no probe swept.
     pub acquisition: Option<Acquisition>,
     /// Pictures measured.
     pub repeats: usize,
-    /// Pictures rendered before them, not measured.
+    /// Pictures rendered before those, not measured.
     pub warm_up: usize,
-    /// How far the view turned from each repeat to the next, deg.
+    /// Rotation of the view from each repeat to the next, deg.
     #[serde(default)]
     pub turn: f64,
     /// In running order.
     pub passes: Vec<PassProfile>,
-    /// What the CPU did: submit, upload, wait, whole. They may lie within each other and do not add up.
+    /// Spans of the host: submit, upload, wait, total. They may nest, so they do not add up.
     pub host: Vec<PassProfile>,
-    /// From submit to the device being idle again, by the host's clock.
+    /// From submission until the device is idle again, by the host's clock.
     pub wall_ns: Vec<f64>,
-    /// CPU time of the process over the same stretch, all threads, user and system: on a software device what the work costs
-    /// whatever else the machine does. Empty where the system does not tell.
+    /// CPU time of the process over the same interval, all threads, user and system. On a software device this is the cost of
+    /// the work, independent of other load. Empty if the system does not report it.
     #[serde(default)]
     pub cpu_ns: Vec<f64>,
-    /// From the first pass' begin to the last one's end, by the device's clock. Empty without time stamps.
+    /// From the begin of the first pass to the end of the last, by the device's clock. Empty without time stamps.
     pub device_ns: Vec<f64>,
     pub ceilings: Option<Ceilings>,
-    /// How the volume is sampled and texels are read, in words.
+    /// Description of how the volume is sampled and texels are read.
     #[serde(default)]
     pub sampling: Option<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Device {
-    pub name: String,
-    pub driver: String,
-    /// Vulkan version.
-    pub api: String,
-    /// Computes on the CPU.
-    pub is_software: bool,
-    /// ns a tick of the device's clock.
-    pub timestamp_period_ns: f64,
-    /// Bits of a time stamp; 0 where the queue has none, and then no pass has times.
-    pub valid_bits: u32,
-    /// The device's clock was tied to the host's, so that both may be drawn on one axis.
-    pub calibrated: bool,
-    /// What is known of clocks and power state, in words; None where the device tells nothing.
-    pub clocks: Option<String>,
-}
-
+/// Sizes of what was processed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
-    /// Samples and lines.
+    /// Samples per line, lines.
     pub frame: [u32; 2],
     pub slices: u32,
     /// Texels.
@@ -126,97 +103,100 @@ pub struct Sizes {
     pub picture: [u32; 2],
 }
 
+/// Lower bound of the time to acquire a volume.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Acquisition {
-    /// s, for all lines of all slices, at the speed of sound.
+    /// Travel time of sound for all lines of all slices, s.
     pub seconds: f64,
     /// m/s.
     pub sound_speed: f64,
 }
 
-/// A pass of the device, or a span of the host.
+/// Times of a pass on the device, or of a span on the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassProfile {
     /// Unique in its list.
     pub name: String,
-    /// Stage of a pass; of a host span whatever groups it.
+    /// Stage of the pass; `host` for host spans.
     pub stage: String,
     /// Dispatches in one repeat.
     pub runs_per_picture: u32,
-    /// All runs of a repeat together. Empty without time stamps.
+    /// Sum over all runs of a repeat, ns. Empty without time stamps.
     pub samples_ns: Vec<f64>,
-    /// Bytes that a repeat cannot do without reading, every texel of every slot once.
+    /// Minimum bytes read in a repeat: every texel of every bound slot once.
     pub bytes_read: u64,
     /// Bytes that a repeat writes.
     pub bytes_written: u64,
-    /// Texels fetched in a repeat without filtering, where they can be counted.
+    /// Unfiltered texel fetches in a repeat, if they can be counted.
     #[serde(default)]
     pub fetches: Option<u64>,
-    /// Filtered texture samples taken in a repeat, where they can be counted.
+    /// Filtered texture samples in a repeat, if they can be counted.
     #[serde(default)]
     pub filtered: Option<u64>,
-    /// Compute shader invocations in a repeat, from pipeline statistics where the device has them.
+    /// Compute shader invocations in a repeat, from pipeline statistics if the device has them.
     #[serde(default)]
     pub invocations: Option<u64>,
 }
 
-/// A rate that the device reached in a loop that does nothing else, per second.
+/// Peak rate per second that the device reached in a micro-benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ceiling {
     pub median: f64,
-    /// 5th and 95th percentile over the measurement's own repeats.
+    /// 5th and 95th percentile over the repeats of the micro-benchmark.
     pub low: f64,
     pub high: f64,
 }
 
+/// Roofline ceilings of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ceilings {
-    /// Bytes read and bytes written together: copying one byte moves two.
+    /// Bytes read plus bytes written: copying one byte counts as two.
     pub copy: Ceiling,
-    /// Filtered samples.
+    /// Filtered texture samples.
     pub sampling: Ceiling,
-    /// Samples of eight texels, interpolated by the shader.
+    /// Samples interpolated by the shader from eight texels.
     #[serde(default)]
     pub exact: Option<Ceiling>,
-    /// Texel fetches, or loads where the device takes those.
+    /// Texel fetches, or storage loads if the device uses those.
     pub fetch: Ceiling,
 }
 
-/// The ceiling that a pass is nearest to, and how near.
+/// The ceiling that a pass is closest to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roof {
-    /// 1 at the ceiling. Above it where caches serve what the ceiling's loop had to fetch from memory.
+    /// Achieved rate over the ceiling. Above 1 if caches serve what the micro-benchmark fetched from memory.
     pub share: f64,
     /// "copy", "sampling" or "fetch".
     pub bound: &'static str,
 }
 
 impl PassProfile {
-    /// None without times.
+    /// The times as a sample; None without times.
     pub fn sample(&self) -> Option<Sample> {
         Sample::new(&self.samples_ns).ok()
     }
 
+    /// Minimum bytes read and written in a repeat.
     pub fn bytes(&self) -> u64 {
         self.bytes_read + self.bytes_written
     }
 
-    /// `count` in a repeat as a rate per second, by the median time.
+    /// `count` events per repeat as a rate per second, by the median time.
     fn rate(&self, count: u64) -> Option<f64> {
         let median = self.sample()?.median();
         (median > 0.0 && count > 0).then(|| count as f64 / median * 1e9)
     }
 
-    /// Least memory traffic per second by the median time.
+    /// Minimum memory traffic per second, by the median time.
     pub fn bytes_per_second(&self) -> Option<f64> {
         self.rate(self.bytes())
     }
 
-    /// S. Williams, A. Waterman and D. Patterson, Roofline, 2009, with measured ceilings: the one nearest to being reached.
+    /// The closest ceiling (S. Williams, A. Waterman and D. Patterson, Roofline, 2009, with measured ceilings).
     pub fn roof(&self, ceilings: &Ceilings) -> Option<Roof> {
         let rates = [
             ("copy", self.bytes(), ceilings.copy),
@@ -232,11 +212,12 @@ impl PassProfile {
 }
 
 impl Profile {
+    /// True if the device has time stamps, so that passes have times.
     pub fn has_time_stamps(&self) -> bool {
         self.device.valid_bits > 0
     }
 
-    /// Time of all passes, one entry a repeat; empty without time stamps.
+    /// Sum of the times of all passes, ns, one entry per repeat; empty without time stamps.
     pub fn pass_sums(&self) -> Vec<f64> {
         if !self.has_time_stamps() || self.passes.is_empty() {
             return Vec::new();
@@ -244,12 +225,15 @@ impl Profile {
         (0..self.repeats).map(|i| self.passes.iter().filter_map(|p| p.samples_ns.get(i)).sum()).collect()
     }
 
-    /// What the device did between passes, one entry a repeat: its span less the passes. Below zero where passes overlap.
+    /// Idle time between passes, ns, one entry per repeat: the span of the device minus the passes. Negative if passes overlap.
     pub fn idle_ns(&self) -> Vec<f64> {
-        self.device_ns.iter().zip(self.pass_sums()).map(|(whole, passes)| whole - passes).collect()
+        self.device_ns.iter().zip(self.pass_sums()).map(|(span, passes)| span - passes).collect()
     }
 
-    /// That the lists agree with each other, and every number is one.
+    /// Checks that the lists are consistent and all numbers are finite.
+    ///
+    /// # Errors
+    /// The first field that is not.
     pub fn check(&self) -> Result<(), ProfileError> {
         let fault = |field: &str, fault: String| Err(ProfileError::Contents { field: field.into(), fault });
         if self.format != FORMAT {
@@ -259,10 +243,10 @@ impl Profile {
             return fault("repeats", "is 0; at least one picture must be measured".into());
         }
         let stamped = if self.has_time_stamps() { self.repeats } else { 0 };
-        let told = if self.cpu_ns.is_empty() { 0 } else { self.repeats };
+        let with_cpu_time = if self.cpu_ns.is_empty() { 0 } else { self.repeats };
         let mut lists = vec![
             ("wall_ns", self.repeats, &self.wall_ns),
-            ("cpu_ns", told, &self.cpu_ns),
+            ("cpu_ns", with_cpu_time, &self.cpu_ns),
             ("device_ns", stamped, &self.device_ns),
         ];
         for (kind, expected, spans) in [("passes", stamped, &self.passes), ("host", self.repeats, &self.host)] {
@@ -298,9 +282,46 @@ impl Profile {
     }
 }
 
-/// Tells settings apart at a glance: FNV-1a, 64 bits, of their TOML, in hexadecimal. Not proof against intent.
+/// Fingerprint of settings: 64-bit FNV-1a of their TOML, in hexadecimal. Not cryptographic.
 pub fn settings_hash(scene: &str) -> String {
     let hash =
         scene.bytes().fold(0xcbf2_9ce4_8422_2325, |h: u64, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
     format!("{hash:016x}")
+}
+
+impl Profile {
+    /// The profile as JSON. Every number is exact: `from_json(to_json(p))` is p.
+    ///
+    /// # Errors
+    /// [`Profile::check`] refuses it.
+    pub fn to_json(&self) -> Result<String, ProfileError> {
+        self.check()?;
+        let mut text = serde_json::to_string_pretty(self).map_err(|e| ProfileError::Json(e.to_string()))?;
+        text.push('\n');
+        Ok(text)
+    }
+
+    /// Reads a profile of this format or the one before. Any text gives a consistent profile or an error.
+    ///
+    /// # Errors
+    /// One line: another format, no JSON of a profile, or contents that [`Profile::check`] refuses.
+    pub fn from_json(text: &str) -> Result<Profile, ProfileError> {
+        read(text).map_err(ProfileError::on_one_line)
+    }
+}
+
+fn read(text: &str) -> Result<Profile, ProfileError> {
+    /// Read first, to distinguish a profile of another version from a file that is none.
+    #[derive(Deserialize)]
+    struct Version {
+        format: String,
+    }
+    let version: Version = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
+    if ![FORMAT, FORMAT_BEFORE].contains(&version.format.as_str()) {
+        return Err(ProfileError::Format { found: version.format });
+    }
+    let mut profile: Profile = serde_json::from_str(text).map_err(|e| ProfileError::Json(e.to_string()))?;
+    profile.format = FORMAT.into();
+    profile.check()?;
+    Ok(profile)
 }

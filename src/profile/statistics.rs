@@ -1,7 +1,7 @@
-//! What a handful of times says without assuming their distribution: order statistics, and how far they can be trusted.
-//! Times have long tails and outliers, so medians and ranks are used throughout, means and deviations nowhere.
+//! Order statistics, rank tests and multiple-test correction. They assume no distribution: run times have long tails and
+//! outliers, so medians and ranks are used throughout, means and standard deviations nowhere.
 
-/// Samples that no statistic can be made of.
+/// Why values are no sample.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     #[error("there are no samples")]
@@ -10,28 +10,30 @@ pub enum SampleError {
     NotFinite { at: usize, value: f64 },
 }
 
-/// At least one finite number, in ascending order. Units are the caller's and stay.
+/// One or more finite numbers, sorted in ascending order, in the caller's unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample(Vec<f64>);
 
-/// An interval for a median (or a shift), and the probability that it covers the true one.
+/// Confidence interval of a median (or a shift), and its coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     pub low: f64,
     pub high: f64,
-    /// Exact probability, 0..1, for independent draws from one continuous distribution; neighbours that resemble each other
-    /// make it too high.
+    /// Probability, 0..1, that the interval covers the true value. Exact for independent draws from one continuous distribution;
+    /// too high if neighbours are correlated.
     pub coverage: f64,
 }
 
 impl Interval {
-    /// False where there were too few samples for the coverage that was asked for.
+    /// False if there are too few samples for the requested coverage.
     pub fn reaches(&self, level: f64) -> bool {
         self.coverage >= level
     }
 }
 
 impl Sample {
+    /// # Errors
+    /// There is no value, or one is not finite.
     pub fn new(values: &[f64]) -> Result<Sample, SampleError> {
         if let Some((at, value)) = values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
             return Err(SampleError::NotFinite { at, value: *value });
@@ -61,7 +63,7 @@ impl Sample {
     }
 
     /// The quantile at `share` (0..1, clamped), type 7 of Hyndman and Fan (Sample quantiles in statistical packages, The
-    /// American Statistician 50, 1996): linear between the order statistics, which lie at 0, 1 / (n - 1) ... 1.
+    /// American Statistician 50, 1996): linear between the order statistics, which are at 0, 1 / (n - 1) ... 1.
     pub fn quantile(&self, share: f64) -> f64 {
         let at = share.clamp(0.0, 1.0) * (self.0.len() - 1) as f64;
         let (below, part) = (at.floor() as usize, at.fract());
@@ -73,7 +75,7 @@ impl Sample {
         self.quantile(0.5)
     }
 
-    /// Median of the distances from the median, not scaled to any distribution.
+    /// Median absolute deviation from the median, not scaled to any distribution.
     pub fn mad(&self) -> f64 {
         let median = self.median();
         let mut distances: Vec<f64> = self.0.iter().map(|v| (v - median).abs()).collect();
@@ -81,16 +83,16 @@ impl Sample {
         Sample(distances).median()
     }
 
-    /// Between which two order statistics the true median lies: the k-th from below and the k-th from above, where the number
-    /// of samples below the true median is binomial with p = 1/2 (David and Nagaraja, BarrierRecorder Statistics, 2003, section 7.1).
-    /// k is the largest that still covers `level`; where none does, the whole range is given with what it covers.
+    /// Distribution-free confidence interval of the median: from the k-th smallest to the k-th largest sample. The number of
+    /// samples below the true median is binomial with p = 1/2 (David and Nagaraja, Order Statistics, 2003, section 7.1). k is the
+    /// largest that still covers `level`; if none does, the interval is the full range.
     pub fn median_interval(&self, level: f64) -> Interval {
         let n = self.0.len();
-        // P(fewer than k samples lie below), by its logarithm: 2^-n underflows from 1075 samples on.
+        // P(fewer than k samples are below), by its logarithm: 2^-n underflows from 1075 samples on.
         let mut log_share = -(n as f64) * std::f64::consts::LN_2;
         let mut below = log_share.exp();
         let (mut k, mut tail) = (1, below);
-        // Beyond the middle the two order statistics would swap sides.
+        // Beyond the middle the two order statistics would swap.
         for next in 2..=n.div_ceil(2) {
             log_share += ((n + 2 - next) as f64 / (next - 1) as f64).ln();
             below += log_share.exp();
@@ -103,8 +105,11 @@ impl Sample {
     }
 }
 
-/// By what factor the median of the second half of a series differs from that of the first: 1 is steady. None where a half is
-/// empty or its median is not positive. The middle one of an odd number belongs to neither.
+/// Ratio of the median of the second half of a series to that of the first; 1 is steady. None if a half is empty or its median is
+/// not positive. The middle sample of an odd number belongs to neither half.
+///
+/// # Errors
+/// The series is no sample.
 pub fn drift(series: &[f64]) -> Result<Option<f64>, SampleError> {
     let half = series.len() / 2;
     if half == 0 {
@@ -115,8 +120,11 @@ pub fn drift(series: &[f64]) -> Result<Option<f64>, SampleError> {
     Ok((first.median() > 0.0 && ratio > 0.0).then_some(ratio))
 }
 
-/// Medians of `count` stretches of a series in its order, as equal in length as they go. Neighbouring times resemble each
-/// other; the medians of stretches do so far less, and one outlier does not move them. None where there are fewer samples.
+/// Medians of `count` consecutive blocks of a series, of nearly equal length. Neighbouring times are correlated; block medians
+/// are far less so, and robust against outliers. None if there are fewer samples than blocks.
+///
+/// # Errors
+/// A value is not finite.
 pub fn block_medians(series: &[f64], count: usize) -> Result<Option<Vec<f64>>, SampleError> {
     if count == 0 || series.len() < count {
         return Ok(None);
@@ -124,4 +132,167 @@ pub fn block_medians(series: &[f64], count: usize) -> Result<Option<Vec<f64>>, S
     let cut = |i: usize| i * series.len() / count;
     let medians = (0..count).map(|i| Sample::new(&series[cut(i)..cut(i + 1)]).map(|s| s.median()));
     medians.collect::<Result<Vec<_>, _>>().map(Some)
+}
+
+/// Maximum number of samples, both together, for which the exact distribution of the rank sum is computed. Above it the normal
+/// approximation is accurate enough.
+const MAX_EXACT: usize = 60;
+
+/// The Mann-Whitney test, two-sided.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MannWhitney {
+    /// Pairs in which the value of the first sample is larger; ties count half.
+    pub u: f64,
+    /// Probability of a U at least as extreme if both samples are from one distribution.
+    pub p: f64,
+    /// From the exact distribution, not the normal approximation.
+    pub is_exact: bool,
+}
+
+/// Shift of the second sample relative to the first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shift {
+    pub estimate: f64,
+    pub low: f64,
+    pub high: f64,
+    /// Probability that the interval covers the true shift, if the distributions differ by a shift only.
+    pub coverage: f64,
+}
+
+/// H. B. Mann and D. R. Whitney, On a test of whether one of two random variables is stochastically larger than the other,
+/// 1947. Small samples: the exact permutation distribution of the midranks, so that ties need no correction. Large ones: the
+/// normal approximation with the variance corrected for ties and a continuity correction.
+///
+/// # Errors
+/// `a` or `b` is no sample.
+pub fn mann_whitney(a: &[f64], b: &[f64]) -> Result<MannWhitney, SampleError> {
+    let (first, second) = (Sample::new(a)?, Sample::new(b)?);
+    let (n, m) = (first.count(), second.count());
+    let all = Sample::new(&[a, b].concat())?;
+    let all = all.sorted();
+    // Twice the midrank of every sample of both: integers.
+    let mut doubled = Vec::with_capacity(n + m);
+    let mut ties = 0.0;
+    while doubled.len() < all.len() {
+        let from = doubled.len();
+        let to = from + all[from..].iter().take_while(|v| **v == all[from]).count();
+        doubled.resize(to, from + to + 1);
+        let tied = (to - from) as f64;
+        ties += tied.powi(3) - tied;
+    }
+    let rank = |v: f64| doubled[all.partition_point(|x| *x < v)];
+    let sum: usize = a.iter().map(|v| rank(*v)).sum();
+    let u = (sum - n * (n + 1)) as f64 / 2.0;
+    if n + m <= MAX_EXACT {
+        let subsets = rank_sums(&doubled, n);
+        let total: f64 = subsets.iter().sum();
+        let below: f64 = subsets[..=sum].iter().sum();
+        let above: f64 = subsets[sum..].iter().sum();
+        return Ok(MannWhitney { u, p: (2.0 * below.min(above) / total).min(1.0), is_exact: true });
+    }
+    let (n, m) = (n as f64, m as f64);
+    let variance = n * m / 12.0 * (n + m + 1.0 - ties / ((n + m) * (n + m - 1.0)));
+    let off = ((u - n * m / 2.0).abs() - 0.5).max(0.0);
+    let p = if variance > 0.0 { (2.0 * normal_tail(off / variance.sqrt())).min(1.0) } else { 1.0 };
+    Ok(MannWhitney { u, p, is_exact: false })
+}
+
+/// Number of subsets of `chosen` ranks for each rank sum.
+fn rank_sums(ranks: &[usize], chosen: usize) -> Vec<f64> {
+    let max_sum: usize = ranks[ranks.len() - chosen..].iter().sum();
+    let mut counts = vec![vec![0.0; max_sum + 1]; chosen + 1];
+    counts[0][0] = 1.0;
+    for rank in ranks {
+        for k in (1..=chosen).rev() {
+            let (less, here) = counts.split_at_mut(k);
+            for sum in *rank..=max_sum {
+                here[0][sum] += less[k - 1][sum - rank];
+            }
+        }
+    }
+    counts.swap_remove(chosen)
+}
+
+/// Minimum p value of two samples of `n` each: 2 / C(2n, n).
+pub fn min_p(n: usize) -> f64 {
+    2.0 / (1..=n).map(|i| (n + i) as f64 / i as f64).product::<f64>()
+}
+
+/// J. L. Hodges and E. L. Lehmann, Estimates of location based on rank tests, 1963: the median of all differences b - a. The
+/// interval holds every shift that the Mann-Whitney test would not reject; `coverage` is below `level` if there are too few
+/// samples. Memory: n * m values.
+///
+/// # Errors
+/// `a` or `b` is no sample.
+pub fn hodges_lehmann(a: &[f64], b: &[f64], level: f64) -> Result<Shift, SampleError> {
+    let (first, second) = (Sample::new(a)?, Sample::new(b)?);
+    let (n, m) = (first.count(), second.count());
+    let pairs: Vec<f64> = second.sorted().iter().flat_map(|y| first.sorted().iter().map(move |x| y - x)).collect();
+    let differences = Sample::new(&pairs)?;
+    let sorted = differences.sorted();
+    // The k-th difference from below and from above, by P(U < k).
+    let mut k = 1;
+    let mut tail;
+    if n + m <= MAX_EXACT {
+        let ranks: Vec<usize> = (1..=n + m).collect();
+        let subsets = rank_sums(&ranks, n);
+        let total: f64 = subsets.iter().sum();
+        let least = n * (n + 1) / 2;
+        tail = subsets[least] / total;
+        let mut below = tail;
+        for next in 2..=(n * m).div_ceil(2) {
+            below += subsets[least + next - 1] / total;
+            if 1.0 - 2.0 * below < level {
+                break;
+            }
+            (k, tail) = (next, below);
+        }
+    } else {
+        let (n, m) = (n as f64, m as f64);
+        let deviation = (n * m * (n + m + 1.0) / 12.0).sqrt();
+        let below = |k: usize| normal_tail((n * m / 2.0 - (k as f64 - 0.5)) / deviation);
+        tail = below(1);
+        for next in 2..=sorted.len().div_ceil(2) {
+            if 1.0 - 2.0 * below(next) < level {
+                break;
+            }
+            (k, tail) = (next, below(next));
+        }
+    }
+    let coverage = (1.0 - 2.0 * tail).max(0.0);
+    Ok(Shift { estimate: differences.median(), low: sorted[k - 1], high: sorted[sorted.len() - k], coverage })
+}
+
+/// S. Holm, A simple sequentially rejective multiple test procedure, 1979: adjusted p values, in the order given. Rejecting those
+/// up to alpha gives a family-wise error rate of at most alpha, whatever their dependence.
+pub fn holm(p: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p.len()).collect();
+    order.sort_by(|i, j| p[*i].total_cmp(&p[*j]));
+    let mut adjusted = vec![0.0; p.len()];
+    let mut least: f64 = 0.0;
+    for (rank, i) in order.into_iter().enumerate() {
+        least = least.max((p[i] * (p.len() - rank) as f64).min(1.0));
+        adjusted[i] = least;
+    }
+    adjusted
+}
+
+/// P(Z > z) of the standard normal distribution, with a relative error of about 1e-14.
+pub fn normal_tail(z: f64) -> f64 {
+    let x = z.abs() / std::f64::consts::SQRT_2;
+    let bell = (-x * x).exp() / std::f64::consts::PI.sqrt();
+    let upper = if x < 1.5 {
+        // erf(x) = 2 bell sum of 2^n x^(2n+1) / (2n+1)!! (Abramowitz and Stegun 7.1.6): all terms positive.
+        let (mut term, mut sum, mut n) = (x, x, 0.0);
+        while term > sum * 1e-17 {
+            n += 1.0;
+            term *= 2.0 * x * x / (2.0 * n + 1.0);
+            sum += term;
+        }
+        0.5 - bell * sum
+    } else {
+        // erfc(x) = bell / (x + (1/2) / (x + 1 / (x + (3/2) / (x + ...)))) (7.1.14), from the inside.
+        0.5 * bell / (1..=120).rev().fold(x, |inner, n| x + 0.5 * f64::from(n) / inner)
+    };
+    if z >= 0.0 { upper } else { 1.0 - upper }
 }

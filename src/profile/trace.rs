@@ -3,46 +3,51 @@
 use super::Profile;
 use serde_json::{Value, json};
 
-/// Whose clock and work.
+/// Where a span ran, and by whose clock it was timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Track {
     Device,
     Host,
 }
 
-/// Something that took time, in ns since the run began.
+/// A timed span, in ns since the run began.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     pub name: String,
     pub track: Track,
-    /// From 0.
+    /// Repeat that it belongs to, from 0.
     pub repeat: usize,
     pub begin_ns: f64,
     pub end_ns: f64,
 }
 
+/// Why a trace cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is no stretch of time")]
-    Stretch { name: String, repeat: usize, begin_ns: f64, end_ns: f64 },
+    #[error("span {name:?} of repeat {repeat}: from {begin_ns} to {end_ns} ns is no interval of time")]
+    Interval { name: String, repeat: usize, begin_ns: f64, end_ns: f64 },
     #[error("trace: {0}")]
     Json(String),
 }
 
-/// Longest time that the format's numbers still tell to the nanosecond: 2^53 ns, 104 days.
-const LONGEST: f64 = 9_007_199_254_740_992.0;
+/// Maximum time that the numbers of the format resolve to the nanosecond: 2^53 ns, 104 days.
+const MAX_NS: f64 = 9_007_199_254_740_992.0;
 
-/// Both tracks on one time axis. Host spans may lie within each other; whatever else overlaps goes to a thread of its own, so
-/// that no viewer drops it. Without calibration the device's spans are right among themselves and the trace says so.
+/// Writes spans as a Chrome trace, both tracks on one time axis. Host spans may nest; other overlapping spans get threads of their
+/// own, so that no viewer drops them. Without calibration the device's spans are consistent only among themselves, and the trace
+/// says so.
+///
+/// # Errors
+/// A span that ends before it begins, or is not finite.
 pub fn chrome(profile: &Profile, spans: &[Span]) -> Result<String, TraceError> {
     for span in spans {
-        let fits = |ns: f64| ns.is_finite() && ns.abs() < LONGEST;
+        let fits = |ns: f64| ns.is_finite() && ns.abs() < MAX_NS;
         if !(fits(span.begin_ns) && fits(span.end_ns) && span.begin_ns <= span.end_ns) {
             let (name, repeat) = (span.name.clone(), span.repeat);
-            return Err(TraceError::Stretch { name, repeat, begin_ns: span.begin_ns, end_ns: span.end_ns });
+            return Err(TraceError::Interval { name, repeat, begin_ns: span.begin_ns, end_ns: span.end_ns });
         }
     }
-    // Calibration is not exact to the nanosecond: the first stamp may come out before the run began.
+    // Calibration is not exact to the nanosecond: the first time stamp may be before the begin of the run.
     let origin = spans.iter().map(|s| s.begin_ns.round() as i64).min().unwrap_or(0).min(0);
     let tied = if profile.device.calibrated { "" } else { " (clock not tied to the host's)" };
     let names = [(Track::Host, "host".to_string()), (Track::Device, format!("device {}{tied}", profile.device.name))];
@@ -91,7 +96,7 @@ fn process(track: Track) -> u32 {
     }
 }
 
-/// `between` in ns from the trace's start. The format counts microseconds; three decimals hold a nanosecond.
+/// `between`: begin and end, ns from the start of the trace. The format counts microseconds; three decimals resolve 1 ns.
 fn event(profile: &Profile, span: &Span, lane: usize, between: [i64; 2]) -> Value {
     let us = |ns: i64| ns as f64 / 1e3;
     let (list, category) = match span.track {
@@ -111,18 +116,18 @@ fn event(profile: &Profile, span: &Span, lane: usize, between: [i64; 2]) -> Valu
     })
 }
 
-/// Every span of a track in order of its begin: lane, begin, end (whole ns) and the span. A lane of the device holds one at a
-/// time; on the host one may lie within another.
+/// The spans of a track in order of begin: lane, begin, end (integer ns) and the span. In a lane of the device spans do not
+/// overlap; on the host they may nest.
 fn lanes(spans: &[Span], track: Track) -> Vec<(usize, i64, i64, &Span)> {
-    let whole = |span: &Span| [span.begin_ns.round() as i64, span.end_ns.round() as i64];
+    let rounded = |span: &Span| [span.begin_ns.round() as i64, span.end_ns.round() as i64];
     let mut ordered: Vec<&Span> = spans.iter().filter(|s| s.track == track).collect();
-    // Of two that begin together, the longer holds the shorter.
-    ordered.sort_by_key(|s| (whole(s)[0], -whole(s)[1]));
-    // The ends of the spans that are open in each lane, the innermost last.
+    // Of two that begin together, the longer encloses the shorter.
+    ordered.sort_by_key(|s| (rounded(s)[0], -rounded(s)[1]));
+    // Ends of the open spans of each lane, innermost last.
     let mut open: Vec<Vec<i64>> = Vec::new();
     let mut placed = Vec::with_capacity(ordered.len());
     for span in ordered {
-        let [begin, end] = whole(span);
+        let [begin, end] = rounded(span);
         for lane in &mut open {
             while lane.last().is_some_and(|last| *last <= begin) {
                 lane.pop();

@@ -2,6 +2,7 @@
 
 use super::{Settings, TransferPoint};
 use crate::files;
+use crate::text::printable;
 use serde::Deserialize;
 use std::path::Path;
 use toml::{Table, Value};
@@ -166,29 +167,15 @@ fn merge(under: &mut Table, over: Table) {
     }
 }
 
-/// `text` on one line of at most 400 characters, without control characters.
-pub(crate) fn single_line(text: &str) -> String {
-    plain(text).chars().take(400).collect()
-}
-
 fn one_line(error: &toml::de::Error, text: &str) -> String {
     let span = error.span().filter(|_| !text.is_empty());
     let place = span.map_or(String::new(), |span| format!("line {}: ", line_of(text, span.start)));
-    place + &plain(error.message())
+    place + &printable(error.message())
 }
 
 /// The line number of a byte in a text, from 1.
 pub(crate) fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|b| *b == b'\n').count() + 1
-}
-
-/// `text` on one line without control characters. Keys in messages may contain anything.
-pub(crate) fn plain(message: &str) -> String {
-    let mut line = String::new();
-    for c in message.lines().collect::<Vec<_>>().join(" ").chars() {
-        if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
-    }
-    line
 }
 
 #[cfg(test)]

@@ -2,11 +2,12 @@
 
 use crate::args::{Output, check_outputs, open_device};
 use crate::gpu::Choice;
-use crate::picture::grey::Grey;
+use crate::picture::Grey;
 use crate::picture::replace;
 use crate::terminal::{Failure, failed, input, say};
-use crate::thesis_tables::measure::{Asked, growth, run};
-use crate::thesis_tables::{csv, markdown};
+use crate::thesis_tables::export;
+use crate::thesis_tables::growth::growth;
+use crate::thesis_tables::measure::{TableOptions, run};
 use std::path::{Path, PathBuf};
 
 /// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.
@@ -54,9 +55,9 @@ impl ThesisTables {
             self.pictures.iter().map(|file| Grey::load(file).map_err(input)).collect::<Result<_, _>>()?;
         let context = open_device(self.device.clone(), false)?;
 
-        let asked = Asked { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
-        let bar = indicatif::ProgressBar::new(asked.volumes() as u64).with_message("volumes");
-        let report = run(&context, &asked, &mut || bar.inc(1));
+        let options = TableOptions { quick: self.quick, repeats: self.repeat as usize, warm_up: WARM_UP };
+        let bar = indicatif::ProgressBar::new(options.volumes() as u64).with_message("volumes");
+        let report = run(&context, &options, &mut || bar.inc(1));
         bar.finish_and_clear();
         let mut report = report.map_err(failed)?;
         for (file, grey) in self.pictures.iter().zip(&greys) {
@@ -65,16 +66,16 @@ impl ThesisTables {
             report.grown.push(growth(&context, &name, grey).map_err(fault)?);
         }
 
-        let written = markdown::markdown(&report);
+        let written = export::markdown(&report);
         match &self.markdown {
             None => say!("{}", written.trim_end()),
             Some(file) => write(file, &written)?,
         }
         if let Some(file) = &self.csv {
-            write(file, &csv::tables(&report))?;
+            write(file, &export::tables_csv(&report))?;
         }
         match growth_file {
-            Some(file) => write(&file, &csv::growth(&report.grown)),
+            Some(file) => write(&file, &export::growth_csv(&report.grown)),
             None => Ok(()),
         }
     }

@@ -1,17 +1,12 @@
 //! Tables 3-6 of the thesis measured on a device, and 7-9 on pictures: the scenes of [`crate::thesis_tables`] rendered again
 //! and again.
 
-use super::measure_growth::Fault;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{self, Context, GpuError, Renderer};
+use crate::machine;
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
-use crate::picture::grey::Grey;
-use crate::profile::machine;
-use crate::scene::{
-    EnhancedSigma, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth, VolumeFormat,
-};
+use crate::scene::{Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth};
 use crate::source::{Frame, Geometry, StoredType};
-use crate::thesis_tables::window_growth;
-use crate::thesis_tables::{Conditions, DEPTH, Filter3d, Grown, Reached, Report, Row, Table, tables};
+use crate::thesis_tables::{Conditions, DEPTH, Filter3d, Reached, Report, Row, Table, tables};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -21,14 +16,14 @@ pub const HALF_REGION: f64 = 45.0;
 const SIGMA: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
+pub struct TableOptions {
     pub quick: bool,
     /// Volumes measured in each row, and rendered before that.
     pub repeats: usize,
     pub warm_up: usize,
 }
 
-impl Asked {
+impl TableOptions {
     /// Volumes rendered in all.
     pub fn volumes(&self) -> usize {
         tables(self.quick).iter().map(|t| t.rows.len()).sum::<usize>() * (self.repeats + self.warm_up)
@@ -39,24 +34,24 @@ impl Asked {
 ///
 /// # Errors
 /// What the device cannot hold or do.
-pub fn run(context: &Arc<Context>, asked: &Asked, after_each: &mut dyn FnMut()) -> Result<Report, GpuError> {
+pub fn run(context: &Arc<Context>, options: &TableOptions, after_each: &mut dyn FnMut()) -> Result<Report, GpuError> {
     let device = machine::device(context);
-    let mut tables = tables(asked.quick);
+    let mut tables = tables(options.quick);
     let mut sweeps: BTreeMap<usize, Vec<Frame>> = BTreeMap::new();
     for row in tables.iter().flat_map(|t| &t.rows) {
         let Conditions { frames, lines, .. } = row.conditions;
         sweeps.entry(frames).or_insert_with(|| super::sweep::frames(frames, lines));
     }
     for table in &mut tables {
-        measure(context, table, &sweeps, asked, after_each)?;
+        measure(context, table, &sweeps, options, after_each)?;
     }
     Ok(Report {
         device,
         program: machine::program(),
         date: machine::date(),
-        quick: asked.quick,
-        repeats: asked.repeats,
-        warm_up: asked.warm_up,
+        quick: options.quick,
+        repeats: options.repeats,
+        warm_up: options.warm_up,
         tables,
         grown: Vec::new(),
     })
@@ -67,15 +62,15 @@ fn measure(
     context: &Arc<Context>,
     table: &mut Table,
     sweeps: &BTreeMap<usize, Vec<Frame>>,
-    asked: &Asked,
+    options: &TableOptions,
     after_each: &mut dyn FnMut(),
 ) -> Result<(), GpuError> {
     let mut renderers = Vec::new();
     for row in &table.rows {
         let scene = scene(&row.conditions).map_err(|e| broken(&e))?;
-        renderers.push(Renderer::new(context, scene, &Options::default())?);
+        renderers.push(Renderer::new(context, scene, &gpu::Options::default())?);
     }
-    for n in 0..asked.warm_up + asked.repeats {
+    for n in 0..options.warm_up + options.repeats {
         for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {
             for frame in sweeps.get(&row.conditions.frames).into_iter().flatten() {
                 renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
@@ -83,7 +78,7 @@ fn measure(
             renderer.show(0)?;
             renderer.picture()?;
             let times = renderer.take_times()?;
-            if n >= asked.warm_up {
+            if n >= options.warm_up {
                 add(row, &times);
             }
             after_each();
@@ -154,25 +149,4 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     // A slice's pixels are square otherwise, and a sector is wider than deep: n x n are denser in depth.
     let pitch = [0, 1].map(|i| (high[i] - low[i]) / f64::from(n - 1));
     Ok(scene.on_grid(SliceGrid { size: [n, n], origin: low, pitch }))
-}
-
-/// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).
-///
-/// # Errors
-/// Windows beyond what is filtered; a picture that the device cannot hold.
-pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, Fault> {
-    let windows = |sigma: f64| window_growth::WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
-    let rows =
-        super::measure_growth::measure(context, grey, window_growth::SIGMAS.into_iter().flat_map(windows).collect())?;
-    Ok(Grown { picture: picture.into(), rows })
-}
-
-/// A row of Tables 7-9.
-pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
-    let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
-    settings.picture.size = [1, 1];
-    settings.slices.format = VolumeFormat::R32f;
-    settings.slices.enhanced_sigma =
-        Some(EnhancedSigma { window, largest, sigma, growth: true, ..EnhancedSigma::default() });
-    settings
 }

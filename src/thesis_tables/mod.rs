@@ -3,16 +3,14 @@
 //! measures.
 
 pub(crate) mod command;
-pub mod csv;
-pub mod markdown;
+pub mod export;
+pub mod growth;
 pub mod measure;
-pub mod measure_growth;
 pub mod sweep;
-pub mod window_growth;
 
-use crate::profile::Device;
+use crate::machine::Device;
 use crate::profile::statistics::Sample;
-use crate::thesis_tables::window_growth::Growth;
+use growth::Grown;
 
 /// Thesis conditions, each unless varied (4.3): angles in deg, depth in mm.
 pub const SECTOR_ANGLE: f64 = 77.0;
@@ -183,14 +181,6 @@ pub struct Reached {
     pub share: f64,
     /// Mean depth of those surfaces below the face, mm; 0 where there are none.
     pub depth: f64,
-}
-
-/// How far the windows of the enhanced sigma filter grew on one picture (Tables 7-9).
-#[derive(Clone, Debug, PartialEq)]
-pub struct Grown {
-    /// The picture's name.
-    pub picture: String,
-    pub rows: Vec<Growth>,
 }
 
 /// Everything that the text is made of.

@@ -31,8 +31,8 @@ pub mod threads;
 
 use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::{Context, ContextOptions, GpuError};
+use crate::machine;
 use crate::passes::fault_injection::Change;
-use crate::profile::machine;
 use crate::scene::Scene;
 use crate::verify::report::{FORMAT, Level, Outcome, Run};
 use std::path::PathBuf;

@@ -10,7 +10,7 @@ use crate::gpu::{Context, GpuError, Options, Renderer};
 use crate::passes::{PassTime, Span};
 use crate::picture::Picture;
 use crate::probe::Geometry;
-use crate::profile::pass_times;
+use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::sync::Arc;
@@ -200,7 +200,7 @@ fn as_if(
     let times = renderer.take_times()?;
     drop(renderer);
     aside.tell(found);
-    Ok((pass_times::table(&times, &scene), times, picture))
+    Ok((pass_time_table(&times, &scene), times, picture))
 }
 
 /// A device without time stamps says so and draws the same; one of 36 bits, or with another period, has its times all the same.

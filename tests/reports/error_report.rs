@@ -2,7 +2,7 @@
 
 use crate::scenes::*;
 use echolume::error_report::dials::dial;
-use echolume::error_report::measure::{Asked, Held};
+use echolume::error_report::measure::{ErrorMeasurement, ReferenceChoice};
 use echolume::error_report::{Measure, Reference, Report, choose};
 use echolume::scene::Scene;
 use echolume::scene::load::Layers;
@@ -26,27 +26,27 @@ fn resolved(layers: &Layers) -> Scene {
     scene_of(layers.clone().finish().expect("settings"))
 }
 
-fn report(more: &[&str], names: &[&str], held: Held) -> Report {
+fn report(more: &[&str], names: &[&str], reference: ReferenceChoice) -> Report {
     let (layers, frames) = (layers(more), frames());
     let scene = resolved(&layers);
     let dials: Vec<_> = names.iter().map(|n| dial(n, &scene).expect("dial")).collect();
     let context = device();
-    let asked = Asked {
+    let measurement = ErrorMeasurement {
         context: &context,
         layers: &layers,
         scene: &scene,
         frames: &frames,
         input: "a bumpy wall",
         repeats: 3,
-        held,
+        reference,
     };
-    asked.report(&dials, |_, _| {}).expect("report")
+    measurement.report(&dials, |_, _| {}).expect("report")
 }
 
 #[test]
 fn errors_fall_with_the_step_down_to_the_devices_floor() {
     let _alone = alone();
-    let report = report(&[], &["step"], Held::F64);
+    let report = report(&[], &["step"], ReferenceChoice::F64);
     let dial = &report.dials[0];
     let mut points: Vec<_> = dial.points.iter().map(|p| (p.value, p.errors.rmse)).collect();
     points.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -63,7 +63,7 @@ fn errors_fall_with_the_step_down_to_the_devices_floor() {
 #[test]
 fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
     let _alone = alone();
-    let report = report(&["slices.format=r16"], &["sampling"], Held::F64);
+    let report = report(&["slices.format=r16"], &["sampling"], ReferenceChoice::F64);
     let places: Vec<_> = report.dials[0].points.iter().map(|p| (p.label.as_str(), p.errors.rmse)).collect();
     println!("{places:?}");
     assert_eq!(places.iter().map(|p| p.0).collect::<Vec<_>>(), ["exact", "hardware", "quads"]);
@@ -75,9 +75,11 @@ fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
 #[test]
 fn a_converged_reference_tells_its_own_error() {
     let _alone = alone();
-    let report = report(&[], &["rays", "lut", "adaptive"], Held::Converged);
+    let report = report(&[], &["rays", "lut", "adaptive"], ReferenceChoice::Converged);
     for dial in &report.dials {
-        let Reference::Converged { set, rmse } = &dial.reference else { panic!("{} is held against f64", dial.name) };
+        let Reference::Converged { set, rmse } = &dial.reference else {
+            panic!("{} is reference against f64", dial.name)
+        };
         let worst = dial.points.iter().map(|p| p.errors.rmse).fold(0.0, f64::max);
         println!("{}: worst {worst:.1e}, {} itself {rmse:.1e}", dial.name, set.join(" "));
         assert!(*rmse < worst, "{}: {rmse} against {worst}", dial.name);
@@ -91,14 +93,14 @@ fn a_converged_reference_tells_its_own_error() {
 #[test]
 fn the_chosen_settings_hold_on_a_scene_that_the_sweep_did_not_contain() {
     let _alone = alone();
-    let swept = report(&[], &["step", "format", "termination"], Held::F64);
+    let swept = report(&[], &["step", "format", "termination"], ReferenceChoice::F64);
     let limit = 0.01;
     let choice = choose::cheapest_under(&swept, Measure::Rmse, limit, 0.25).expect("a choice");
     println!("{}", choice.say(Measure::Rmse));
     let elsewhere = ["camera.azimuth=25", "camera.elevation=-15", "volume.transfer=warm"];
     let chosen: Vec<&str> = elsewhere.into_iter().chain(choice.set.iter().map(String::as_str)).collect();
     // The first place of a dial is the scene as it is; the reference of `step` there is f64 with tiny steps.
-    let tried = report(&chosen, &["step"], Held::F64);
+    let tried = report(&chosen, &["step"], ReferenceChoice::F64);
     let error = tried.dials[0].points[0].errors.rmse;
     println!("predicted {:.2e}, elsewhere {error:.2e}", choice.error);
     assert!(error < limit, "{error}");

@@ -2,9 +2,9 @@
 
 use crate::scenes::*;
 use echolume::passes::{DispatchArgs, by_name};
-use echolume::profile::compare::{Options, Verdict, compare};
-use echolume::profile::measure::{Asked, Run, run};
-use echolume::profile::{formats, trace};
+use echolume::profile::compare::{CompareOptions, Verdict, compare};
+use echolume::profile::measure::{ProfileOptions, ProfileRun, run};
+use echolume::profile::{Profile, trace};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }
@@ -12,8 +12,8 @@ const SETTINGS: &str = "mode = 'sr'
     distance = { median = 5 }
     post = { sigma = { window = 3, sigma = 0.1 } }";
 
-fn asked(repeats: usize) -> Asked {
-    Asked { repeats, warm_up: 2, still: false, turn: 0.0, input: "a bumpy wall".into(), ceilings: false }
+fn asked(repeats: usize) -> ProfileOptions {
+    ProfileOptions { repeats, warm_up: 2, still: false, angle_step: 0.0, input: "a bumpy wall".into(), ceilings: false }
 }
 
 #[test]
@@ -21,14 +21,14 @@ fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
     let _alone = alone();
     let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
     slow.faults.slow_down("median_distance", 6);
-    let mut old = Run::new(&quick, &scene, &asked(18)).expect("run");
-    let mut new = Run::new(&slow, &scene, &asked(18)).expect("run");
-    while old.wants_more() {
+    let mut old = ProfileRun::new(&quick, &scene, &asked(18)).expect("run");
+    let mut new = ProfileRun::new(&slow, &scene, &asked(18)).expect("run");
+    while old.needs_more() {
         old.repeat(&frames).expect("repeat");
         new.repeat(&frames).expect("repeat");
     }
     let (old, new) = (old.finish().0, new.finish().0);
-    let compared = compare(&old, &new, &Options::default()).expect("comparison");
+    let compared = compare(&old, &new, &CompareOptions::default()).expect("comparison");
     for line in &compared.lines {
         println!("{:20} {:?} {:?}", line.name, line.verdict, line.ratio.as_ref().map(|r| r.estimate));
     }
@@ -40,7 +40,7 @@ fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
     for pass in ["scan_convert", "sigma_slice", "raycast_surface", "light", "sigma_picture", "tone"] {
         assert!(ratio(pass).is_none_or(|r| r < slow / 1.5), "{pass} is blamed: {:?}", ratio(pass));
     }
-    let back = compare(&new, &old, &Options::default()).expect("comparison");
+    let back = compare(&new, &old, &CompareOptions::default()).expect("comparison");
     let line = back.lines.iter().find(|l| l.name == "median_distance").expect("line");
     assert_eq!(line.verdict, Verdict::Faster);
 }
@@ -52,13 +52,13 @@ fn identical_runs_are_hardly_ever_called_different() {
     let (context, frames, scene) = (device(), frames(), scene(SETTINGS));
     let mut different = Vec::new();
     for pair in 0..40 {
-        let mut old = Run::new(&context, &scene, &asked(12)).expect("run");
-        let mut new = Run::new(&context, &scene, &asked(12)).expect("run");
-        while old.wants_more() {
+        let mut old = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
+        let mut new = ProfileRun::new(&context, &scene, &asked(12)).expect("run");
+        while old.needs_more() {
             old.repeat(&frames).expect("repeat");
             new.repeat(&frames).expect("repeat");
         }
-        let compared = compare(&old.finish().0, &new.finish().0, &Options::default()).expect("comparison");
+        let compared = compare(&old.finish().0, &new.finish().0, &CompareOptions::default()).expect("comparison");
         let called = compared.lines.iter().filter(|l| matches!(l.verdict, Verdict::Faster | Verdict::Slower));
         different.extend(called.map(|l| (pair, l.name.clone(), l.ratio.as_ref().map(|r| r.estimate))));
     }
@@ -108,8 +108,8 @@ fn a_profile_adds_up_and_survives_being_written() {
     for idle in profile.idle_ns() {
         assert!(idle > -1e5, "passes overlap by {idle} ns");
     }
-    let text = formats::to_json(&profile).expect("json");
-    assert_eq!(formats::from_json(&text).expect("read back"), profile);
+    let text = profile.to_json().expect("json");
+    assert_eq!(Profile::from_json(&text).expect("read back"), profile);
     let trace = trace::chrome(&profile, &spans).expect("trace");
     let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
     let events = trace["traceEvents"].as_array().expect("events");
@@ -121,7 +121,7 @@ fn a_profile_adds_up_and_survives_being_written() {
 fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
     let _alone = alone();
     let context = device();
-    let turning = Asked { still: true, turn: 170.0, ..asked(3) };
+    let turning = ProfileOptions { still: true, angle_step: 170.0, ..asked(3) };
     for (mode, ray, tile) in [("sr", "raycast_surface", false), ("mpr", "raycast_planes", true)] {
         let scene = scene(&SETTINGS.replace("mode = 'sr'", &format!("mode = '{mode}'")));
         assert_eq!(scene.cuts_planes(), tile);

@@ -4,14 +4,14 @@ use crate::scenes::alone;
 use crate::scenes::device;
 use echolume::gpu::{Options, Renderer};
 use echolume::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
-use echolume::picture::grey::Grey;
+use echolume::picture::Grey;
 use echolume::plan::Plan;
 use echolume::reference;
 use echolume::scene::{MAX_WINDOW, Scene};
-use echolume::thesis_tables::measure::{Asked, growth, growth_settings, run, scene};
+use echolume::thesis_tables::growth::{Growth, SIGMAS, WINDOWS, growth, growth_settings};
+use echolume::thesis_tables::measure::{TableOptions, run, scene};
 use echolume::thesis_tables::sweep::{BALL_RADIUS, frames, surface_depth};
-use echolume::thesis_tables::window_growth::{Growth, SIGMAS, WINDOWS};
-use echolume::thesis_tables::{Conditions, Filter3d, markdown, tables};
+use echolume::thesis_tables::{Conditions, Filter3d, export, tables};
 
 fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
     let steps = plan.steps.iter().filter(|s| (s.pass.stage == Stage::Preprocess) == first);
@@ -108,7 +108,7 @@ fn rays_meet_the_surface_where_the_body_has_it() {
 fn a_quick_run_fills_every_row() {
     let _alone = alone();
     let context = device();
-    let asked = Asked { quick: true, repeats: 2, warm_up: 1 };
+    let asked = TableOptions { quick: true, repeats: 2, warm_up: 1 };
     let mut volumes = 0;
     let report = run(&context, &asked, &mut || volumes += 1).expect("run");
     assert_eq!((volumes, asked.volumes()), (18 * 3, 18 * 3));
@@ -121,7 +121,7 @@ fn a_quick_run_fills_every_row() {
         let met = row.reached.expect("rays");
         assert!(met.share > 0.99 && (60.0..110.0).contains(&met.depth), "{}: {met:?}", row.label);
     }
-    let markdown = markdown::markdown(&report);
+    let markdown = export::markdown(&report);
     assert!(markdown.contains("- quick:") && markdown.contains(report.device.name.as_str()), "{markdown}");
 }
 
@@ -139,8 +139,8 @@ fn growth_is_the_reference_s() {
     assert!(WINDOWS.iter().flatten().all(|w| *w <= MAX_WINDOW));
     let frame = Texels { size: [40, 32, 1], channels: 1, values: grey.shares() };
     for row in &grown.rows {
-        let scene = echolume::thesis_tables::measure_growth::scene(&grey, growth_settings(row.sigma, row.windows))
-            .expect("scene");
+        let scene =
+            echolume::thesis_tables::growth::scene_of(&grey, growth_settings(row.sigma, row.windows)).expect("scene");
         let slots = reference::render(&scene, std::slice::from_ref(&frame));
         let reference = Growth::new(row.sigma, row.windows, &slots[&Slot::Growth].values);
         // A pixel whose count is decided by rounding may stop a ring earlier or later.

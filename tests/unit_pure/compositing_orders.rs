@@ -1,7 +1,6 @@
 //! Orders of the compositing rules in f64, and what spoils them.
 
-use echolume::error_report::analytic::{Field, Flaw, NONE, errors, steps};
-use echolume::error_report::orders::{Fit, Range, fit};
+use echolume::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps};
 use echolume::passes::raycast::composite::Rule;
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];

@@ -2,10 +2,11 @@
 
 use crate::common::files::data;
 use echolume::error_report::choose::{cheapest_under, most_accurate_under};
+use echolume::error_report::convergence::{Range, fit};
 use echolume::error_report::metrics::{distances, normals, pictures};
-use echolume::error_report::orders::{Range, fit};
-use echolume::error_report::pareto_front::{front, of_report};
-use echolume::error_report::{Dial, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, plot};
+use echolume::error_report::{
+    Dial, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, export, pareto_front, plot,
+};
 use echolume::passes::{MISS, Texels};
 use proptest::prelude::*;
 
@@ -131,8 +132,8 @@ fn angles_between_normals_keep_their_digits() {
 #[test]
 fn ties_stay_on_the_front_in_the_order_given() {
     let points = [[2.0, 1.0], [1.0, 3.0], [2.0, 1.0], [3.0, 1.0], [1.0, 4.0], [f64::NAN, 0.0], [4.0, 0.5]];
-    assert_eq!(front(&points), [1, 0, 2, 6]);
-    assert_eq!(front(&[]), [0usize; 0]);
+    assert_eq!(pareto_front(&points), [1, 0, 2, 6]);
+    assert_eq!(pareto_front(&[]), [0usize; 0]);
 }
 
 proptest! {
@@ -144,7 +145,7 @@ proptest! {
         let mut wanted: Vec<usize> =
             (0..pairs.len()).filter(|i| !pairs.iter().any(|other| beats(other, &pairs[*i]))).collect();
         wanted.sort_by(|a, b| pairs[*a][0].total_cmp(&pairs[*b][0]).then(a.cmp(b)));
-        prop_assert_eq!(front(&pairs), wanted);
+        prop_assert_eq!(pareto_front(&pairs), wanted);
     }
 
     /// Against every combination: no cheaper one is as accurate, no more accurate one as fast.
@@ -262,7 +263,7 @@ fn a_report_survives_its_file_and_others_are_refused() {
 
 #[test]
 fn a_table_has_every_point_under_its_names() {
-    let csv = small().to_csv();
+    let csv = export::csv(&small());
     // Quotes of fields as RFC 4180 has them.
     assert!(csv.contains("\"Device <1>, \"\"quoted\"\"\",driver & 2.0"), "{csv}");
     let plain = csv.replace("\"Device <1>, \"\"quoted\"\"\"", "Device");
@@ -279,7 +280,7 @@ fn a_table_has_every_point_under_its_names() {
     // A step of 1 is the fastest, 8 bits next; 16 bits beat the default step in error, 32 bits the finest step in both.
     let on_front: Vec<&str> = (1..7).map(|r| cell(r, "on_front")).collect();
     assert_eq!(on_front, ["true", "false", "false", "true", "true", "true"]);
-    assert_eq!(of_report(&small(), Measure::Rmse), [(0, 0), (1, 0), (1, 1), (1, 2)]);
+    assert_eq!(small().pareto_front(Measure::Rmse), [(0, 0), (1, 0), (1, 1), (1, 2)]);
 }
 
 #[test]

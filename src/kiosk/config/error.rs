@@ -1,6 +1,7 @@
 //! Errors in the configuration: each names the file, the line, the key and the values that are allowed there.
 
-use crate::scene::load::{line_of, plain};
+use crate::scene::load::line_of;
+use crate::text::printable;
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ impl ConfigError {
             Some((end, _)) => format!("{} ...", &text[..end]),
             None => text.to_string(),
         };
-        ConfigError { path: path.into(), line, key: short(&plain(key)), fault: short(&plain(fault)) }
+        ConfigError { path: path.into(), line, key: short(&printable(key)), fault: short(&printable(fault)) }
     }
 
     /// The key at fault, such as `display.scale`; empty where it is the file itself.
@@ -40,7 +41,7 @@ impl ConfigError {
 
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: ", plain(&self.path.display().to_string()))?;
+        write!(f, "{}: ", printable(&self.path.display().to_string()))?;
         if let Some(line) = self.line {
             write!(f, "line {line}: ")?;
         }

@@ -264,7 +264,7 @@ impl Config {
     /// # Errors
     /// One line: a path that is not UTF-8.
     pub fn to_toml(&self) -> Result<String, String> {
-        toml::to_string(self).map_err(|e| load::plain(&e.to_string()))
+        toml::to_string(self).map_err(|e| crate::text::printable(&e.to_string()))
     }
 
     /// What is to be drawn: the presets and the scene, over the phantom's own preset where that is the source.

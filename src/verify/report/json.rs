@@ -1,7 +1,7 @@
 //! Runs as JSON, which comes back as it went but for its pictures.
 
-use super::numbers::plain;
 use super::{FORMAT, Figure, Outcome, Run, VerifyError, Worst};
+use crate::text::escaped;
 use serde::Deserialize;
 use std::collections::HashSet;
 
@@ -16,7 +16,7 @@ pub const MOST_SAMPLES: usize = 100_000;
 /// One line: [`Run::check`] refuses it.
 pub fn to_json(run: &Run) -> Result<String, VerifyError> {
     run.check()?;
-    let mut text = serde_json::to_string_pretty(run).map_err(|e| VerifyError::Json(plain(&e.to_string())))?;
+    let mut text = serde_json::to_string_pretty(run).map_err(|e| VerifyError::Json(escaped(&e.to_string())))?;
     text.push('\n');
     Ok(text)
 }
@@ -31,10 +31,10 @@ pub fn from_json(text: &str) -> Result<Run, VerifyError> {
     struct Version {
         format: String,
     }
-    let fault = |e: serde_json::Error| VerifyError::Json(plain(&e.to_string()));
+    let fault = |e: serde_json::Error| VerifyError::Json(escaped(&e.to_string()));
     let version: Version = serde_json::from_str(text).map_err(fault)?;
     if version.format != FORMAT {
-        return Err(VerifyError::Format { found: plain(&version.format) });
+        return Err(VerifyError::Format { found: escaped(&version.format) });
     }
     let run: Run = serde_json::from_str(text).map_err(fault)?;
     run.check()?;
@@ -52,7 +52,7 @@ impl Run {
     /// One line: the first field that is not so.
     pub fn check(&self) -> Result<(), VerifyError> {
         if self.format != FORMAT {
-            return Err(VerifyError::Format { found: plain(&self.format) });
+            return Err(VerifyError::Format { found: escaped(&self.format) });
         }
         self.fault().map_or(Ok(()), |(field, fault)| Err(VerifyError::Contents { field, fault }))
     }
@@ -93,9 +93,9 @@ fn outcome_fault(outcome: &Outcome) -> Option<String> {
     let mut names = HashSet::new();
     let figure = |figure: &Figure| {
         if !names.insert(figure.what.clone()) {
-            return Some(format!("figure '{}' is there twice", plain(&figure.what)));
+            return Some(format!("figure '{}' is there twice", escaped(&figure.what)));
         }
-        figure_fault(figure).map(|fault| format!("figure '{}' {fault}", plain(&figure.what)))
+        figure_fault(figure).map(|fault| format!("figure '{}' {fault}", escaped(&figure.what)))
     };
     let worst = |worst: &Worst| {
         let Worst { beyond, texels, .. } = worst;

@@ -1,8 +1,9 @@
 //! A run as JUnit XML, which CI systems read: a suite a group, a case a check.
 
 use super::baseline::Compared;
-use super::numbers::{of_allowed, plain};
+use super::numbers::of_allowed;
 use super::{Outcome, Run, Verdict, words};
+use crate::text::escaped;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::time::Duration;
 
@@ -20,7 +21,7 @@ pub fn junit(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
     if let Some(compared) = compared {
         report.add_test_suite(baseline(run, compared));
     }
-    report.to_string().map_err(|e| format!("JUnit XML: {}", plain(&e.to_string())))
+    report.to_string().map_err(|e| format!("JUnit XML: {}", escaped(&e.to_string())))
 }
 
 /// None of what is no time.
@@ -30,16 +31,16 @@ fn duration(seconds: f64) -> Option<Duration> {
 
 /// An empty suite that says what it ran on: readers show suites by themselves.
 fn suite_on(run: &Run, name: &str) -> TestSuite {
-    let mut suite = TestSuite::new(plain(name));
+    let mut suite = TestSuite::new(escaped(name));
     suite.timestamp = run.date.parse().ok();
     let properties = [
-        ("device", plain(&run.device.name)),
-        ("driver", plain(&run.device.driver)),
-        ("api", plain(&run.device.api)),
-        ("program", plain(&run.program)),
+        ("device", escaped(&run.device.name)),
+        ("driver", escaped(&run.device.driver)),
+        ("api", escaped(&run.device.api)),
+        ("program", escaped(&run.program)),
         ("level", run.level.word().into()),
         ("validation", run.validation.to_string()),
-        ("date", plain(&run.date)),
+        ("date", escaped(&run.date)),
     ];
     suite.add_properties(properties.iter().map(|(name, value)| (*name, value.as_str())));
     suite
@@ -57,7 +58,7 @@ fn case(outcome: &Outcome) -> TestCase {
         Verdict::Passed => TestCaseStatus::success(),
         Verdict::Failed => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            let first = outcome.faults.first().map_or_else(|| "failed".into(), |fault| plain(&fault.what));
+            let first = outcome.faults.first().map_or_else(|| "failed".into(), |fault| escaped(&fault.what));
             let more = match outcome.faults.len() {
                 0 | 1 => String::new(),
                 count => format!(" (and {} more)", count - 1),
@@ -67,17 +68,17 @@ fn case(outcome: &Outcome) -> TestCase {
         }
         Verdict::LeftOut => {
             let mut status = TestCaseStatus::skipped();
-            let why: Vec<String> = outcome.notes.iter().map(|note| plain(note)).collect();
+            let why: Vec<String> = outcome.notes.iter().map(|note| escaped(note)).collect();
             status.set_message(if why.is_empty() { "left out".into() } else { why.join("; ") });
             status
         }
     };
-    let mut case = TestCase::new(plain(&outcome.name), status);
-    case.set_classname(plain(&outcome.group));
+    let mut case = TestCase::new(escaped(&outcome.name), status);
+    case.set_classname(escaped(&outcome.group));
     case.time = duration(outcome.seconds);
-    let figures = outcome.figures.iter().map(|f| format!("{}: {}", plain(&f.what), of_allowed(f)));
+    let figures = outcome.figures.iter().map(|f| format!("{}: {}", escaped(&f.what), of_allowed(f)));
     // The notes of what was left out are its message.
-    let notes = outcome.notes.iter().filter(|_| outcome.verdict != Verdict::LeftOut).map(|note| plain(note));
+    let notes = outcome.notes.iter().filter(|_| outcome.verdict != Verdict::LeftOut).map(|note| escaped(note));
     let lines: Vec<String> = figures.chain(notes).collect();
     if !lines.is_empty() {
         case.set_system_out(lines.join("\n"));

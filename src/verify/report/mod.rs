@@ -8,8 +8,8 @@ pub mod junit;
 pub mod numbers;
 pub mod words;
 
+use crate::machine::Device;
 use crate::picture::Picture;
-use crate::profile::Device;
 use crate::profile::statistics::{Sample, SampleError};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -244,7 +244,7 @@ impl Outcome {
 
     /// Group and name, as one would ask for it.
     pub fn title(&self) -> String {
-        format!("{} / {}", numbers::plain(&self.group), numbers::plain(&self.name))
+        format!("{} / {}", crate::text::escaped(&self.group), crate::text::escaped(&self.name))
     }
 }
 

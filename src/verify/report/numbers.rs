@@ -2,29 +2,10 @@
 
 use super::{Figure, Unit};
 
-/// Bytes of a text that are shown: a name or message may come from a file.
-const LONGEST: usize = 600;
-
 /// Significant digits.
 const DIGITS: usize = 3;
 /// With so many every f64 is told from its neighbour.
 const MOST_DIGITS: usize = 17;
-
-/// One line of bounded length that cannot write to a terminal: control characters and other invisible ones as escapes.
-pub fn plain(text: &str) -> String {
-    let mut line = String::new();
-    for c in text.chars() {
-        if line.len() >= LONGEST {
-            line.push_str(" ...");
-            break;
-        }
-        match c {
-            '\'' | '"' | '\\' => line.push(c),
-            _ => line.extend(c.escape_debug()),
-        }
-    }
-    line
-}
 
 /// To three significant digits; very large and very small ones with a power of ten.
 pub fn number(value: f64) -> String {

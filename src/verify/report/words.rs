@@ -1,8 +1,9 @@
 //! What a run found, as text for a terminal.
 
 use super::baseline::{Class, Compared};
-use super::numbers::{expected_and_got, number, of_allowed, percent, plain, seconds};
+use super::numbers::{expected_and_got, number, of_allowed, percent, seconds};
 use super::{Fault, Outcome, Run, Verdict, Worst};
+use crate::text::escaped;
 use std::fmt::Write as _;
 
 /// Changes of a kind that a terminal is given, but for those that fail the run.
@@ -12,12 +13,12 @@ const MOST_CHANGES: usize = 40;
 pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
     let mut line =
-        format!("{:<18} {}", plain(group), counts([Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(count)));
+        format!("{:<18} {}", escaped(group), counts([Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(count)));
     let _ = write!(line, " in {}", seconds(outcomes.iter().map(|o| o.seconds).sum()));
     let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
     let used = passed.filter_map(|o| Some((o, o.tightest()?.used()?))).filter(|(_, used)| *used > 0.0);
     if let Some((outcome, used)) = used.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
-        let _ = write!(line, "; nearest to its tolerance: {}, {}", plain(&outcome.name), percent(used));
+        let _ = write!(line, "; nearest to its tolerance: {}, {}", escaped(&outcome.name), percent(used));
     }
     line
 }
@@ -34,16 +35,16 @@ fn counts(of: [usize; 3]) -> String {
 pub fn failure(outcome: &Outcome) -> String {
     let mut text = format!("{}: {}\n", outcome.title(), outcome.verdict.word());
     for fault in &outcome.faults {
-        let _ = writeln!(text, "  {}", plain(&fault.what));
+        let _ = writeln!(text, "  {}", escaped(&fault.what));
         for (name, value) in fault_items(fault) {
             let _ = writeln!(text, "    {name}: {value}");
         }
     }
     for figure in outcome.figures.iter().filter(|f| f.used().is_some_and(|used| used > 1.0)) {
-        let _ = writeln!(text, "  {}: {}", plain(&figure.what), of_allowed(figure));
+        let _ = writeln!(text, "  {}: {}", escaped(&figure.what), of_allowed(figure));
     }
     for note in &outcome.notes {
-        let _ = writeln!(text, "  {}", plain(note));
+        let _ = writeln!(text, "  {}", escaped(note));
     }
     text
 }
@@ -51,9 +52,9 @@ pub fn failure(outcome: &Outcome) -> String {
 /// What is known of a fault beside what it is, names first; all on one line each.
 pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
     let mut items = Vec::new();
-    items.extend(fault.pass.as_deref().map(|pass| ("pass", plain(pass))));
+    items.extend(fault.pass.as_deref().map(|pass| ("pass", escaped(pass))));
     if !fault.input.is_empty() {
-        items.push(("input", plain(&fault.input)));
+        items.push(("input", escaped(&fault.input)));
     }
     if let Some(worst) = &fault.worst {
         let [expected, got] = expected_and_got(worst.expected, worst.got);
@@ -63,7 +64,7 @@ pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
         items.push(("beyond tolerance", beyond(worst)));
     }
     if !fault.files.is_empty() {
-        items.push(("files", fault.files.iter().map(|f| plain(f)).collect::<Vec<_>>().join(", ")));
+        items.push(("files", fault.files.iter().map(|f| escaped(f)).collect::<Vec<_>>().join(", ")));
     }
     items
 }
@@ -71,7 +72,7 @@ pub(super) fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
 /// Where the worst texel lies.
 fn place(worst: &Worst) -> String {
     let [x, y, z] = worst.at;
-    format!("at ({x}, {y}, {z}) of {}, channel {}", plain(&worst.output), worst.channel)
+    format!("at ({x}, {y}, {z}) of {}, channel {}", escaped(&worst.output), worst.channel)
 }
 
 fn beyond(worst: &Worst) -> String {
@@ -89,9 +90,9 @@ pub fn summary(run: &Run) -> String {
         run.count(Verdict::Failed),
         run.count(Verdict::LeftOut),
         seconds(run.seconds),
-        plain(&device.name),
-        plain(&device.driver),
-        plain(&device.api),
+        escaped(&device.name),
+        escaped(&device.driver),
+        escaped(&device.api),
         run.level.word(),
     )
 }

@@ -5,7 +5,7 @@ mod figures;
 mod refusals;
 
 use crate::common::program::{self, *};
-use echolume::picture::grey::Grey;
+use echolume::picture::Grey;
 use std::fs;
 use std::process::Command;
 

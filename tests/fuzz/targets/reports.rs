@@ -1,9 +1,9 @@
 //! What an earlier run wrote, and ordinary pictures.
 
 use super::{told, written};
-use echolume::error_report::{Measure, Report, choose, summary_table};
-use echolume::picture::grey::Grey;
-use echolume::profile::{compare, formats, table as passes};
+use echolume::error_report::{Measure, Report, choose, export as error_export};
+use echolume::picture::Grey;
+use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
 use echolume::ui::quality_ladder;
 use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
@@ -17,7 +17,7 @@ pub fn error_report(bytes: &[u8]) -> String {
     assert_eq!(Report::from_json(&written).expect("what was written is right"), report);
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
-        summary_table::table(&report, measure);
+        error_export::summary_table(&report, measure);
         outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
         outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
     }
@@ -25,21 +25,21 @@ pub fn error_report(bytes: &[u8]) -> String {
     let rungs = 0;
     #[cfg(feature = "view")]
     let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
-    format!("{} {rungs} {}", outcome.len(), report.to_csv().len())
+    format!("{} {rungs} {}", outcome.len(), error_export::csv(&report).len())
 }
 
 pub fn profile(bytes: &[u8]) -> String {
-    let profile = match formats::from_json(&String::from_utf8_lossy(bytes)) {
+    let profile = match Profile::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(profile) => profile,
         Err(error) => return told(error),
     };
-    let written = formats::to_json(&profile).expect("it was checked");
-    assert_eq!(formats::from_json(&written).expect("what was written is right"), profile);
-    let _ = (formats::csv(&profile), formats::csv_samples(&profile), passes::profile(&profile));
-    match compare::compare(&profile, &profile, &compare::Options::default()) {
+    let written = profile.to_json().expect("it was checked");
+    assert_eq!(Profile::from_json(&written).expect("what was written is right"), profile);
+    let _ = (export::csv(&profile), export::csv_samples(&profile), export::profile_table(&profile));
+    match compare::compare(&profile, &profile, &compare::CompareOptions::default()) {
         Ok(compared) => {
             assert_eq!(compared.regressions().count(), 0, "it is no slower than itself");
-            passes::comparison(&compared)
+            export::comparison_table(&compared)
         }
         Err(error) => error.to_string(),
     }

@@ -1,13 +1,14 @@
 //! Comparisons of simulated runs: how often identical ones are called different, and whether differences are found.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::profile::compare::{CompareError, Comparison, Kind, Line, Options, Verdict, compare};
-use echolume::profile::{Profile, table};
+use echolume::profile::Profile;
+use echolume::profile::compare::{CompareError, CompareOptions, Comparison, Kind, Line, Verdict, compare};
+use echolume::profile::export::comparison_table;
 
 const PAIRS: u32 = 400;
 
 fn compared(old: &Profile, new: &Profile) -> Comparison {
-    compare(old, new, &Options::default()).unwrap_or_else(|e| panic!("{e}"))
+    compare(old, new, &CompareOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn line<'a>(comparison: &'a Comparison, name: &str) -> &'a Line {
@@ -125,10 +126,10 @@ fn only_a_pass_or_the_wall_past_the_threshold_is_a_regression() {
     assert_eq!(line(&comparison, "submit").verdict, Verdict::Slower);
     let names: Vec<&str> = comparison.regressions().map(|l| l.name.as_str()).collect();
     assert_eq!(names, ["pass 2"]);
-    let strict = Options { threshold: 1.01, ..Options::default() };
+    let strict = CompareOptions { threshold: 1.01, ..CompareOptions::default() };
     let strict = compare(&old, &new, &strict).expect("comparison");
     assert_eq!(strict.regressions().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["pass 1", "pass 2"]);
-    let text = table::comparison(&comparison);
+    let text = comparison_table(&comparison);
     assert!(text.contains("SLOWER") && text.contains("slower by more than 5.0 %: pass 2\n"), "{text}");
     assert!(text.contains("test: Mann-Whitney on the medians of 6 blocks"), "{text}");
 }
@@ -194,7 +195,7 @@ fn different_work_is_refused_by_name_unless_forced() {
     new.scene = "mode = \"vr\"\n[ray]\nstep = 0.25\nrays = 2\n".into();
     new.sizes.picture = [1024, 512];
     new.input = "sweep.vol".into();
-    let error = compare(&old, &new, &Options::default()).expect_err("different work");
+    let error = compare(&old, &new, &CompareOptions::default()).expect_err("different work");
     let text = error.to_string();
     assert!(matches!(error, CompareError::DifferentWork(_)));
     for part in [
@@ -207,7 +208,7 @@ fn different_work_is_refused_by_name_unless_forced() {
         assert!(text.contains(part), "{part} is not in: {text}");
     }
     assert!(!text.contains("mode"), "{text}");
-    let forced = compare(&old, &new, &Options { force: true, ..Options::default() }).expect("forced");
+    let forced = compare(&old, &new, &CompareOptions { force: true, ..CompareOptions::default() }).expect("forced");
     assert_eq!(forced.notes.len(), 4, "{:?}", forced.notes);
 }
 
@@ -249,12 +250,12 @@ fn a_shift_of_all_passes_is_pointed_out() {
 #[test]
 fn thresholds_that_are_none_and_broken_profiles_are_refused() {
     let good = profile(30);
-    let with = |threshold: f64| compare(&good, &good, &Options { threshold, ..Options::default() });
+    let with = |threshold: f64| compare(&good, &good, &CompareOptions { threshold, ..CompareOptions::default() });
     assert!(with(f64::NAN).is_err() && with(1.0).is_ok());
     let message = with(0.5).expect_err("threshold").to_string();
     assert_eq!(message, "--threshold: 0.5 is not a ratio of at least 1 (1.05 is five percent slower)");
     let mut broken = good.clone();
     broken.wall_ns[3] = f64::NAN;
-    let message = compare(&good, &broken, &Options::default()).expect_err("NaN").to_string();
+    let message = compare(&good, &broken, &CompareOptions::default()).expect_err("NaN").to_string();
     assert_eq!(message, "new profile: wall_ns: time 3 is NaN ns; a time is finite and not below 0");
 }

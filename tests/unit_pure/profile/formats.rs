@@ -1,8 +1,8 @@
 //! Tables, CSV and JSON of a profile.
 
 use super::simulated::{Noise, Random, pass, profile, run};
-use echolume::profile::formats::{csv, csv_samples, from_json, to_json};
-use echolume::profile::{Profile, settings_hash, table};
+use echolume::profile::export::{csv, csv_samples, profile_table};
+use echolume::profile::{Profile, settings_hash};
 
 fn measured() -> Profile {
     let mut profile = run(&mut Random(81), 4, 30, Noise { spread: 0.03, ..Noise::default() });
@@ -32,15 +32,15 @@ fn json_comes_back_as_it_went() {
     odd.device.clocks = None;
     odd.passes[2].name = "quote \" comma , break \n".into();
     for profile in [measured(), odd, without_stamps()] {
-        let text = to_json(&profile).expect("JSON");
-        assert_eq!(from_json(&text).expect("profile"), profile);
+        let text = profile.to_json().expect("JSON");
+        assert_eq!(Profile::from_json(&text).expect("profile"), profile);
     }
 }
 
 #[test]
 fn other_versions_other_files_and_contradictions_are_refused() {
-    let good = to_json(&measured()).expect("JSON");
-    let error = |text: &str| from_json(text).expect_err("refused").to_string();
+    let good = measured().to_json().expect("JSON");
+    let error = |text: &str| Profile::from_json(text).expect_err("refused").to_string();
     let other = good.replace("echolume-profile-2", "echolume-profile-9");
     assert_eq!(
         error(&other),
@@ -54,7 +54,7 @@ fn other_versions_other_files_and_contradictions_are_refused() {
     let broken = |change: fn(&mut Profile)| {
         let mut profile = measured();
         change(&mut profile);
-        to_json(&profile).expect_err("refused").to_string()
+        profile.to_json().expect_err("refused").to_string()
     };
     assert_eq!(broken(|p| p.passes[1].samples_ns.truncate(7)), "pass 1: has 7 times for 30 repeats");
     assert_eq!(broken(|p| p.repeats = 0), "repeats: is 0; at least one picture must be measured");
@@ -70,21 +70,21 @@ fn other_versions_other_files_and_contradictions_are_refused() {
 fn a_profile_of_the_version_before_is_read() {
     let mut before = measured();
     before.cpu_ns.clear();
-    let text = to_json(&before).expect("JSON").replace("echolume-profile-2", "echolume-profile-1");
+    let text = before.to_json().expect("JSON").replace("echolume-profile-2", "echolume-profile-1");
     let without: Vec<&str> = text.lines().filter(|l| !l.contains("\"cpu_ns\"") && !l.contains("\"turn\"")).collect();
     assert_eq!(text.lines().count() - without.len(), 2);
-    assert_eq!(from_json(&without.join("\n")).expect("profile"), before);
+    assert_eq!(Profile::from_json(&without.join("\n")).expect("profile"), before);
 }
 
 #[test]
 fn cpu_time_is_shown_and_written_where_it_is_known() {
     let known = measured();
-    assert!(table::profile(&known).contains("CPU, all threads"));
+    assert!(profile_table(&known).contains("CPU, all threads"));
     assert!(csv(&known).lines().any(|l| l.starts_with("cpu,,cpu,1,30,3000000,")), "{}", csv(&known));
     let unknown = Profile { cpu_ns: Vec::new(), ..measured() };
-    assert!(!table::profile(&unknown).contains("CPU, all threads") && !csv(&unknown).contains("cpu,"));
+    assert!(!profile_table(&unknown).contains("CPU, all threads") && !csv(&unknown).contains("cpu,"));
     let short = Profile { cpu_ns: vec![1.0; 29], ..measured() };
-    assert_eq!(to_json(&short).expect_err("refused").to_string(), "cpu_ns: has 29 times for 30 repeats");
+    assert_eq!(short.to_json().expect_err("refused").to_string(), "cpu_ns: has 29 times for 30 repeats");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn the_table_holds_every_pass_and_its_numbers() {
     profile.passes = vec![pass("volume", times.clone()), pass("tone", times.iter().rev().copied().collect())];
     profile.device_ns = vec![35e6; 30];
     profile.wall_ns = vec![40e6; 30];
-    let text = table::profile(&profile);
+    let text = profile_table(&profile);
     println!("{text}");
     let row = |start: &str| text.lines().find(|l| l.starts_with(start)).unwrap_or_else(|| panic!("{start}: {text}"));
     // Median 15.5 ms; order statistics 10 and 21; 4 MB in 15.5 ms; 8 M filtered samples of 1e11 a second are the nearer roof.
@@ -117,7 +117,7 @@ fn the_table_holds_every_pass_and_its_numbers() {
 
 #[test]
 fn without_time_stamps_no_pass_has_a_time_and_the_host_still_has() {
-    let text = table::profile(&without_stamps());
+    let text = profile_table(&without_stamps());
     assert!(text.contains("this device has no time stamps"), "{text}");
     assert!(!text.contains("pass 0") && !text.contains("passes, sum") && !text.contains("idle between"), "{text}");
     assert!(text.contains("host: submit") && text.contains("wall, submit to idle"), "{text}");
@@ -133,7 +133,7 @@ fn what_is_not_known_or_too_little_is_said() {
     profile.device.is_software = true;
     profile.device.calibrated = false;
     profile.ceilings = None;
-    let text = table::profile(&profile);
+    let text = profile_table(&profile);
     for part in [
         "* 3 repeats are too few for 95 %: the whole range covers 75.0 %",
         "clocks       not known: runs at other clocks",

@@ -1,6 +1,7 @@
 //! Runs whose truth is known.
 
-use echolume::profile::{Acquisition, Ceiling, Ceilings, Device, FORMAT, PassProfile, Profile, Sizes, settings_hash};
+use echolume::machine::Device;
+use echolume::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 
 /// Vigna's splitmix64: the same numbers everywhere.
 pub struct Random(pub u64);

@@ -1,7 +1,8 @@
 //! Expected numbers: scipy 1.17.1 and numpy, in the calls named beside them.
 
-use echolume::profile::ranks::{hodges_lehmann, holm, least_p, mann_whitney, normal_tail};
-use echolume::profile::statistics::{Sample, SampleError, block_medians, drift};
+use echolume::profile::statistics::{
+    Sample, SampleError, block_medians, drift, hodges_lehmann, holm, mann_whitney, min_p, normal_tail,
+};
 
 fn close(got: f64, expected: f64, relative: f64) {
     assert!((got - expected).abs() <= relative * expected.abs(), "{got}, expected {expected}");
@@ -104,7 +105,7 @@ fn mann_whitney_is_scipys() {
     // Apart as far as can be: 2 of C(12, 6) ways.
     let low = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
     check(&low, &low.map(|v| v + 6.0), 0.0, 2.0 / 924.0, true);
-    close(least_p(6), 2.0 / 924.0, 1e-14);
+    close(min_p(6), 2.0 / 924.0, 1e-14);
 }
 
 fn waves() -> (Vec<f64>, Vec<f64>) {

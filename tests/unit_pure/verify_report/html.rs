@@ -3,7 +3,7 @@
 use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
 use echolume::verify::report::baseline::{Options, compare};
 use echolume::verify::report::html::html;
-use echolume::verify::report::{Fault, Figure, Run, Unit, Verdict, numbers};
+use echolume::verify::report::{Fault, Figure, Run, Unit, Verdict};
 use proptest::prelude::*;
 use scraper::{ElementRef, Html, Selector};
 
@@ -202,7 +202,7 @@ proptest! {
         let document = checked(&page(&run, old.as_ref()));
         let names: Vec<String> = all(&document, "table.checks td.name").into_iter().map(|e| e.text().collect()).collect();
         let groups = run.groups();
-        let expected = groups.iter().flat_map(|(_, outcomes)| outcomes.iter().map(|o| numbers::plain(&o.name)));
+        let expected = groups.iter().flat_map(|(_, outcomes)| outcomes.iter().map(|o| echolume::text::escaped(&o.name)));
         prop_assert_eq!(names, expected.collect::<Vec<_>>());
         prop_assert_eq!(all(&document, "article").len(), run.failures().count());
     }

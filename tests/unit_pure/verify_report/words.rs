@@ -1,9 +1,8 @@
 //! Text for the terminal, and the numbers in it.
 
 use super::simulated::{any_run, check, empty, fail, outcome, run};
-use echolume::verify::report::numbers::{
-    amount, change, expected_and_got, number, of_allowed, percent, plain, seconds,
-};
+use echolume::text::escaped;
+use echolume::verify::report::numbers::{amount, change, expected_and_got, number, of_allowed, percent, seconds};
 use echolume::verify::report::{Figure, Outcome, Unit, Verdict, words};
 use proptest::prelude::*;
 
@@ -113,9 +112,9 @@ fn times_become_their_median() {
 
 #[test]
 fn no_text_drives_the_terminal() {
-    assert_eq!(plain("a\u{1b}[2J\n\u{202e}"), "a\\u{1b}[2J\\n\\u{202e}");
-    assert_eq!(plain("'quotes' and \"those\" \\ stay"), "'quotes' and \"those\" \\ stay");
-    assert_eq!(plain(&"x".repeat(5000)).len(), 604);
+    assert_eq!(escaped("a\u{1b}[2J\n\u{202e}"), "a\\u{1b}[2J\\n\\u{202e}");
+    assert_eq!(escaped("'quotes' and \"those\" \\ stay"), "'quotes' and \"those\" \\ stay");
+    assert_eq!(escaped(&"x".repeat(5000)).len(), 604);
 }
 
 proptest! {

@@ -1,8 +1,9 @@
 //! Errors and counts of two runs: which grew, which shrank.
 
 use super::{Change, Class, Pair};
+use crate::text::escaped;
 use crate::verify::report::Unit;
-use crate::verify::report::numbers::{amount, change, plain};
+use crate::verify::report::numbers::{amount, change};
 
 /// By what share an error must differ to be told.
 const SHARE: f64 = 0.01;
@@ -46,7 +47,7 @@ fn value(pair: &Pair) -> Option<Change> {
         (true, false) => format!(", now under {}", bare(allowed, unit)),
     };
     let allowed = pair.new.allowed.map_or_else(String::new, still);
-    let what = plain(&pair.new.what);
+    let what = escaped(&pair.new.what);
     Some(Change::new(class, pair.of, format!("{what} {}{allowed}", change(old, new, unit))))
 }
 
@@ -69,5 +70,5 @@ fn tolerance(pair: &Pair) -> Option<Change> {
             format!("{} -> {}", word(old), word(new))
         }
     };
-    Some(Change::new(Class::Changed, pair.of, format!("{}: allowed {told}", plain(&pair.new.what))))
+    Some(Change::new(Class::Changed, pair.of, format!("{}: allowed {told}", escaped(&pair.new.what))))
 }

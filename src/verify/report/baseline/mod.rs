@@ -4,8 +4,8 @@
 mod errors;
 mod times;
 
-use super::numbers::plain;
 use super::{Figure, Outcome, Run, Verdict};
+use crate::text::escaped;
 use std::collections::{HashMap, HashSet};
 use std::fmt::{Display, Formatter};
 
@@ -78,7 +78,7 @@ impl Change {
 
 impl Display for Change {
     fn fmt(&self, to: &mut Formatter) -> std::fmt::Result {
-        write!(to, "{} / {}: {}", plain(&self.group), plain(&self.name), self.what)
+        write!(to, "{} / {}: {}", escaped(&self.group), escaped(&self.name), self.what)
     }
 }
 
@@ -199,7 +199,7 @@ fn arrived(outcome: &Outcome, same_level: bool) -> Option<Change> {
 fn reason(outcome: &Outcome) -> String {
     let fault = outcome.faults.first().map(|f| &f.what);
     let note = outcome.notes.first().filter(|_| outcome.verdict == Verdict::LeftOut);
-    fault.or(note).map_or_else(String::new, |what| format!(": {}", plain(what)))
+    fault.or(note).map_or_else(String::new, |what| format!(": {}", escaped(what)))
 }
 
 fn verdict(old: &Outcome, new: &Outcome) -> Option<Change> {
@@ -217,7 +217,7 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
     let mut changes = Vec::new();
     let both_passed = [old.verdict, new.verdict] == [Verdict::Passed; 2];
     let mut told = |figure: &Figure, what: &str| {
-        changes.push(Change::new(Class::Changed, new, format!("{}: {what}", plain(&figure.what))));
+        changes.push(Change::new(Class::Changed, new, format!("{}: {what}", escaped(&figure.what))));
     };
     for figure in new.figures.iter().filter(|f| !f.fleeting) {
         match old.figures.iter().find(|f| f.what == figure.what) {
@@ -236,13 +236,13 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
 }
 
 fn described(run: &Run) -> String {
-    let parts = [&run.date, &run.program, &run.device.name, &run.device.driver].map(|part| plain(part));
+    let parts = [&run.date, &run.program, &run.device.name, &run.device.driver].map(|part| escaped(part));
     let [date, program, device, driver] = parts;
     format!("the run of {date} ({program}, {}) on {device}, {driver}", run.level.word())
 }
 
 fn differences(old: &Run, new: &Run) -> Vec<String> {
-    let of = |what: fn(&Run) -> String| [old, new].map(|run| plain(&what(run)));
+    let of = |what: fn(&Run) -> String| [old, new].map(|run| escaped(&what(run)));
     let conditions = [
         ("device", of(|r| r.device.name.clone())),
         ("driver", of(|r| r.device.driver.clone())),

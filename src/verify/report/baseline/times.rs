@@ -3,8 +3,8 @@
 use super::{Change, Class, Options, Pair};
 use crate::profile::compare as profile;
 use crate::profile::compare::{Kind, Line, Series, Verdict};
-use crate::profile::judgement;
-use crate::verify::report::numbers::{change, number, plain};
+use crate::text::escaped;
+use crate::verify::report::numbers::{change, number};
 use crate::verify::report::{Figure, Run, Unit};
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ pub(super) fn judged(pairs: &[Pair], runs: [&Run; 2], options: &Options) -> Judg
         return Judged::default();
     }
     let both = times.iter().filter(|p| !usable(p.old).is_empty() && !usable(p.new).is_empty()).count();
-    let blocks = judgement::blocks(both, ALPHA);
+    let blocks = profile::blocks_needed(both, ALPHA);
     let tick = runs[0].device.timestamp_period_ns.max(runs[1].device.timestamp_period_ns);
     let series = |figure| Some(Series { stage: "", runs: 1, times: usable(figure) });
     let lines = times.iter().map(|p| profile::Pair {
@@ -33,8 +33,8 @@ pub(super) fn judged(pairs: &[Pair], runs: [&Run; 2], options: &Options) -> Judg
         old: series(p.old),
         new: series(p.new),
     });
-    let criteria = profile::Options { threshold: options.threshold(), alpha: ALPHA, force: true };
-    let lines = match judgement::lines(lines.collect(), blocks, tick, &criteria) {
+    let criteria = profile::CompareOptions { threshold: options.threshold(), alpha: ALPHA, force: true };
+    let lines = match profile::judge(lines.collect(), blocks, tick, &criteria) {
         Ok(lines) => lines,
         Err(fault) => return Judged { changes: Vec::new(), notes: vec![format!("times are not compared: {fault}")] },
     };
@@ -49,7 +49,7 @@ pub(super) fn judged(pairs: &[Pair], runs: [&Run; 2], options: &Options) -> Judg
     }
     found.notes.extend(because.map(|why| format!("{why}: times are told, and fail nothing")));
     found.notes.extend(left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}")));
-    found.notes.extend(judgement::common_shift(&lines));
+    found.notes.extend(profile::common_shift(&lines));
     found
 }
 
@@ -86,7 +86,7 @@ fn told(pair: &Pair, line: &Line, options: &Options, is_only_told: bool) -> Opti
     };
     let what = format!(
         "{} {} % {word} ({:.2}..{:.2}), {medians}{under}",
-        plain(&pair.new.what),
+        escaped(&pair.new.what),
         rounded(100.0 * share),
         ratio.low,
         ratio.high

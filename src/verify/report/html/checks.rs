@@ -2,7 +2,8 @@
 
 use super::pictures::Album;
 use super::{OPEN, badge};
-use crate::verify::report::numbers::{of_allowed, percent, plain, seconds};
+use crate::text::escaped;
+use crate::verify::report::numbers::{of_allowed, percent, seconds};
 use crate::verify::report::words::fault_items;
 use crate::verify::report::{Figure, Outcome, Unit, Verdict};
 use maud::{Markup, html};
@@ -16,7 +17,7 @@ pub fn failure(outcome: &Outcome, album: &mut Album) -> Markup {
             h3 { (outcome.title()) " " (badge(outcome.verdict)) }
             @if outcome.faults.is_empty() { p { "No reason was given." } }
             @for (at, fault) in outcome.faults.iter().enumerate() {
-                p class="fault sentence" { (plain(&fault.what)) }
+                p class="fault sentence" { (escaped(&fault.what)) }
                 @let items = fault_items(fault);
                 @if !items.is_empty() {
                     dl { @for (name, value) in items { div { dt { (name) } dd { (value) } } } }
@@ -27,7 +28,7 @@ pub fn failure(outcome: &Outcome, album: &mut Album) -> Markup {
             @if !errors(outcome).is_empty() {
                 ul class="figures" { @for figure in errors(outcome) { li class="figure" { (measured(figure)) } } }
             }
-            @for note in &outcome.notes { p class="dim" { (plain(note)) } }
+            @for note in &outcome.notes { p class="dim" { (escaped(note)) } }
         }
     }
 }
@@ -41,7 +42,7 @@ fn errors(outcome: &Outcome) -> Vec<&Figure> {
 /// A figure with its tolerance, and how much of that it takes as a bar.
 fn measured(figure: &Figure) -> Markup {
     html! {
-        span class="what" { (plain(&figure.what)) } " "
+        span class="what" { (escaped(&figure.what)) } " "
         span class="value" { (of_allowed(figure)) }
         @if let Some(used) = figure.used() { " " (bar(used)) }
     }
@@ -70,7 +71,7 @@ pub fn group(at: usize, name: &str, outcomes: &[&Outcome], album: &mut Album) ->
         section id={ "group-" (at) } {
             details open[open] {
                 summary {
-                    h2 { (plain(name)) }
+                    h2 { (escaped(name)) }
                     span class="dim" {
                         @for (verdict, count) in counts.iter().filter(|(_, count)| *count > 0) {
                             (count) " " (verdict.word()) ", "
@@ -86,7 +87,7 @@ pub fn group(at: usize, name: &str, outcomes: &[&Outcome], album: &mut Album) ->
                     details class="gallery" {
                         summary { "Pictures of " (shown.len()) @if shown.len() == 1 { " check" } @else { " checks" } " that did not fail" }
                         @for outcome in shown {
-                            h3 { (plain(&outcome.name)) }
+                            h3 { (escaped(&outcome.name)) }
                             @for picture in &outcome.pictures { (album.set(picture)) }
                         }
                     }
@@ -102,7 +103,7 @@ fn row(outcome: &Outcome) -> Markup {
         errors(outcome).into_iter().filter(|f| tightest.is_none_or(|t| !std::ptr::eq(*f, t))).collect();
     html! {
         tr {
-            td class="name" { (plain(&outcome.name)) }
+            td class="name" { (escaped(&outcome.name)) }
             td { (badge(outcome.verdict)) }
             td class="error" {
                 @if let Some(figure) = tightest { div class="figure" { (measured(figure)) } }
@@ -117,7 +118,7 @@ fn row(outcome: &Outcome) -> Markup {
                     }
                 }
                 @if outcome.verdict == Verdict::LeftOut {
-                    @for note in &outcome.notes { div class="dim" { (plain(note)) } }
+                    @for note in &outcome.notes { div class="dim" { (escaped(note)) } }
                 }
             }
             td class="time" { (seconds(outcome.seconds)) }

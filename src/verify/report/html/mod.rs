@@ -5,8 +5,9 @@ mod pictures;
 mod times;
 
 use super::baseline::{Class, Compared};
-use super::numbers::{plain, seconds};
+use super::numbers::seconds;
 use super::{Outcome, Run, Verdict};
+use crate::text::escaped;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use pictures::Album;
 
@@ -23,7 +24,7 @@ pub fn html(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
     let mut album = Album::default();
     let failures: Vec<&Outcome> = run.failures().collect();
     let passed = Verdict::Failed != overall(run, compared);
-    let title = format!("echolume verify: {}, {}", if passed { "passed" } else { "failed" }, plain(&run.device.name));
+    let title = format!("echolume verify: {}, {}", if passed { "passed" } else { "failed" }, escaped(&run.device.name));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -54,7 +55,7 @@ pub fn html(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
                 }
                 footer {
                     @if let Some(note) = album.note() { p { (note) } }
-                    p { "Written by " (plain(&run.program)) "." }
+                    p { "Written by " (escaped(&run.program)) "." }
                 }
             }
         }
@@ -97,12 +98,12 @@ fn head(run: &Run, compared: Option<&Compared>) -> Markup {
     let software = if run.device.is_software { " (software: computes on the CPU)" } else { "" };
     let clocks = run.device.clocks.as_deref();
     let conditions = [
-        ("Device", Some(plain(&run.device.name) + software)),
-        ("Driver", Some(plain(&run.device.driver))),
-        ("Vulkan", Some(plain(&run.device.api))),
-        ("Clocks", clocks.map(plain)),
-        ("Program", Some(plain(&run.program))),
-        ("Date", Some(plain(&run.date))),
+        ("Device", Some(escaped(&run.device.name) + software)),
+        ("Driver", Some(escaped(&run.device.driver))),
+        ("Vulkan", Some(escaped(&run.device.api))),
+        ("Clocks", clocks.map(escaped)),
+        ("Program", Some(escaped(&run.program))),
+        ("Date", Some(escaped(&run.date))),
         ("Level", Some(run.level.word().into())),
         ("Validation layer", Some(if run.validation { "watching" } else { "not watching" }.into())),
     ];
@@ -144,7 +145,7 @@ fn baseline(compared: &Compared) -> Markup {
                     h3 class=(class.word()) { (class.word()) " " span class="dim" { (changes.len()) } }
                     ul class="changes" {
                         @for change in changes {
-                            li { span class="of" { (plain(&change.group)) " / " (plain(&change.name)) } " " span { (change.what) } }
+                            li { span class="of" { (escaped(&change.group)) " / " (escaped(&change.name)) } " " span { (change.what) } }
                         }
                     }
                 }
@@ -163,7 +164,7 @@ fn notes(run: &Run) -> Markup {
     for outcome in &run.outcomes {
         let left_out = outcome.verdict == Verdict::LeftOut;
         let unexplained = (left_out && outcome.notes.is_empty()).then(|| "no reason was given".to_string());
-        for note in outcome.notes.iter().map(|note| plain(note)).chain(unexplained) {
+        for note in outcome.notes.iter().map(|note| escaped(note)).chain(unexplained) {
             let reasons = &mut parts[usize::from(!left_out)].1;
             let place = *places.entry((left_out, note.clone())).or_insert_with(|| {
                 reasons.push((note, Vec::new()));

@@ -1,8 +1,8 @@
 //! Pictures within the page, as many as it can carry.
 
 use crate::picture::Picture;
+use crate::text::escaped;
 use crate::verify::report::Shown;
-use crate::verify::report::numbers::plain;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use maud::{Markup, html};
@@ -31,7 +31,7 @@ impl Album {
             ("expected".to_string(), &shown.expected),
             (format!("difference, {} times", shown.gain), &shown.difference),
         ];
-        let what = plain(&shown.what);
+        let what = escaped(&shown.what);
         if self.sets >= MOST_SETS {
             return self.leave_out(&what);
         }

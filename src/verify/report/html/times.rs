@@ -2,7 +2,8 @@
 
 use crate::profile::LEVEL;
 use crate::profile::statistics::Sample;
-use crate::verify::report::numbers::{amount, plain};
+use crate::text::escaped;
+use crate::verify::report::numbers::amount;
 use crate::verify::report::{Figure, Outcome, Run, Unit};
 use maud::{Markup, html};
 
@@ -22,7 +23,7 @@ pub fn section(run: &Run) -> Markup {
                 p class="dim" { "Medians; the mark at the end of a bar is the interval that covers the true median with a probability of 95 %." }
                 @for (group, times) in groups {
                     @let longest = times.iter().map(|(_, f)| high(f)).fold(0.0, f64::max);
-                    h3 { (plain(group)) }
+                    h3 { (escaped(group)) }
                     table class="times" {
                         tbody { @for (name, figure) in &times { (row(name, figure, longest)) } }
                     }
@@ -47,7 +48,7 @@ fn row(name: &str, figure: &Figure, longest: f64) -> Markup {
     let interval = interval(figure);
     html! {
         tr {
-            td class="name" { (plain(name)) " " span class="dim" { (plain(&figure.what)) } }
+            td class="name" { (escaped(name)) " " span class="dim" { (escaped(&figure.what)) } }
             td {
                 div class="track" {
                     span class="span" style={ "width:" (format!("{:.2}", share(figure.value))) "%" } {}

@@ -1,16 +1,100 @@
-//! Profiles and comparisons as tables for a terminal.
+//! Profiles, comparisons and pass times as text: CSV for other programs, tables for a terminal.
 
 use super::compare::{Comparison, Kind, Line, Verdict};
-use super::formats::medians;
 use super::statistics::{Interval, Sample, drift};
 use super::{Ceiling, LEVEL, PassProfile, Profile};
-use crate::profile::pass_times;
+use crate::passes::{PassTime, by_name};
+use crate::scene::Scene;
 use std::fmt::Write as _;
 
-/// A pass whose halves differ by more is said not to have been steady.
-const STEADY: f64 = 1.05;
+/// A profile as CSV: one line per pass, then the host spans, `device` (first begin to last end), `wall` and `cpu` (of the process,
+/// if the system reports it). Without time stamps the time columns of passes are empty.
+pub fn csv(profile: &Profile) -> String {
+    let mut text = String::from(
+        "kind,stage,name,runs_per_picture,repeats,min_ns,p5_ns,median_ns,p95_ns,max_ns,mad_ns,ci_low_ns,ci_high_ns,\
+         ci_coverage,bytes_read,bytes_written,bytes_per_s,fetches,filtered,invocations,ceiling,share_of_ceiling,share_of_passes\n",
+    );
+    let sum: f64 = medians(&profile.passes).sum();
+    for (kind, list) in [("pass", &profile.passes), ("host", &profile.host)] {
+        for span in list {
+            let sample = span.sample();
+            let roof = profile.ceilings.as_ref().and_then(|c| span.roof(c));
+            let share = sample.as_ref().filter(|_| kind == "pass" && sum > 0.0).map(|s| s.median() / sum);
+            let mut fields =
+                vec![kind.into(), quoted(&span.stage), quoted(&span.name), span.runs_per_picture.to_string()];
+            fields.push(span.samples_ns.len().to_string());
+            fields.extend(time_fields(sample.as_ref()));
+            fields.extend([span.bytes_read, span.bytes_written].map(|n| n.to_string()));
+            fields.push(optional(span.bytes_per_second()));
+            fields.extend(
+                [span.fetches, span.filtered, span.invocations].map(|n| n.map_or_else(String::new, |n| n.to_string())),
+            );
+            fields.push(roof.map_or_else(String::new, |r| r.bound.into()));
+            fields.extend([roof.map(|r| r.share), share].map(optional));
+            let _ = writeln!(text, "{}", fields.join(","));
+        }
+    }
+    for (kind, list) in totals(profile) {
+        let mut fields = vec![kind.to_string(), String::new(), kind.into(), "1".into(), list.len().to_string()];
+        fields.extend(time_fields(Sample::new(list).ok().as_ref()));
+        fields.resize(text.lines().next().map_or(0, |l| l.split(',').count()), String::new());
+        let _ = writeln!(text, "{}", fields.join(","));
+    }
+    text
+}
 
-/// Rows under each other, columns as wide as their widest cell: the first `left` aligned left, the others right.
+/// All samples as CSV: one line per repeat of every pass and span.
+pub fn csv_samples(profile: &Profile) -> String {
+    let mut text = String::from("kind,stage,name,repeat,ns\n");
+    let lists = [("pass", &profile.passes), ("host", &profile.host)];
+    let spans = lists.iter().flat_map(|(kind, list)| {
+        list.iter().map(move |span| (*kind, span.stage.as_str(), span.name.as_str(), &span.samples_ns))
+    });
+    let totals = totals(profile).map(|(name, list)| (name, "", name, list));
+    for (kind, stage, name, samples) in spans.chain(totals) {
+        for (repeat, ns) in samples.iter().enumerate() {
+            let _ = writeln!(text, "{kind},{},{},{repeat},{ns}", quoted(stage), quoted(name));
+        }
+    }
+    text
+}
+
+/// Times that are not of one pass or span.
+fn totals(profile: &Profile) -> impl Iterator<Item = (&'static str, &Vec<f64>)> {
+    let cpu = (!profile.cpu_ns.is_empty()).then_some(("cpu", &profile.cpu_ns));
+    [("device", &profile.device_ns), ("wall", &profile.wall_ns)].into_iter().chain(cpu)
+}
+
+/// Median times of the spans that have times, ns.
+fn medians(spans: &[PassProfile]) -> impl Iterator<Item = f64> {
+    spans.iter().filter_map(|s| s.sample()).map(|s| s.median())
+}
+
+fn time_fields(sample: Option<&Sample>) -> Vec<String> {
+    let Some(sample) = sample else { return vec![String::new(); 9] };
+    let interval = sample.median_interval(LEVEL);
+    let [p5, median, p95] = [0.05, 0.5, 0.95].map(|share| sample.quantile(share));
+    let numbers =
+        [sample.min(), p5, median, p95, sample.max(), sample.mad(), interval.low, interval.high, interval.coverage];
+    numbers.map(|n| n.to_string()).into()
+}
+
+fn optional(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |v| v.to_string())
+}
+
+/// A CSV field (RFC 4180), quoted if it contains a comma, quote or line break.
+fn quoted(field: &str) -> String {
+    match field.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", field.replace('"', "\"\"")),
+        false => field.into(),
+    }
+}
+
+/// Ratio of the medians of the halves of a run above which a pass is reported as not steady.
+const MAX_DRIFT: f64 = 1.05;
+
+/// Rows as text, columns as wide as their widest cell: the first `left` columns left-aligned, the others right-aligned.
 fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
@@ -40,17 +124,17 @@ fn interval(interval: &Interval) -> String {
     format!("{}..{}{mark}", ms(interval.low), ms(interval.high))
 }
 
-/// What was measured where, every pass, what lies between passes and on the host, and what the numbers do not say.
-pub fn profile(profile: &Profile) -> String {
+/// A profile as a table for a terminal: conditions, passes, totals and notes.
+pub fn profile_table(profile: &Profile) -> String {
     let mut text = conditions(profile);
     text.push('\n');
     if profile.has_time_stamps() {
-        text.push_str(&aligned(&passes(profile), 2));
+        text.push_str(&aligned(&pass_rows(profile), 2));
     } else {
         text.push_str("times of passes: not known, this device has no time stamps\n");
     }
     text.push('\n');
-    text.push_str(&aligned(&whole(profile), 1));
+    text.push_str(&aligned(&total_rows(profile), 1));
     for note in notes(profile) {
         let _ = writeln!(text, "{note}");
     }
@@ -110,8 +194,8 @@ fn conditions(profile: &Profile) -> String {
     aligned(&rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect::<Vec<_>>(), 2)
 }
 
-/// A head and one row a pass; columns that no pass fills are left out.
-fn passes(profile: &Profile) -> Vec<Vec<String>> {
+/// A header and one row per pass; columns that are empty for all passes are omitted.
+fn pass_rows(profile: &Profile) -> Vec<Vec<String>> {
     let head = [
         "stage",
         "pass",
@@ -152,8 +236,8 @@ fn passes(profile: &Profile) -> Vec<Vec<String>> {
     rows.iter().map(|row| kept.iter().map(|c| row[*c].clone()).collect()).collect()
 }
 
-/// What is not one pass: the device as a whole, and the host.
-fn whole(profile: &Profile) -> Vec<Vec<String>> {
+/// Times that are not of one pass: totals of the device, and the host.
+fn total_rows(profile: &Profile) -> Vec<Vec<String>> {
     let mut rows = vec![["a picture", "ms", "p5", "p95", "95 % interval", "% of wall"].map(String::from).to_vec()];
     let wall = Sample::new(&profile.wall_ns).ok().map(|s| s.median()).filter(|w| *w > 0.0);
     let mut add = |name: &str, times: &[f64]| {
@@ -189,11 +273,11 @@ fn notes(profile: &Profile) -> Vec<String> {
         }
     }
     let moved = |pass: &&PassProfile| {
-        drift(&pass.samples_ns).ok().flatten().is_some_and(|d| !(1.0 / STEADY..=STEADY).contains(&d))
+        drift(&pass.samples_ns).ok().flatten().is_some_and(|d| !(1.0 / MAX_DRIFT..=MAX_DRIFT).contains(&d))
     };
     let unsteady: Vec<&str> = profile.passes.iter().filter(moved).map(|p| p.name.as_str()).collect();
     if !unsteady.is_empty() {
-        let by = 100.0 * (STEADY - 1.0);
+        let by = 100.0 * (MAX_DRIFT - 1.0);
         notes.push(format!("not steady, halves of the run differ by more than {by:.0} %: {}", unsteady.join(", ")));
     }
     if profile.device.is_software && profile.has_time_stamps() {
@@ -205,15 +289,15 @@ fn notes(profile: &Profile) -> Vec<String> {
                 .into(),
         );
     }
-    notes.extend(profile.acquisition.map(|a| pass_times::floor(a.seconds, a.sound_speed)));
+    notes.extend(profile.acquisition.map(|a| acquisition_floor(a.seconds, a.sound_speed)));
     notes
 }
 
-/// One line a pass, the conditions that differ, the test, and the regressions.
-pub fn comparison(comparison: &Comparison) -> String {
+/// A comparison as a table for a terminal: differing conditions, one line per pass, the test, the regressions.
+pub fn comparison_table(comparison: &Comparison) -> String {
     let head = ["stage", "pass", "old ms", "new ms", "ratio", "95 % interval", "p (Holm)", "noise", "verdict", ""];
     let mut rows = vec![head.map(String::from).to_vec()];
-    rows.extend(comparison.lines.iter().map(compared));
+    rows.extend(comparison.lines.iter().map(comparison_row));
     let mut text = String::new();
     for note in &comparison.notes {
         let _ = writeln!(text, "{note}");
@@ -229,7 +313,7 @@ pub fn comparison(comparison: &Comparison) -> String {
     text
 }
 
-fn compared(line: &Line) -> Vec<String> {
+fn comparison_row(line: &Line) -> Vec<String> {
     let verdict = match line.verdict {
         Verdict::Faster => "faster",
         Verdict::Slower => "SLOWER",
@@ -256,4 +340,33 @@ fn compared(line: &Line) -> Vec<String> {
     });
     row.extend([verdict.to_string(), line.note.clone().unwrap_or_default()]);
     row
+}
+
+/// Pass times of one run as a table: one line per pass, the sum, and the acquisition floor if a probe swept the volume. Without
+/// time stamps no time is printed.
+pub fn pass_time_table(measured: &[PassTime], scene: &Scene) -> String {
+    let mut text = String::new();
+    if measured.is_empty() {
+        text.push_str("times: this device has no time stamps\n");
+    } else {
+        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {:>10}", "stage", "pass", "runs", "ms a run", "ms in all");
+        for time in measured {
+            let stage = by_name(time.name).map_or("", |p| p.stage.name());
+            let all = time.total * 1e-6;
+            let each = all / f64::from(time.runs.max(1));
+            let _ = writeln!(text, "{stage:<12} {:<19} {:>5} {each:>10.3} {all:>10.3}", time.name, time.runs);
+        }
+        let sum = measured.iter().map(|t| t.total).sum::<f64>() * 1e-6;
+        let _ = writeln!(text, "{:<12} {:<19} {:>5} {:>10} {sum:>10.3}", "", "sum", "", "");
+    }
+    if let Some(probe) = scene.probe() {
+        let _ = writeln!(text, "{}", acquisition_floor(probe.acquisition_time(), probe.sound_speed));
+    }
+    text
+}
+
+/// A sentence with the acquisition floor: `seconds` is the travel time of sound for a volume, `sound_speed` in m/s.
+pub fn acquisition_floor(seconds: f64, sound_speed: f64) -> String {
+    let ms = seconds * 1e3;
+    format!("sound itself needs {ms:.1} ms for this volume ({sound_speed} m/s): no display is faster")
 }

@@ -1,22 +1,43 @@
-//! What is known of the machine: device, driver, clocks.
+//! Description of the machine for reports: device, driver, clocks, program, date, and CPU time of the process.
 
 use crate::gpu::Context;
-use crate::profile::Device;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Now, by RFC 3339.
+/// A Vulkan device, as reports describe it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Device {
+    pub name: String,
+    pub driver: String,
+    /// Vulkan version.
+    pub api: String,
+    /// True if it computes on the CPU.
+    pub is_software: bool,
+    /// Period of the device's clock, ns per tick.
+    pub timestamp_period_ns: f64,
+    /// Valid bits of a time stamp; 0 if the queue has none, and then no pass has times.
+    pub valid_bits: u32,
+    /// True if the device's clock is calibrated to the host's, so that both can be drawn on one axis.
+    pub calibrated: bool,
+    /// Description of clocks and power state; None if unknown.
+    pub clocks: Option<String>,
+}
+
+/// The current time, RFC 3339.
 pub fn date() -> String {
     humantime::format_rfc3339_seconds(SystemTime::now()).to_string()
 }
 
-/// Name and version of the program.
+/// Name, version and build of the program.
 pub fn program() -> String {
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
     format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
 }
 
+/// Describes the device of a context.
 pub fn device(context: &Context) -> Device {
     let candidate = &context.candidate;
     Device {
@@ -31,20 +52,20 @@ pub fn device(context: &Context) -> Device {
     }
 }
 
-/// CPU time that each thread of this process has had, user and system, ns by thread.
+/// CPU time of each thread of this process so far, user and system, ns.
 #[derive(Clone, Debug)]
 pub struct CpuTime(BTreeMap<String, u64>);
 
 impl CpuTime {
-    /// Now. None where the system does not tell: it is Linux' /proc/self/task/*/schedstat, whose first number is the time on a
-    /// CPU in ns (/proc/self/stat counts in hundredths of a second). A thread that is running is told up to its last switch,
-    /// so this one yields first.
+    /// Reads the current values; None if the system does not report them. On Linux they are in /proc/self/task/*/schedstat, whose
+    /// first number is the time on a CPU in ns (/proc/self/stat has a resolution of 10 ms only). The value of a running thread is
+    /// updated at context switches, so this thread yields first.
     pub fn now() -> Option<CpuTime> {
         std::thread::yield_now();
         let mut threads = BTreeMap::new();
         for thread in std::fs::read_dir("/proc/self/task").ok()? {
             let thread = thread.ok()?;
-            // One that has just ended has no file any more.
+            // A thread that has just ended has no file.
             let Ok(text) = std::fs::read_to_string(thread.path().join("schedstat")) else { continue };
             let on_cpu = text.split_whitespace().next()?.parse().ok()?;
             threads.insert(thread.file_name().to_string_lossy().into_owned(), on_cpu);
@@ -52,15 +73,15 @@ impl CpuTime {
         (!threads.is_empty()).then_some(CpuTime(threads))
     }
 
-    /// ns of all threads since then. What a thread did that has ended is lost; drivers keep theirs.
+    /// CPU time of all threads since `then`, ns. Time of threads that have ended is lost; drivers keep theirs alive.
     pub fn since(&self, then: &CpuTime) -> f64 {
         let of = |(name, now): (&String, &u64)| now.saturating_sub(then.0.get(name).copied().unwrap_or(0));
         self.0.iter().map(of).sum::<u64>() as f64
     }
 }
 
-/// What the system tells of clocks and power without privileges: of the processor for a software device, of the first display
-/// device that says something otherwise.
+/// Clocks and power state that the system reports without privileges: of the processor for a software device, otherwise of the
+/// first display device that reports any.
 fn clocks(is_software: bool) -> Option<String> {
     let read = |path: &Path| std::fs::read_to_string(path).ok().map(|text| text.trim().to_string());
     let mut known = Vec::new();
@@ -91,28 +112,28 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
-    fn what_a_thread_works_is_counted_as_its_own() {
+    fn cpu_time_is_attributed_to_the_thread_that_used_it() {
         if !Path::new("/proc/self/task").exists() {
             assert!(CpuTime::now().is_none());
             return;
         }
         let (go, wait) = mpsc::channel::<()>();
-        let (tell, told) = mpsc::channel::<String>();
+        let (report, reported) = mpsc::channel::<String>();
         let worker = std::thread::spawn(move || {
             let own = std::fs::read_link("/proc/thread-self").unwrap();
             let own = own.file_name().unwrap().to_string_lossy().into_owned();
-            tell.send(own.clone()).unwrap();
+            report.send(own.clone()).unwrap();
             wait.recv().unwrap();
             let product = (0..3_000_000).fold(1.0f64, |x, _| std::hint::black_box(x * 1.000_000_1));
             assert!(product > 1.0);
-            tell.send(own).unwrap();
-            // Alive until it has been looked at: what has ended is told no more.
+            report.send(own).unwrap();
+            // Stay alive until it has been read: ended threads are not reported.
             wait.recv().unwrap();
         });
-        let name = told.recv().unwrap();
+        let name = reported.recv().unwrap();
         let then = CpuTime::now().expect("Linux tells");
         go.send(()).unwrap();
-        told.recv().unwrap();
+        reported.recv().unwrap();
         let now = CpuTime::now().expect("Linux tells");
         let own = now.0[&name] - then.0[&name];
         assert!(own > 0, "the thread that worked had no time");

@@ -1,10 +1,54 @@
-//! A report of errors as text, one line a place of a dial.
+//! An error report as text: CSV for other programs, a summary table for a terminal.
 
-use super::{Measure, Reference, Report};
+use super::metrics::SurfaceError;
+use super::{Measure, Reference, Report, Time};
 use std::fmt::Write as _;
 
+/// One line a point after a line of names (RFC 4180). What does not apply is empty; times are in ms. `on_front`: no other
+/// point of the report has both a smaller RMSE and a shorter time.
+pub fn csv(report: &Report) -> String {
+    let front = report.pareto_front(Measure::Rmse);
+    let mut text = String::from(
+        "dial,unit,value,label,set,default,rmse,max,psnr_db,ssim,mm_rms,mm_median,mm_p95,mm_max,mm_false_hits,mm_missed_hits,\
+         deg_rms,deg_median,deg_p95,deg_max,deg_false_hits,deg_missed_hits,time_ms,time_low_ms,time_high_ms,on_front,\
+         reference,reference_rmse,device,driver,date,repeats\r\n",
+    );
+    for (d, dial) in report.dials.iter().enumerate() {
+        for (p, point) in dial.points.iter().enumerate() {
+            let (e, number) = (&point.errors, |v: Option<f64>| v.map_or(String::new(), |v| v.to_string()));
+            let mut row = vec![dial.name.clone(), dial.unit.clone(), point.value.to_string(), point.label.clone()];
+            row.extend([point.set.join("; "), point.is_default.to_string()]);
+            row.extend([Some(e.rmse), Some(e.max), e.psnr, e.ssim].map(number));
+            for surface in [e.mm, e.degrees] {
+                let spread = surface.and_then(|s| s.error);
+                row.extend([spread.map(|s| s.rms), spread.map(|s| s.median)].map(number));
+                row.extend([spread.map(|s| s.p95), spread.map(|s| s.max)].map(number));
+                row.extend([surface.map(|s| s.false_hits), surface.map(|s| s.missed_hits)].map(number));
+            }
+            let ms = |of: fn(&Time) -> f64| number(point.time.as_ref().map(|t| of(t) * 1e-6));
+            row.extend([ms(|t| t.median), ms(|t| t.low), ms(|t| t.high), front.contains(&(d, p)).to_string()]);
+            row.extend(match &dial.reference {
+                Reference::F64 => ["f64".into(), String::new()],
+                Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
+            });
+            row.extend([&report.device, &report.driver, &report.date].map(String::clone));
+            row.push(report.repeats.to_string());
+            text.push_str(&row.iter().map(|field| quoted(field)).collect::<Vec<_>>().join(","));
+            text.push_str("\r\n");
+        }
+    }
+    text
+}
+
+fn quoted(field: &str) -> String {
+    match field.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", field.replace('"', "\"\"")),
+        false => field.to_string(),
+    }
+}
+
 /// Places by dial: error, time, and both in shares of the scene's as it is.
-pub fn table(report: &Report, measure: Measure) -> String {
+pub fn summary_table(report: &Report, measure: Measure) -> String {
     let mut text = String::new();
     let [w, h, k] = report.sizes.volume;
     let [x, y] = report.sizes.picture;
@@ -41,8 +85,7 @@ pub fn table(report: &Report, measure: Measure) -> String {
         for point in &dial.points {
             let e = &point.errors;
             let or = |v: Option<f64>, digits: usize| v.map_or("-".into(), |v| format!("{v:.digits$}"));
-            let rms =
-                |s: &Option<super::metrics::SurfaceError>| s.as_ref().and_then(|s| s.error.as_ref()).map(|s| s.rms);
+            let rms = |s: &Option<SurfaceError>| s.as_ref().and_then(|s| s.error.as_ref()).map(|s| s.rms);
             let time = match point.time {
                 Some(t) => {
                     let ratio = base.filter(|b| b.median > 0.0).map(|b| t.median / b.median);

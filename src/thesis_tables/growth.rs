@@ -1,0 +1,174 @@
+//! Tables 7-9 of the thesis (5.5): how far the windows of the enhanced sigma filter grow on a picture, as the share of pixels whose
+//! window grew by +0, +2, +4 ... pixels.
+
+use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::passes::Slot;
+use crate::picture::Grey;
+use crate::probe::{Geometry, Grid};
+use crate::scene::{EnhancedSigma, Input, Mode, Scene, SceneError, Settings, VolumeFormat};
+use crate::source::StoredType;
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+/// Starting windows of Tables 7-9 and where their growth stops, pixels.
+pub const WINDOWS: [[u32; 2]; 6] = [[3, 17], [5, 19], [7, 19], [9, 21], [11, 21], [13, 23]];
+/// Standard deviations of the noise that the thesis measures with, 0..1.
+pub const SIGMAS: [f64; 3] = [0.03, 0.1, 0.17];
+
+/// The growth of one picture's windows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Growth {
+    pub sigma: f64,
+    /// Starting and largest window, pixels.
+    pub windows: [u32; 2],
+    /// Pixels whose window grew by n rings, at place n.
+    pub counts: Vec<u64>,
+}
+
+impl Growth {
+    /// From the number of rings that each pixel's window grew by.
+    pub fn new(sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
+        let most = (windows[1] - windows[0]) / 2;
+        let mut counts = vec![0; most as usize + 1];
+        for ring in rings {
+            counts[(ring.round().max(0.0) as usize).min(most as usize)] += 1;
+        }
+        Growth { sigma, windows, counts }
+    }
+
+    /// Share of the pixels that grew by n rings, 0..1.
+    pub fn share(&self, rings: usize) -> Option<f64> {
+        let all: u64 = self.counts.iter().sum();
+        self.counts.get(rings).map(|n| *n as f64 / all.max(1) as f64)
+    }
+}
+
+fn columns(rows: &[Growth]) -> usize {
+    rows.iter().map(|r| r.counts.len()).max().unwrap_or(0)
+}
+
+/// One line a starting window, in percent.
+pub fn table(rows: &[Growth]) -> String {
+    let mut text = format!("{:>6} {:>7} {:>7}", "sigma", "window", "largest");
+    for n in 0..columns(rows) {
+        let _ = write!(text, " {:>7}", format!("+{}", 2 * n));
+    }
+    text.push('\n');
+    for row in rows {
+        let _ = write!(text, "{:>6} {:>7} {:>7}", row.sigma, row.windows[0], row.windows[1]);
+        for n in 0..columns(rows) {
+            let share = row.share(n).map_or(String::new(), |s| format!("{:.2} %", 100.0 * s));
+            let _ = write!(text, " {share:>7}");
+        }
+        let kept = text.trim_end().len();
+        text.truncate(kept);
+        text.push('\n');
+    }
+    text
+}
+
+/// The same with shares in 0..1; a window that cannot grow so far has an empty field.
+pub fn csv(rows: &[Growth]) -> String {
+    let mut text = "sigma,window,largest".to_string();
+    (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
+    text.push('\n');
+    for row in rows {
+        let _ = write!(text, "{},{},{}", row.sigma, row.windows[0], row.windows[1]);
+        for n in 0..columns(rows) {
+            let _ = write!(text, ",{}", row.share(n).map_or(String::new(), |s| format!("{s:.6}")));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// How far the windows of the enhanced sigma filter grew on one picture (Tables 7-9).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    /// The picture's name.
+    pub picture: String,
+    pub rows: Vec<Growth>,
+}
+
+/// One row of the growth table: sigma, starting and largest window, and the settings that make it.
+pub type GrowthSettings = (f64, [u32; 2], Settings);
+
+#[derive(Debug, thiserror::Error)]
+pub enum GrowthError {
+    #[error("{0}")]
+    Scene(#[from] SceneError),
+    #[error("{0}")]
+    Gpu(#[from] GpuError),
+}
+
+/// A picture as a Cartesian volume of one slice.
+///
+/// # Errors
+/// Settings that cannot be.
+pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
+    let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
+    let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
+    Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings)
+}
+
+/// One picture through the filter for every row; only the filter changes in between.
+///
+/// # Errors
+/// Windows beyond what is filtered; a picture that the device cannot hold.
+pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -> Result<Vec<Growth>, GrowthError> {
+    let (mut grown, mut renderer) = (Vec::new(), None);
+    for (sigma, windows, settings) in rows {
+        let scene = scene_of(grey, settings)?;
+        let renderer: &mut Renderer = match &mut renderer {
+            None => renderer.insert(Renderer::new(context, scene, &Options::default())?),
+            Some(there) => {
+                there.change(scene)?;
+                there
+            }
+        };
+        renderer.frame(0, &grey.bytes(), 0)?;
+        let rings = renderer.read(Slot::Growth)?;
+        let rings = rings.ok_or_else(|| GpuError::Broken("slot 'growth' is not in the plan".into()))?;
+        grown.push(Growth::new(sigma, windows, &rings.values));
+    }
+    Ok(grown)
+}
+
+/// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).
+///
+/// # Errors
+/// Windows beyond what is filtered; a picture that the device cannot hold.
+pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, GrowthError> {
+    let windows = |sigma: f64| WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
+    let rows = measure(context, grey, SIGMAS.into_iter().flat_map(windows).collect())?;
+    Ok(Grown { picture: picture.into(), rows })
+}
+
+/// A row of Tables 7-9.
+pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
+    let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
+    settings.picture.size = [1, 1];
+    settings.slices.format = VolumeFormat::R32f;
+    settings.slices.enhanced_sigma =
+        Some(EnhancedSigma { window, largest, sigma, growth: true, ..EnhancedSigma::default() });
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_of_all_pixels_and_a_window_that_cannot_grow_has_none() {
+        let wide = Growth::new(0.1, [3, 7], &[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 0.0]);
+        assert_eq!(wide.counts, [5, 1, 2]);
+        let narrow = Growth::new(0.1, [5, 7], &[1.0, 0.0]);
+        let csv = csv(&[wide.clone(), narrow.clone()]);
+        assert_eq!(
+            csv,
+            "sigma,window,largest,grew 0,grew 2,grew 4\n0.1,3,7,0.625000,0.125000,0.250000\n0.1,5,7,0.500000,0.500000,\n"
+        );
+        let table = table(&[wide, narrow]);
+        assert!(table.contains("62.50 %") && table.lines().count() == 3, "{table}");
+    }
+}
