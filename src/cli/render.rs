@@ -52,6 +52,7 @@ pub struct Render {
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
+        let options = self.options()?;
         let (mut source, scene) = self.open()?;
         if self.explain {
             let scene = self.input.resolve_sampling(scene);
@@ -68,7 +69,7 @@ impl Render {
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let context = self.input.open_device(self.validate)?;
-        let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(|e| match e {
+        let mut renderer = Renderer::new(&context, scene, &options).map_err(|e| match e {
             GpuError::Shader { .. } if self.glsl.is_some() => input(e),
             e => failed(e),
         })?;

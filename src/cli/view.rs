@@ -125,12 +125,12 @@ impl View {
         if let Some(device) = device {
             place.device.device = device;
         }
+        let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
         let mut first = match kiosk {
             true => None,
             // Open the source before the window: a fault is then reported in the terminal.
             false => Some(self.console_config()?.opened()?),
         };
-        let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
         let view = Arc::new(self);
         let make = move |context: &Arc<Context>, size: [u32; 2], factor: f32, wake: Wake| {
             let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };

@@ -34,8 +34,8 @@ struct State {
     faults: BTreeMap<String, String>,
     /// Why the folder cannot be read.
     unreadable: Option<String>,
-    /// Why no pipelines can be made of what compiles.
-    refused: Option<String>,
+    /// Shaders that compile and of which no pipelines can be made, and why.
+    refused: Option<(HashSet<String>, String)>,
 }
 
 impl ShaderFolder {
@@ -102,21 +102,35 @@ impl ShaderFolder {
     /// Why the sources as they are now are not what is shown: the first fault, several lines; none where all is well.
     pub fn fault(&self) -> Option<String> {
         let state = self.state();
-        state.unreadable.iter().chain(state.faults.values()).chain(&state.refused).next().cloned()
+        state
+            .unreadable
+            .iter()
+            .chain(state.faults.values())
+            .chain(state.refused.iter().map(|(_, fault)| fault))
+            .next()
+            .cloned()
     }
 
-    /// The shaders that were compiled anew since the last call, if any: pipelines of them are out of date.
+    /// The shaders that were compiled anew since the last call, if any: pipelines of them are out of date. Those that were refused are
+    /// among them until they are not.
     pub fn take_changed(&self) -> Option<HashSet<String>> {
-        let changed = &mut self.state().changed;
-        (!changed.is_empty()).then(|| std::mem::take(changed))
+        let mut state = self.state();
+        let mut changed = std::mem::take(&mut state.changed);
+        if !changed.is_empty() {
+            changed.extend(state.refused.iter().flat_map(|(shaders, _)| shaders.iter().cloned()));
+        }
+        Some(changed).filter(|changed| !changed.is_empty())
     }
 
-    /// Why no pipelines can be made of what compiles.
-    pub fn set_refused(&self, fault: Option<String>) {
-        if let Some(fault) = &fault {
-            tracing::warn!("{fault}");
-        }
-        self.state().refused = fault;
+    /// No pipelines can be made of these shaders, although they compile, and why.
+    pub fn refuse(&self, shaders: HashSet<String>, fault: String) {
+        tracing::warn!("{fault}");
+        self.state().refused = Some((shaders, fault));
+    }
+
+    /// Pipelines were made of all that changed.
+    pub fn accept(&self) {
+        self.state().refused = None;
     }
 
     /// Reads the folder again and compiles what is different: first what is in use, then the rest, so that its faults are known.

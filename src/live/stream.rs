@@ -175,10 +175,10 @@ impl Stream {
                     && let Some(changed) = folder.take_changed()
                 {
                     match now.renew_shaders(&changed) {
-                        Ok(()) => folder.set_refused(None),
+                        Ok(()) => folder.accept(),
                         Err(error) if error.is_device_lost() => return Err(error.into()),
                         // What was drawn before stays.
-                        Err(error) => folder.set_refused(Some(error.to_string())),
+                        Err(error) => folder.refuse(changed, error.to_string()),
                     }
                 }
                 let begun = now.begin()?;

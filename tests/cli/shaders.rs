@@ -8,9 +8,9 @@ use std::process::Command;
 fn shaders_from_a_folder_are_drawn_with_and_what_is_wrong_with_them_is_one_line() {
     let folder = Folder::new("glsl");
     let glsl = repository("glsl");
-    let render = |from: &str, to: &str| run(&["render", "-o", to, "--size", "64x48", "--glsl", from]);
+    let render = |from: &str, to: &str| run(&["render", BONE, "-o", to, "--size", "64x48", "--glsl", from]);
     let (built_in, compiled) = (folder.path("built-in.png"), folder.path("compiled.png"));
-    done(&["render", "-o", &built_in, "--size", "64x48"]);
+    done(&["render", BONE, "-o", &built_in, "--size", "64x48"]);
     let (code, _, err) = render(glsl.to_str().expect("a plain name"), &compiled);
     assert_eq!(code, Some(0), "{err}");
     let pixels = |file: &str| image::open(file).expect("a picture").to_rgba8().into_raw();
