@@ -47,7 +47,7 @@ pub fn device(context: &Context) -> Device {
         is_software: candidate.is_software(),
         timestamp_period_ns: f64::from(context.limits.timestamp_period),
         valid_bits: candidate.valid_bits(),
-        calibrated: candidate.calibrated,
+        calibrated: candidate.calibrated_timestamps,
         clocks: clocks(candidate.is_software()),
     }
 }

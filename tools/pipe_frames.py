@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An acquisition program in about ten lines: rings of a moving test pattern, swept both ways, on standard output as src/source/piped reads them.
+"""An acquisition program in about ten lines: rings of a moving test pattern, swept both ways, on standard output as src/source/piped.rs reads them.
     tools/pipe_frames.py [FRAMES A SECOND [NUMBER OF FRAMES]]"""
 import itertools, json, math, signal, struct, sys, time
 rate, count = (float(sys.argv[1]) if len(sys.argv) > 1 else 200.0), (int(sys.argv[2]) if len(sys.argv) > 2 else None)

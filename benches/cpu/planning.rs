@@ -2,7 +2,7 @@
 
 use crate::common;
 use criterion::{Criterion, Throughput};
-use echolume::barriers::{Barrier, Tracker, accesses};
+use echolume::barriers::{Barrier, BarrierTracker, accesses};
 use echolume::passes::{DispatchArgs, Frequency};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::Geometry;
@@ -11,17 +11,17 @@ use std::hint::black_box;
 
 /// Barriers of a volume's frames, its passes, and one picture.
 fn barriers(scene: &Scene, plan: &Plan) -> Vec<Barrier> {
-    let mut tracker = Tracker::default();
+    let mut tracker = BarrierTracker::default();
     let mut found = Vec::new();
     for slice in 0..scene.slices() {
         for (_, step) in plan.steps_of(Frequency::Frame) {
             let args = DispatchArgs { layer: slice % 4, slice, slices: 1, ..step.args() };
-            found.extend(tracker.before(&accesses(scene, step.pass, &args)));
+            found.extend(tracker.record(&accesses(scene, step.pass, &args)));
         }
     }
     for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
-        found.extend(tracker.before(&accesses(scene, step.pass, &args)));
+        found.extend(tracker.record(&accesses(scene, step.pass, &args)));
     }
     found
 }

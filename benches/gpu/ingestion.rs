@@ -3,7 +3,7 @@
 
 use crate::common::{BYTES, Run};
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::gpu::{Context, GpuError, Options, Renderer};
+use echolume::gpu::{Context, GpuError, Renderer, RendererOptions};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 use echolume::scene::load::Layers;
@@ -45,7 +45,7 @@ pub fn bench(criterion: &mut Criterion, context: &Arc<Context>, phantom: &Phanto
         all.iter().chain(set).try_for_each(|s| layers.set(s)).map_err(|e| e.to_string())?;
         let settings = layers.finish().map_err(|e| e.to_string())?;
         let scene = Scene::new(geometry, BYTES, settings).map_err(|e| e.to_string())?;
-        let options = Options { volume_images: 2, ..Options::default() };
+        let options = RendererOptions { volume_images: 2, ..RendererOptions::default() };
         let mut renderer = Renderer::new(context, scene, &options).map_err(|e| e.to_string())?;
         let lines = if name.ends_with("line by line") { 1 } else { probe.lines.len() };
         let mut image = 0;

@@ -18,9 +18,9 @@ mod scenes;
 
 use common::Run;
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::gpu::pass_runner::Timed;
-use echolume::gpu::renderer::size_of;
-use echolume::gpu::{Choice, Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::gpu::pass_runner::PassTimer;
+use echolume::gpu::resources::shape_size;
+use echolume::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
 use echolume::passes::slots::Initializer;
 use echolume::passes::{DispatchArgs, Pass, Slot, Texels, measure};
 use echolume::scene::Scene;
@@ -53,7 +53,7 @@ fn all(run: Run) -> Result<(), String> {
     let mut criterion = common::criterion();
     check_that_none_is_forgotten()?;
     let sizes = if run == Run::Bench { &FULL } else { &SMALL };
-    let Ok(device) = std::env::var("ECHOLUME_DEVICE").map_or(Ok(Choice::Best), |name| name.parse());
+    let Ok(device) = std::env::var("ECHOLUME_DEVICE").map_or(Ok(DeviceChoice::Best), |name| name.parse());
     let options = ContextOptions { device, validation: run == Run::Test };
     let context = Context::new(&options).map_err(|e| e.to_string())?;
     // Inputs are made on a context of their own: synchronization validation does not see that the host waits for a timeline,
@@ -112,7 +112,8 @@ fn bench(
     group.sampling_mode(SamplingMode::Flat).throughput(Throughput::Elements(invocations));
     group.bench_function(name, |bencher| {
         let timed = timed.get_or_insert_with(|| {
-            let made = inputs().and_then(|inputs| Timed::new(context, scene, pass, &inputs).map_err(|e| e.to_string()));
+            let made =
+                inputs().and_then(|inputs| PassTimer::new(context, scene, pass, &inputs).map_err(|e| e.to_string()));
             or_end(&format!("{}/{name}", pass.name), made)
         });
         bencher.iter_custom(|runs| {
@@ -125,7 +126,7 @@ fn bench(
 
 /// The scene rendered whole. Frames from the outside in: what passes of frames left is of the middle ones.
 fn render(context: &Arc<Context>, scene: &Scene, frames: &[Frame]) -> Result<Renderer, GpuError> {
-    let mut renderer = Renderer::new(context, scene.clone(), &Options::default())?;
+    let mut renderer = Renderer::new(context, scene.clone(), &RendererOptions::default())?;
     let mut order: Vec<&Frame> = frames.iter().collect();
     order.sort_by_key(|f| std::cmp::Reverse(f.slice.abs_diff(frames.len() / 2)));
     for frame in order {
@@ -167,7 +168,7 @@ fn noise(scene: &Scene, pass: &Pass) -> Vec<(Slot, Texels)> {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     };
     let mut filled = |slot: Slot| {
-        let mut texels = Texels::untouched(size_of(slot.shape(scene)), slot.format(scene).channels());
+        let mut texels = Texels::untouched(shape_size(slot.shape(scene)), slot.format(scene).channels());
         texels.values.fill_with(&mut next);
         (slot, texels)
     };

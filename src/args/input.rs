@@ -2,7 +2,7 @@
 
 use crate::files::check_target;
 use crate::gpu::context::list;
-use crate::gpu::{Choice, Context, ContextOptions, Fetch, GpuError, select};
+use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom};
@@ -86,8 +86,8 @@ impl InputArgs {
     /// `scene` with the way of sampling that the chosen device will use. Without a device the scene stays unchanged.
     pub fn resolve_sampling(&self, scene: Scene) -> Scene {
         let devices = list().unwrap_or_default();
-        match select::choose(&devices, self.scene.device.as_ref().unwrap_or(&Choice::Best)) {
-            Ok(n) => scene.sampled(Fetch::of(&devices[n]).sampling()),
+        match device_selection::choose(&devices, self.scene.device.as_ref().unwrap_or(&DeviceChoice::Best)) {
+            Ok(n) => scene.sampled(TexelAccess::for_device(&devices[n]).sampling()),
             Err(_) => scene,
         }
     }
@@ -146,7 +146,7 @@ pub struct SceneArgs {
     set: Vec<String>,
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
-    pub device: Option<Choice>,
+    pub device: Option<DeviceChoice>,
 }
 
 impl SceneArgs {
@@ -228,8 +228,8 @@ impl SceneArgs {
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
-pub fn open_device(choice: Option<Choice>, validation: bool) -> Result<Arc<Context>, Failure> {
-    let device = choice.unwrap_or(Choice::Best);
+pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
+    let device = choice.unwrap_or(DeviceChoice::Best);
     let context = Context::new(&ContextOptions { device, validation }).map_err(|e| match e {
         GpuError::NoSuchDevice { .. } => input(e),
         e => failed(e),

@@ -73,10 +73,10 @@ impl SourceArgs {
             let text = error.to_string();
             // Usage and the hint to --help follow an empty line. They apply to a command line only.
             let text = text.split("\n\n").next().unwrap_or_default().trim_start_matches("error: ").replace("\n ", "");
-            input(config.refuse(&text))
+            input(config.flag_error(&text))
         })?;
         parsed.source.check().map_err(|failure| match failure {
-            Failure::Input(text) => input(config.refuse(&text)),
+            Failure::Input(text) => input(config.flag_error(&text)),
             failure => failure,
         })?;
         Ok(parsed.source)
@@ -188,9 +188,8 @@ impl SourceArgs {
             false => Err(input(format!("{flag} {mm}: must lie in {least}..=1000 mm"))),
         };
         let spacing = self.spacing.map(|mm| positive("--spacing", mm, 0.01)).transpose()?;
-        let widest_hole = positive("--hole", self.hole, 0.0)?;
-        options.freehand =
-            freehand::CompoundingOptions { spacing, widest_hole, clip: self.clip()?, ..options.freehand };
+        let max_hole = positive("--hole", self.hole, 0.0)?;
+        options.freehand = freehand::CompoundingOptions { spacing, max_hole, clip: self.clip()?, ..options.freehand };
         Ok(options)
     }
 

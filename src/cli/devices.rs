@@ -1,6 +1,6 @@
 //! `echolume devices`.
 
-use crate::gpu::{Choice, context, select};
+use crate::gpu::{DeviceChoice, context, device_selection};
 use crate::terminal::{Failure, failed, say};
 
 #[derive(clap::Args)]
@@ -13,7 +13,7 @@ pub struct Devices {
 impl Devices {
     pub fn run(&self) -> Result<(), Failure> {
         let devices = context::list().map_err(failed)?;
-        let picked = select::choose(&devices, &Choice::Best);
+        let picked = device_selection::choose(&devices, &DeviceChoice::Best);
         for (i, device) in devices.iter().enumerate() {
             say!(
                 "{i} {} ({}, Vulkan {}, {})",
@@ -22,10 +22,10 @@ impl Devices {
                 device.api_version(),
                 device.driver.trim()
             );
-            if !device.lacks.is_empty() {
-                say!("    cannot be used: lacks {}", device.lacks.join(", "));
+            if !device.missing.is_empty() {
+                say!("    cannot be used: lacks {}", device.missing.join(", "));
             }
-            for without in &device.without {
+            for without in &device.missing_optional {
                 say!("    works without {without}");
             }
             match &picked {
@@ -33,7 +33,7 @@ impl Devices {
                     say!("    picked: no other device fits. It is a software device: the same pictures, slowly");
                 }
                 Ok(n) if *n == i => say!("    picked: the best device that lacks nothing"),
-                _ if !device.lacks.is_empty() => {}
+                _ if !device.missing.is_empty() => {}
                 _ if device.is_software() => {
                     say!("    not picked: a software device is the last choice; --device {i} selects it")
                 }

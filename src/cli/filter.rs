@@ -1,7 +1,7 @@
 //! `echolume filter`: applies the 2D slice filters to an ordinary picture.
 
 use crate::args::{check_outputs, open_device};
-use crate::gpu::{Choice, Context, Options, Renderer};
+use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::regions::{self, Region};
 use crate::picture::{self, Grey};
@@ -90,7 +90,7 @@ pub struct Filter {
     csv: Option<PathBuf>,
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
-    device: Option<Choice>,
+    device: Option<DeviceChoice>,
     /// Print the time of every pass
     #[arg(long)]
     timings: bool,
@@ -115,7 +115,7 @@ impl Filter {
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
 
         if let Some(output) = &self.output {
-            let mut renderer = Renderer::new(&context, scene, &Options::default()).map_err(failed)?;
+            let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
             renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
             let filtered = read(&mut renderer, Slot::Volume)?.values;
             grey.with(&filtered).save(output).map_err(failed)?;

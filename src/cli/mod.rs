@@ -20,7 +20,7 @@ mod view;
 #[cfg(feature = "view")]
 mod view_config;
 
-use crate::kiosk::log_rotation::{self, Rotating};
+use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::terminal::{self, Failure, failed, input};
 use crate::{profile, verify};
 use clap::{Parser, Subcommand};
@@ -144,7 +144,7 @@ fn start_log(
     let log = tracing_subscriber::fmt().with_max_level(level).with_target(false);
     // A kiosk without a log still shows pictures.
     let configured = configured.filter(|_| file.is_none()).and_then(|(path, bytes, files)| {
-        let opened = Rotating::open(&path, bytes, files);
+        let opened = RotatingLog::open(&path, bytes, files);
         opened
             .inspect_err(|fault| drop(writeln!(std::io::stderr(), "echolume: log: {fault}; logging to standard error")))
             .ok()
@@ -166,7 +166,7 @@ fn start_log(
             log.without_time().with_writer(std::io::stderr).finish().with(shown).init();
         }
         Some(path) => {
-            let file = Rotating::open(path, log_rotation::USUAL_BYTES, log_rotation::USUAL_FILES);
+            let file = RotatingLog::open(path, log_rotation::DEFAULT_FILE_BYTES, log_rotation::DEFAULT_FILES);
             let file = file.map_err(|fault| input(format!("--log-file {fault}")))?;
             log.with_ansi(false).with_writer(Mutex::new(file)).init();
         }

@@ -5,7 +5,7 @@ use crate::dump;
 use crate::error_report::command::{nanoseconds, read};
 use crate::error_report::{Measure, choose};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{GpuError, Options, Renderer};
+use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::plan::Plan;
 use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
@@ -117,8 +117,8 @@ impl Render {
         self.input.open_with(&choice.set)
     }
 
-    fn options(&self) -> Result<Options, Failure> {
-        let mut options = Options::default();
+    fn options(&self) -> Result<RendererOptions, Failure> {
+        let mut options = RendererOptions::default();
         if let Some(folder) = &self.glsl {
             options.shaders = ShaderFolder::open(folder).map_err(input)?.shaders();
         }

@@ -54,7 +54,7 @@ impl SupportBundle {
             return Err(input(format!("--config {}: is not a file", config.display())));
         }
         let mut bundle = Bundle::new(self.config.as_deref());
-        let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::USUAL));
+        let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::DEFAULT_PATH));
         if let Some(Err(Failure::Input(fault))) =
             Config::read(config).ok().map(|config| SourceArgs::from_config(&config))
         {

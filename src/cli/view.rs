@@ -4,12 +4,12 @@ use super::view_config::{ConsoleConfig, WindowConfig};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::error_report::command::{nanoseconds, read};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::window::{PresentMode, display};
+use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
-use crate::ui::console::{Amiss, Console, Options};
+use crate::ui::console::{Console, ConsoleOptions, StartupFault};
 use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -88,16 +88,16 @@ pub struct View {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Compile the shaders from this folder instead of using the built-in ones, and again whenever a file there changes; what does not
-    /// compile is reported over the picture (needs glslc or glslangValidator)
+    /// Compile the shaders from this folder instead of using the built-in ones, and again whenever a file there changes. A shader that
+    /// does not compile is reported over the picture (needs glslc or glslangValidator)
     #[arg(long, value_name = "DIR")]
     glsl: Option<PathBuf>,
 }
 
 impl View {
     pub fn run(mut self) -> Result<(), Failure> {
-        if self.kiosk && self.config.is_none() && Path::new(config::USUAL).exists() {
-            self.config = Some(config::USUAL.into());
+        if self.kiosk && self.config.is_none() && Path::new(config::DEFAULT_PATH).exists() {
+            self.config = Some(config::DEFAULT_PATH.into());
         }
         if self.kiosk {
             // Panics go to the log, where the support bundle finds them.
@@ -119,7 +119,7 @@ impl View {
             place.direct = Some(self.monitor_request(place.direct)?);
         }
         place.shape.full_screen |= self.full_screen;
-        place.shape.stays = kiosk;
+        place.shape.stays_open = kiosk;
         place.shape.time = self.time.map(Into::into);
         place.device.validation = self.validate;
         if let Some(device) = device {
@@ -136,16 +136,16 @@ impl View {
             let note = if context.candidate.is_software() { " (software: no GPU is used)" } else { "" };
             say!("device: {}{note}, {}", context.candidate.name, context.candidate.driver.trim());
             let wanted = first.take().map_or_else(|| view.console_config(), Ok);
-            let (wanted, amiss) = match wanted {
+            let (wanted, startup_fault) = match wanted {
                 Ok(wanted) => (wanted, None),
                 Err(failure) => {
                     let why = failure.message();
                     tracing::error!("{why}");
-                    (ConsoleConfig::nothing(), Some(view.amiss(why)))
+                    (ConsoleConfig::nothing(), Some(view.startup_fault(why)))
                 }
             };
-            let (open, options) = wanted.options(factor, wake, amiss);
-            Console::new(context, open, Options { shaders: shaders.clone(), ..options }, size)
+            let (open, options) = wanted.options(factor, wake, startup_fault);
+            Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), ..options }, size)
         };
         let ran = place.run(Box::new(make)).map_err(|e| match e {
             GpuError::NoSuchDevice { .. } => input(e),
@@ -189,7 +189,7 @@ impl View {
         if let Some(file) = &self.record {
             super::stream::check_record(file, self.source.path())?;
         }
-        let options = Options {
+        let options = ConsoleOptions {
             settings: self.scene.layers(self.source.is_phantom(), &[])?.finish().map_err(input)?,
             update: self.stream.update()?,
             cine: CineLimits { volumes: self.cine as usize, bytes: (self.cine_memory as usize) << 20 },
@@ -199,7 +199,7 @@ impl View {
             folder: self.save_to.clone(),
             panels: !self.no_panels,
             scale: self.scale,
-            ..Options::usual()
+            ..ConsoleOptions::default()
         };
         Ok(ConsoleConfig { source: Some(self.source.clone()), first: None, options })
     }
@@ -214,12 +214,12 @@ impl View {
         }
         place.shape.full_screen = self.kiosk || self.monitor.is_some();
         place.shape.monitor = self.monitor.clone();
-        place.shape.pace = self.present;
+        place.shape.present_mode = self.present;
         Ok(place)
     }
 
     /// The monitor and its mode. Flags override the configuration.
-    fn monitor_request(&self, configured: Option<display::Wanted>) -> Result<display::Wanted, Failure> {
+    fn monitor_request(&self, configured: Option<MonitorChoice>) -> Result<MonitorChoice, Failure> {
         if let Some(hz) = self.refresh.filter(|hz| !(1.0..=1000.0).contains(hz)) {
             return Err(input(format!("--refresh {hz}: must lie in 1..=1000")));
         }
@@ -229,7 +229,7 @@ impl View {
             false => configured.size,
         };
         let monitor = self.monitor.clone().or(configured.monitor);
-        Ok(display::Wanted { monitor, size, refresh: self.refresh })
+        Ok(MonitorChoice { monitor, size, refresh: self.refresh })
     }
 
     fn budget(&self) -> Result<Option<Duration>, Failure> {
@@ -240,10 +240,10 @@ impl View {
     }
 
     /// The fault of the configuration, and a test for when it is gone.
-    fn amiss(self: &Arc<View>, why: String) -> Amiss {
+    fn startup_fault(self: &Arc<View>, why: String) -> StartupFault {
         let view = self.clone();
-        let is_mended = Box::new(move || view.console_config().is_ok());
-        Amiss { title: "The configuration cannot be used".into(), why, is_mended }
+        let is_resolved = Box::new(move || view.console_config().is_ok());
+        StartupFault { title: "The configuration cannot be used".into(), why, is_resolved }
     }
 }
 

@@ -2,15 +2,15 @@
 
 use super::view::rungs;
 use crate::args::{SceneArgs, SourceArgs};
-use crate::gpu::window::{PresentMode, display};
-use crate::gpu::{Choice, Context, ContextOptions, GpuError, Wake};
+use crate::gpu::window::{MonitorChoice, PresentMode};
+use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
 use crate::terminal::{Failure, input};
-use crate::ui::console::{Amiss, Console, Options};
-use crate::ui::source_supervisor::Open;
-use crate::ui::window::{self, Make, Shape};
+use crate::ui::console::{Console, ConsoleOptions, StartupFault};
+use crate::ui::source_supervisor::OpenSource;
+use crate::ui::window::{self, MakeConsole, WindowOptions};
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
@@ -20,21 +20,28 @@ const DEFAULT_SIZE: [u32; 2] = [1280, 800];
 /// The device and the window. They stay the same for the whole run.
 pub struct WindowConfig {
     pub device: ContextOptions,
-    pub shape: Shape,
+    pub shape: WindowOptions,
     /// A monitor without a desktop, instead of a window.
-    pub direct: Option<display::Wanted>,
+    pub direct: Option<MonitorChoice>,
 }
 
 impl WindowConfig {
     /// The default: the best device, a window of [`DEFAULT_SIZE`].
     pub fn usual() -> WindowConfig {
-        let device = ContextOptions { device: Choice::Best, validation: false };
-        let (monitor, pace, time) = (None, PresentMode::Fifo, None);
+        let device = ContextOptions { device: DeviceChoice::Best, validation: false };
+        let (monitor, present_mode, time) = (None, PresentMode::Fifo, None);
         let direct = None;
         WindowConfig {
             device,
             direct,
-            shape: Shape { size: DEFAULT_SIZE, full_screen: false, monitor, pace, stays: false, time },
+            shape: WindowOptions {
+                size: DEFAULT_SIZE,
+                full_screen: false,
+                monitor,
+                present_mode,
+                stays_open: false,
+                time,
+            },
         }
     }
 
@@ -42,14 +49,14 @@ impl WindowConfig {
     ///
     /// # Errors
     /// Those of [`window::run`].
-    pub fn run(self, make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
+    pub fn run(self, make: Box<MakeConsole>) -> Result<(Console, Arc<Context>), GpuError> {
         match self.direct {
             None => window::run(&self.device, self.shape, make),
             #[cfg(target_os = "linux")]
             Some(wanted) => {
                 // Grab the keyboard: otherwise the shell of the terminal would run what is typed.
-                let (pace, time) = (self.shape.pace, self.shape.time);
-                let shape = crate::ui::direct::Shape { wanted, pace, grab: true, time };
+                let (present_mode, time) = (self.shape.present_mode, self.shape.time);
+                let shape = crate::ui::direct::DirectOptions { monitor: wanted, present_mode, grab: true, time };
                 crate::ui::direct::run(&self.device, shape, make)
             }
             #[cfg(not(target_os = "linux"))]
@@ -64,11 +71,11 @@ impl WindowConfig {
         place.shape.size = display.size;
         place.shape.full_screen = display.full_screen;
         place.shape.monitor = display.monitor.clone();
-        place.shape.pace = match display.present {
+        place.shape.present_mode = match display.present {
             Present::Fifo => PresentMode::Fifo,
             Present::Mailbox => PresentMode::Mailbox,
         };
-        place.direct = config.display.direct.then(|| display::Wanted {
+        place.direct = config.display.direct.then(|| MonitorChoice {
             monitor: config.display.monitor.clone(),
             size: None,
             refresh: None,
@@ -87,23 +94,23 @@ pub struct ConsoleConfig {
     pub source: Option<SourceArgs>,
     /// The source, if it was opened before the window.
     pub first: Option<Box<dyn Live>>,
-    pub options: Options,
+    pub options: ConsoleOptions,
 }
 
 impl ConsoleConfig {
     /// A console that shows only a message. The default exit keys work.
     pub fn nothing() -> ConsoleConfig {
         let exit = Config::default().keys.exit;
-        let options = Options { panels: false, exit, is_kiosk: true, ..Options::usual() };
+        let options = ConsoleOptions { panels: false, exit, is_kiosk: true, ..ConsoleOptions::default() };
         ConsoleConfig { source: None, first: None, options }
     }
 
     /// The console of a configuration. The flags of `scene` override its settings.
     pub fn configured(config: &Config, scene: &SceneArgs) -> Result<ConsoleConfig, Failure> {
-        let layers = config.layers().map_err(|e| input(config.refuse(&e.to_string())))?;
+        let layers = config.layers().map_err(|e| input(config.flag_error(&e.to_string())))?;
         let (live, display, files) = (&config.live, &config.display, &config.files);
         let record = live.record.as_ref().map(|folder| folder.join(format!("echolume-{}.frames", stamp())));
-        let options = Options {
+        let options = ConsoleOptions {
             settings: scene.layers_over(layers, &[])?.finish().map_err(input)?,
             update: live.update,
             cine: CineLimits { volumes: live.cine_volumes as usize, bytes: (live.cine_memory_mb as usize) << 20 },
@@ -114,7 +121,7 @@ impl ConsoleConfig {
             folder: files.pictures.clone().unwrap_or(".".into()),
             panels: display.panels,
             scale: display.scale as f32,
-            ..Options::usual()
+            ..ConsoleOptions::default()
         };
         Ok(ConsoleConfig { source: Some(SourceArgs::from_config(config)?), first: None, options })
     }
@@ -129,9 +136,9 @@ impl ConsoleConfig {
     }
 
     /// The arguments of the console: how to open the source, and its options. `factor`: pixels per point of the window system.
-    pub fn options(self, factor: f32, wake: Wake, amiss: Option<Amiss>) -> (Open, Options) {
+    pub fn options(self, factor: f32, wake: Wake, startup_fault: Option<StartupFault>) -> (OpenSource, ConsoleOptions) {
         let (source, first) = (self.source, Mutex::new(self.first));
-        let open: Open = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
+        let open: OpenSource = Arc::new(move || match first.lock().unwrap_or_else(|e| e.into_inner()).take() {
             Some(source) => Ok(source),
             None => match source.as_ref().map(SourceArgs::open) {
                 Some(opened) => opened.map_err(Failure::message),
@@ -139,11 +146,11 @@ impl ConsoleConfig {
             },
         });
         let scale = self.options.scale * factor;
-        (open, Options { scale, wake, amiss, ..self.options })
+        (open, ConsoleOptions { scale, wake, startup_fault, ..self.options })
     }
 }
 
 /// The current time, formatted for file names.
 fn stamp() -> String {
-    crate::ui::export::stamp(SystemTime::now())
+    crate::ui::export::timestamp(SystemTime::now())
 }

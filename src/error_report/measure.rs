@@ -5,7 +5,7 @@ use super::dials::{Dial, Place};
 use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
 use crate::error_report::{self, Errors, FORMAT, Point, Reference, Report, Sizes, Time};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::machine;
 use crate::passes::chain::distance_end;
 use crate::passes::shade::normal;
@@ -138,7 +138,7 @@ impl ErrorMeasurement<'_> {
 
     fn rendered(&self, scene: &Scene, repeats: u32) -> Result<Rendering, GpuError> {
         let scene = &in_floats(scene);
-        let mut renderer = Renderer::new(self.context, scene.clone(), &Options::default())?;
+        let mut renderer = Renderer::new(self.context, scene.clone(), &RendererOptions::default())?;
         let mut times = Vec::new();
         // The first, which compiles, is not counted.
         for n in 0..=repeats {

@@ -2,9 +2,12 @@
 //!
 //! Some errors omit the file's name, because the caller adds it.
 
+mod input_error;
 pub mod signals;
 mod unfinished;
 
+pub use input_error::InputError;
+pub(crate) use input_error::{escaped, quoted};
 pub use unfinished::Unfinished;
 
 use std::fs::{File, OpenOptions};

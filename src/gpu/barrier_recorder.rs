@@ -1,33 +1,33 @@
 //! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
 
 use super::context::Context;
-use crate::barriers::oracle::Log;
-use crate::barriers::{Access, Barrier, Worker, Workers};
-use crate::queues::{Queues, Wait};
+use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages};
+use crate::queues::oracle::SubmissionLog;
+use crate::queues::{QueueTracker, Wait};
 use ash::vk;
 
 /// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
 #[derive(Default)]
 pub struct BarrierRecorder {
-    pub queues: Queues,
-    pub barriers: u32,
+    pub queues: QueueTracker,
+    pub count: u32,
     /// Names and extents of the passes dispatched, in order, while someone counts them.
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
     /// Leaves out the n-th barrier, to show that something notices.
     pub drop_barrier: Option<u32>,
     /// All that is recorded and submitted, while someone looks at it.
-    pub log: Option<Log>,
+    pub log: Option<SubmissionLog>,
 }
 
 impl BarrierRecorder {
     /// Records the barrier that an operation with these accesses needs, if it needs one.
     pub(super) fn before(&mut self, context: &Context, queue: usize, commands: vk::CommandBuffer, accesses: &[Access]) {
-        let barrier = self.queues.before(queue, accesses);
-        self.barriers += u32::from(barrier.is_some());
-        let is_dropped = self.drop_barrier == Some(self.barriers);
+        let barrier = self.queues.record(queue, accesses);
+        self.count += u32::from(barrier.is_some());
+        let is_dropped = self.drop_barrier == Some(self.count);
         // A queue that only copies knows no shaders.
         let computes = context.queue(queue).computes;
-        let known = |all: Workers| if computes { all } else { all.without(Worker::Compute) };
+        let known = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
         let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: known(b.from), to: known(b.to) });
         if let Some(log) = &mut self.log {
             log.record(queue, barrier, accesses);
@@ -56,39 +56,39 @@ impl BarrierRecorder {
     }
 }
 
-fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: Workers, of: [(Worker, T); 3]) -> T {
+fn flags<T: std::ops::BitOr<Output = T> + Default>(workers: PipelineStages, of: [(PipelineStage, T); 3]) -> T {
     of.into_iter().filter(|(worker, _)| workers.has(*worker)).fold(T::default(), |all, (_, flags)| all | flags)
 }
 
-fn stages(workers: Workers) -> vk::PipelineStageFlags2 {
+fn stages(workers: PipelineStages) -> vk::PipelineStageFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
-            (Worker::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
-            (Worker::Host, vk::PipelineStageFlags2::HOST),
+            (PipelineStage::Compute, vk::PipelineStageFlags2::COMPUTE_SHADER),
+            (PipelineStage::Copy, vk::PipelineStageFlags2::ALL_TRANSFER),
+            (PipelineStage::Host, vk::PipelineStageFlags2::HOST),
         ],
     )
 }
 
-fn writes(workers: Workers) -> vk::AccessFlags2 {
+fn writes(workers: PipelineStages) -> vk::AccessFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_WRITE),
-            (Worker::Host, vk::AccessFlags2::NONE),
+            (PipelineStage::Compute, vk::AccessFlags2::SHADER_STORAGE_WRITE),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_WRITE),
+            (PipelineStage::Host, vk::AccessFlags2::NONE),
         ],
     )
 }
 
-fn reads(workers: Workers) -> vk::AccessFlags2 {
+fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
     flags(
         workers,
         [
-            (Worker::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
-            (Worker::Copy, vk::AccessFlags2::TRANSFER_READ),
-            (Worker::Host, vk::AccessFlags2::HOST_READ),
+            (PipelineStage::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
+            (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
+            (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
         ],
     )
 }

@@ -1,28 +1,29 @@
-//! What went wrong, and what was being done to what.
+//! Errors of the GPU, each with the operation that failed.
 
 use ash::vk;
 
+/// An error of Vulkan, of the device's limits, or in the use of a renderer.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     #[error("no Vulkan loader: {0}; install one (Debian: apt-get install libvulkan1 mesa-vulkan-drivers)")]
     NoLoader(String),
     #[error(
         "no Vulkan device; install a driver (Debian, software: apt-get install mesa-vulkan-drivers), \
-         and look whether VK_DRIVER_FILES or VK_ICD_FILENAMES name one that is there"
+         and check that VK_DRIVER_FILES and VK_ICD_FILENAMES, if set, name an existing one"
     )]
     NoDevice,
-    #[error("no device fits: {0}")]
+    #[error("no usable device: {0}")]
     NoneFits(String),
-    #[error("device {wanted:?} is not there; there are: {there}")]
+    #[error("no device {wanted:?}; available: {there}")]
     NoSuchDevice { wanted: String, there: String },
     #[error(
-        "validation was asked for, but the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
+        "validation was requested, but the layer VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers)"
     )]
     NoValidation,
-    #[error("{doing}: {}", describe(*.result))]
-    Vulkan { doing: String, result: vk::Result },
-    #[error("{doing}: {fault}")]
-    Memory { doing: String, fault: String },
+    #[error("{operation}: {}", describe(*.result))]
+    Vulkan { operation: String, result: vk::Result },
+    #[error("{operation}: {fault}")]
+    Memory { operation: String, fault: String },
     #[error("{what}: needs {needed}, the device allows {allowed}")]
     Limit { what: String, needed: u64, allowed: u64 },
     #[error("{what}: the device cannot use {format} as {usage}")]
@@ -31,37 +32,37 @@ pub enum GpuError {
     Shader { shader: String, fault: String },
     #[error("frame: {got} bytes arrived, the scene's frames have {expected}")]
     FrameSize { got: usize, expected: usize },
-    #[error("frame for slice {slice}, the volume has {slices}")]
+    #[error("frame for slice {slice}: the volume has {slices} slices")]
     FrameSlice { slice: u32, slices: u32 },
     #[error(
-        "frame for slice {slice}: {bytes} bytes from line {first} on are no whole lines that follow the {there} that are there"
+        "frame for slice {slice}: {bytes} bytes from line {first} on are not complete lines that follow the {received} that have arrived"
     )]
-    FrameLines { slice: u32, first: u32, bytes: usize, there: u32 },
-    #[error("volume image {image}: there are {images}")]
+    FrameLines { slice: u32, first: u32, bytes: usize, received: u32 },
+    #[error("volume image {image}: there are only {images}")]
     VolumeImage { image: u32, images: u32 },
-    #[error("the last change of scene failed ({0}); the next one builds everything anew")]
+    #[error("the last change of scene failed ({0}); the next one rebuilds everything")]
     Broken(String),
     #[error("no window: {0}")]
     Window(String),
-    #[error("the device did not finish within {seconds} s; last submitted: {doing}")]
-    TimedOut { seconds: u64, doing: String },
+    #[error("the device did not finish within {seconds} s; last submitted: {operation}")]
+    TimedOut { seconds: u64, operation: String },
 }
 
 impl GpuError {
-    /// The device is gone: everything has to be built anew.
+    /// True if the device was lost: everything has to be recreated from a new context.
     pub fn is_device_lost(&self) -> bool {
         matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. })
     }
 }
 
-/// Turns a Vulkan result into an error that says what was being done.
-pub trait Doing<T> {
-    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError>;
+/// Adds the operation that failed to a Vulkan result.
+pub trait ErrorContext<T> {
+    fn context(self, operation: impl FnOnce() -> String) -> Result<T, GpuError>;
 }
 
-impl<T> Doing<T> for Result<T, vk::Result> {
-    fn doing(self, what: impl FnOnce() -> String) -> Result<T, GpuError> {
-        self.map_err(|result| GpuError::Vulkan { doing: what(), result })
+impl<T> ErrorContext<T> for Result<T, vk::Result> {
+    fn context(self, operation: impl FnOnce() -> String) -> Result<T, GpuError> {
+        self.map_err(|result| GpuError::Vulkan { operation: operation(), result })
     }
 }
 

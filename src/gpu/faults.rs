@@ -1,5 +1,5 @@
-//! The one seam at which failures are injected, so that the paths for out of memory, a lost device and a time-out are tested;
-//! slowness, so that what finds it is; and wrong results, so that the checks of the device are.
+//! Fault injection. Failures of driver calls test the error paths for out of memory, a lost device and a time-out. Slow passes test
+//! the detection of slowness. Wrong results test the checks of `verify`.
 
 use crate::passes::fault_injection::Change;
 use crate::passes::slots::{Format, Initializer};
@@ -9,92 +9,92 @@ use ash::vk;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
-/// Where a call into the driver can be made to fail.
+/// A kind of driver call that can be made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seam {
+pub enum InjectionPoint {
     Allocate,
     Submit,
     Wait,
-    /// An image of a window.
+    /// Acquiring an image of a swapchain.
     Acquire,
 }
 
-/// How a call fails, for those who know no Vulkan.
+/// How a call fails, for modules that do not use Vulkan's types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failure {
+pub enum InjectedFailure {
     OutOfDeviceMemory,
     OutOfHostMemory,
     DeviceLost,
     TimeOut,
 }
 
-impl Failure {
+impl InjectedFailure {
     pub fn result(self) -> vk::Result {
         match self {
-            Failure::OutOfDeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
-            Failure::OutOfHostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
-            Failure::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
-            Failure::TimeOut => vk::Result::TIMEOUT,
+            InjectedFailure::OutOfDeviceMemory => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            InjectedFailure::OutOfHostMemory => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            InjectedFailure::DeviceLost => vk::Result::ERROR_DEVICE_LOST,
+            InjectedFailure::TimeOut => vk::Result::TIMEOUT,
         }
     }
 }
 
-/// What new memory holds before anything is written to it.
+/// What newly allocated memory holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poison {
-    /// Texels of floats.
+    /// Texels of float formats.
     pub float: f32,
-    /// Texels that stand for 0..1.
-    pub share: f32,
-    /// Texels of whole numbers.
-    pub whole: u32,
-    /// Buffers.
+    /// Texels of normalized formats, 0..1.
+    pub normalized: f32,
+    /// Texels of integer formats.
+    pub integer: u32,
+    /// Each byte of a buffer.
     pub byte: u8,
 }
 
 impl Poison {
-    /// Two that differ in every bit that counts: what holds neither of them where it should was computed from them.
+    /// Two poisons that differ in every significant bit. A result that differs between them was computed from uninitialized memory.
     pub const BOTH: [Poison; 2] = [
-        Poison { float: f32::NAN, share: 2.0 / 3.0, whole: 0xabab_abab, byte: 0xff },
-        Poison { float: -999.5, share: 1.0 / 3.0, whole: 0x5555_5555, byte: 0x55 },
+        Poison { float: f32::NAN, normalized: 2.0 / 3.0, integer: 0xabab_abab, byte: 0xff },
+        Poison { float: -999.5, normalized: 1.0 / 3.0, integer: 0x5555_5555, byte: 0x55 },
     ];
 
-    /// As a texel of a format holds it.
-    pub fn seen_in(self, format: Format) -> f64 {
+    /// The value of a poisoned texel of a format.
+    pub fn texel_value(self, format: Format) -> f64 {
         match format {
-            Format::R32u | Format::Rg32u => f64::from(self.whole),
-            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.share)).round() / 255.0,
-            Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.share)).round() / 65535.0,
+            Format::R32u | Format::Rg32u => f64::from(self.integer),
+            Format::R8 | Format::Rgba8 => (255.0 * f64::from(self.normalized)).round() / 255.0,
+            Format::R16 | Format::Rg16 => (65535.0 * f64::from(self.normalized)).round() / 65535.0,
             _ => f64::from(self.float),
         }
     }
 }
 
-/// At most one planned failure, one slow pass, one poison, and one wrong result.
+/// The injected faults of a context: at most one failure, one slow pass, one poison, and one wrong result.
 #[derive(Default)]
 pub struct Faults {
-    planned: Mutex<Option<(Seam, u32, vk::Result)>>,
+    planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
-    planted: OnceLock<Change>,
-    struck: AtomicU64,
+    change: OnceLock<Change>,
+    changes: AtomicU64,
 }
 
 impl Faults {
-    /// The `after`-th call from now (0: the next) at this seam returns `result` instead of reaching the driver.
-    pub fn inject(&self, seam: Seam, after: u32, result: vk::Result) {
-        *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = Some((seam, after, result));
+    /// The `after`-th call from now (0: the next) at this point returns `result` and does not reach the driver.
+    pub fn inject(&self, point: InjectionPoint, after: u32, result: vk::Result) {
+        *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = Some((point, after, result));
     }
 
-    pub(super) fn pass(&self, seam: Seam) -> Result<(), vk::Result> {
+    pub(super) fn check(&self, point: InjectionPoint) -> Result<(), vk::Result> {
         let mut planned = self.planned.lock().unwrap_or_else(|e| e.into_inner());
         match planned.as_mut() {
-            Some((at, 0, result)) if *at == seam => {
+            Some((at, 0, result)) if *at == point => {
                 let result = *result;
                 *planned = None;
                 Err(result)
             }
-            Some((at, left, _)) if *at == seam => {
+            Some((at, left, _)) if *at == point => {
                 *left -= 1;
                 Ok(())
             }
@@ -102,12 +102,12 @@ impl Faults {
         }
     }
 
-    /// Forgets a planned failure that was not reached.
+    /// Cancels a planned failure that has not happened.
     pub fn forget(&self) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
 
-    /// From now on new memory holds this; zeros where something relies on them ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
+    /// From now on new memory holds this; slots that must start with zeros still do ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).
     pub fn poison(&self, poison: Option<Poison>) {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner()) = poison;
     }
@@ -116,7 +116,7 @@ impl Faults {
         *self.poison.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// From now on the pass is dispatched so many times instead of once. It writes the same each time: only time passes. 0 leaves it out.
+    /// From now on each dispatch of the pass runs this many times; the results stay the same. 0 leaves it out.
     pub fn slow_down(&self, pass: &'static str, times: u32) {
         *self.slow.lock().unwrap_or_else(|e| e.into_inner()) = Some((pass, times));
     }
@@ -128,71 +128,71 @@ impl Faults {
         }
     }
 
-    /// From now on, and for as long as the context lives, the device is told or given something else. Before anything is made from the
-    /// context; the first one holds.
-    pub fn plant(&self, change: Change) {
-        self.planted.get_or_init(|| change);
+    /// Changes what the device receives, as long as the context lives. To be called before anything is made from the context; only the
+    /// first call has an effect.
+    pub fn inject_change(&self, change: Change) {
+        self.change.get_or_init(|| change);
     }
 
-    /// How often what is planted changed something.
-    pub fn struck(&self) -> u64 {
-        self.struck.load(Ordering::Relaxed)
+    /// How often the injected change has changed something.
+    pub fn change_count(&self) -> u64 {
+        self.changes.load(Ordering::Relaxed)
     }
 
-    fn strike(&self, by: impl FnOnce(&Change) -> bool) -> bool {
-        let struck = self.planted.get().is_some_and(by);
-        if struck {
-            self.struck.fetch_add(1, Ordering::Relaxed);
+    fn apply(&self, by: impl FnOnce(&Change) -> bool) -> bool {
+        let changed = self.change.get().is_some_and(by);
+        if changed {
+            self.changes.fetch_add(1, Ordering::Relaxed);
         }
-        struck
+        changed
     }
 
-    /// What a dispatch works on; none if it is left out.
+    /// The arguments of a dispatch; `None` if it is left out.
     pub(super) fn args(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Option<DispatchArgs> {
         let mut args = *args;
-        self.strike(|change| change.args(pass.name, scene, &mut args));
-        (!self.strike(|change| change.leaves_out(pass.name, scene, &args))).then_some(args)
+        self.apply(|change| change.args(pass.name, scene, &mut args));
+        (!self.apply(|change| change.leaves_out(pass.name, scene, &args))).then_some(args)
     }
 
     pub(super) fn numbers(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Params {
         let mut params = pass.numbers(scene, args);
-        self.strike(|change| change.numbers(pass, scene, &mut params));
+        self.apply(|change| change.numbers(pass, scene, &mut params));
         params
     }
 
     pub(super) fn invocations(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
         let mut extent = pass.invocations(scene, args);
-        self.strike(|change| change.extent(pass.name, &mut extent));
+        self.apply(|change| change.extent(pass.name, &mut extent));
         extent
     }
 
     pub(super) fn constants(&self, pass: &str, constants: &[(&'static str, i32)]) -> Vec<(&'static str, i32)> {
         let mut constants = constants.to_vec();
-        self.strike(|change| change.constants(pass, &mut constants));
+        self.apply(|change| change.constants(pass, &mut constants));
         constants
     }
 
     pub(super) fn words(&self, pass: &str, words: &mut Vec<u32>) -> Result<(), String> {
-        let Some(change) = self.planted.get() else { return Ok(()) };
+        let Some(change) = self.change.get() else { return Ok(()) };
         let changed = change.words(pass, words).map_err(|e| e.to_string())?;
-        self.strike(|_| changed);
+        self.apply(|_| changed);
         Ok(())
     }
 
     pub(super) fn table(&self, slot: Slot, scene: &Scene, mut values: Vec<f32>) -> Vec<f32> {
-        self.strike(|change| change.table(slot, scene, &mut values));
+        self.apply(|change| change.table(slot, scene, &mut values));
         values
     }
 
     pub(super) fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
-        self.strike(|change| change.frame(scene, bytes));
+        self.apply(|change| change.frame(scene, bytes));
     }
 
-    /// Bytes of a slot that a pass alone is given.
+    /// The input bytes of a slot for a single pass.
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
             self.frame(scene, &mut bytes);
-        } else if self.planted.get().is_some() && matches!(slot.filled(), Initializer::ByScene(_)) {
+        } else if self.change.get().is_some() && matches!(slot.filled(), Initializer::ByScene(_)) {
             let values = bytemuck::pod_collect_to_vec(&bytes);
             bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();
         }
@@ -200,7 +200,7 @@ impl Faults {
     }
 
     pub(super) fn filter(&self) -> vk::Filter {
-        match self.strike(|change| matches!(change, Change::Nearest)) {
+        match self.apply(|change| matches!(change, Change::Nearest)) {
             true => vk::Filter::NEAREST,
             false => vk::Filter::LINEAR,
         }

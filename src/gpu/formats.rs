@@ -1,14 +1,46 @@
-//! Our formats in Vulkan's words, and whether a device can use them as a scene needs.
+//! Slot formats as Vulkan formats, and what the device can do with them.
 
+use super::context::Context;
+use super::device_selection::Candidate;
+use super::error::GpuError;
 use super::faults::Poison;
-use super::{Context, Fetch, GpuError};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
 use crate::scene::{Sampling, Scene};
 use ash::vk;
 
-pub fn vulkan(format: Format) -> vk::Format {
+/// How single texels are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelAccess {
+    /// `texelFetch` from textures, as the shaders are written.
+    Textures,
+    /// `imageLoad` from storage images and texel buffers; the SPIR-V is rewritten.
+    Storage,
+}
+
+impl TexelAccess {
+    /// What is fast on a device. A software device runs its complete sampler for every fetch; on a GPU textures have their own
+    /// caches.
+    pub fn for_device(candidate: &Candidate) -> TexelAccess {
+        if candidate.is_software() { TexelAccess::Storage } else { TexelAccess::Textures }
+    }
+
+    /// The sampling that `auto` selects.
+    pub fn sampling(self) -> Sampling {
+        if self == TexelAccess::Storage { Sampling::Quads } else { Sampling::Hardware }
+    }
+
+    pub fn describe(self) -> &'static str {
+        match self {
+            TexelAccess::Textures => "texels by texelFetch",
+            TexelAccess::Storage => "texels by imageLoad",
+        }
+    }
+}
+
+/// The Vulkan format.
+pub(super) fn vulkan(format: Format) -> vk::Format {
     match format {
         Format::R8 => vk::Format::R8_UNORM,
         Format::R16 => vk::Format::R16_UNORM,
@@ -25,20 +57,22 @@ pub fn vulkan(format: Format) -> vk::Format {
     }
 }
 
-/// A poison as texels of a format.
-pub fn held(poison: Poison, format: Format) -> vk::ClearColorValue {
+/// The clear value that fills an image of a format with a poison.
+pub(super) fn clear_value(poison: Poison, format: Format) -> vk::ClearColorValue {
     match format {
-        Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.whole; 4] },
-        Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 => vk::ClearColorValue { float32: [poison.share; 4] },
+        Format::R32u | Format::Rg32u => vk::ClearColorValue { uint32: [poison.integer; 4] },
+        Format::R8 | Format::R16 | Format::Rg16 | Format::Rgba8 => {
+            vk::ClearColorValue { float32: [poison.normalized; 4] }
+        }
         _ => vk::ClearColorValue { float32: [poison.float; 4] },
     }
 }
 
-/// What an image of this slot is used for. What no pass writes is a storage image only where those are read by preference.
-pub fn usage(context: &Context, slot: Slot) -> vk::ImageUsageFlags {
+/// The usage of a slot's image. One that no pass writes is a storage image only if texels are read from storage images.
+pub(super) fn usage(context: &Context, slot: Slot) -> vk::ImageUsageFlags {
     let read = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::TRANSFER_SRC;
     match slot {
-        Slot::Frames | Slot::ScanLut if Fetch::of(&context.candidate) == Fetch::Textures => read,
+        Slot::Frames | Slot::ScanLut if TexelAccess::for_device(&context.candidate) == TexelAccess::Textures => read,
         _ => read | vk::ImageUsageFlags::STORAGE,
     }
 }
@@ -56,19 +90,22 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
     features
 }
 
-/// The scene with its samples taken in the way that is fastest here: by eight texels where those are loaded, and where the device
-/// cannot filter the volume's format at all.
-pub fn suited(context: &Context, fetch: Fetch, scene: Scene) -> Scene {
+/// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
+/// device cannot filter the volume's format; and no packed neighbours if the device cannot hold them.
+pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
     let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
-    let scene = scene.sampled(if filters { fetch.sampling() } else { Sampling::Exact });
+    let scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     let format = vulkan(Slot::Quads.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::Quads));
     let fits = fits.is_ok_and(|l| Slot::Quads.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
     if fits { scene } else { scene.without_quads() }
 }
 
-/// Refuses a plan whose slots the device cannot hold, before anything is allocated.
+/// Checks that the device can hold the slots of a plan, before anything is allocated.
+///
+/// # Errors
+/// The first slot that exceeds a limit or whose format is not supported.
 pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuError> {
     let limits = &context.limits;
     for &slot in &plan.slots {
@@ -114,17 +151,17 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
     Ok(())
 }
 
-/// What a device does with a format.
-pub struct Abilities {
+/// The uses of a format that a device supports.
+pub struct FormatSupport {
     pub format: String,
-    pub can: Vec<&'static str>,
-    pub cannot: Vec<&'static str>,
-    /// Columns and rows of the largest sampled image, and texels along each edge of the largest volume; 0 where there is none.
-    pub largest: [u32; 3],
+    pub supported: Vec<&'static str>,
+    pub unsupported: Vec<&'static str>,
+    /// Width and height of the largest sampled image, and the edge of the largest cubic volume, texels; 0 without support.
+    pub max_extent: [u32; 3],
 }
 
-/// Every format that slots have, with everything that slots are used for.
-pub fn abilities(context: &Context) -> Vec<Abilities> {
+/// All formats of slots, with all uses that slots make of them.
+pub fn format_support(context: &Context) -> Vec<FormatSupport> {
     let formats = [
         Format::R8,
         Format::R16,
@@ -148,25 +185,25 @@ pub fn abilities(context: &Context) -> Vec<Abilities> {
     ];
     let of = |format: Format| {
         let there = context.format_features(vulkan(format));
-        let (can, cannot): (Vec<_>, Vec<_>) = uses.iter().partition(|(_, needed)| there.contains(*needed));
+        let (supported, unsupported): (Vec<_>, Vec<_>) = uses.iter().partition(|(_, needed)| there.contains(*needed));
         let edge = |kind| context.image_limits(vulkan(format), kind, vk::ImageUsageFlags::SAMPLED);
         let extent = |kind| edge(kind).map_or(vk::Extent3D::default(), |limits| limits.max_extent);
         let (flat, deep) = (extent(vk::ImageType::TYPE_2D), extent(vk::ImageType::TYPE_3D));
         let names = |of: Vec<&(&'static str, vk::FormatFeatureFlags)>| of.iter().map(|(name, _)| *name).collect();
-        Abilities {
+        FormatSupport {
             format: format!("{format:?}"),
-            can: names(can),
-            cannot: names(cannot),
-            largest: [flat.width, flat.height, deep.width.min(deep.height).min(deep.depth)],
+            supported: names(supported),
+            unsupported: names(unsupported),
+            max_extent: [flat.width, flat.height, deep.width.min(deep.height).min(deep.depth)],
         }
     };
     formats.into_iter().map(of).collect()
 }
 
-/// As if the device could filter no format of a volume.
-pub fn deny_filters(context: &mut Context) {
+/// Fault injection: the device appears unable to filter any format of a volume.
+pub fn disable_linear_filter(context: &mut Context) {
     for format in [Format::R8, Format::R16, Format::R16f, Format::R32f].map(vulkan) {
         let there = context.format_features(format);
-        context.take_features(format, there & !vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+        context.override_features(format, there & !vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
     }
 }

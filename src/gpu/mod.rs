@@ -1,33 +1,35 @@
-//! The only folder that knows Vulkan, and the only one with unsafe code.
+//! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
-//! [`context`] owns instance, device, queue and allocator; [`resources`] images and buffers; [`pipelines`] what a shader
-//! becomes; [`slots`] the resources of a scene; [`recorder`] one command buffer, with the barriers of [`order`] and time stamps; [`measured`] what those said; [`timeline`] what is done;
-//! [`renderer`] the four stages; [`single`] one pass alone, for tests; [`window`] what shows their pictures.
+//! - [`context`] owns instance, device, queues and allocator; [`device_selection`] picks the device; [`faults`] injects faults.
+//! - [`resources`] are images and buffers, [`slots`] those of a scene, [`formats`] what the device can do with them.
+//! - [`pipelines`] compiles shaders, [`async_compiler`] does so on its own thread, [`shader_reload`] takes them from a folder that is watched.
+//! - [`recorder`] records one command buffer with the barriers of [`barrier_recorder`] and the time stamps of [`timing`];
+//!   [`timeline`] says when a submission is done.
+//! - [`renderer`] runs the four stages, [`pass_runner`] a single pass for tests and benchmarks.
+//! - [`window`] presents pictures.
 
+pub mod async_compiler;
 pub mod barrier_recorder;
 pub mod context;
+mod descriptor_sets;
+pub mod device_selection;
 pub mod error;
 pub mod faults;
 pub mod formats;
-pub mod measured;
 pub mod pass_runner;
 pub mod pipelines;
-pub mod recorder;
+mod recorder;
 pub mod renderer;
 pub mod resources;
-pub mod select;
 pub mod shader_reload;
-pub mod slots;
-pub mod timeline;
-pub mod timing;
-#[cfg(feature = "view")]
+mod slots;
+mod timeline;
+mod timing;
 pub mod window;
-#[cfg(not(feature = "view"))]
-#[path = "no_window.rs"]
-mod window;
 
+pub use async_compiler::Wake;
 pub use context::{Context, ContextOptions};
+pub use device_selection::{Candidate, DeviceChoice};
 pub use error::GpuError;
-pub use pipelines::{Fetch, Wake};
-pub use renderer::{Options, Renderer};
-pub use select::{Candidate, Choice};
+pub use formats::TexelAccess;
+pub use renderer::{Renderer, RendererOptions};

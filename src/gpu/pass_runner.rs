@@ -2,14 +2,14 @@
 
 use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
-use super::measured::Measured;
-use super::pipelines::{Fetch, Pipeline, Pipelines, embedded};
-use super::recorder::{Place, Recorder, Work};
-use super::renderer::size_of;
-use super::resources::{Buffer, Purpose};
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::recorder::{Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, shape_size};
 use super::slots::Slots;
 use super::timeline::Timelines;
-use super::{GpuError, formats};
+use super::timing::Timings;
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
@@ -20,17 +20,21 @@ use std::sync::Arc;
 pub struct PassRunner {
     context: Arc<Context>,
     pipelines: Pipelines,
-    fetch: Fetch,
+    texel_access: TexelAccess,
 }
 
 impl PassRunner {
     pub fn new(context: &Arc<Context>) -> Result<PassRunner, GpuError> {
-        PassRunner::fetching(context, Fetch::of(&context.candidate))
+        PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
 
     /// With texels read in a way that may not be the device's fastest.
-    pub fn fetching(context: &Arc<Context>, fetch: Fetch) -> Result<PassRunner, GpuError> {
-        Ok(PassRunner { context: context.clone(), pipelines: Pipelines::new(context, embedded(), fetch)?, fetch })
+    pub fn with_texel_access(context: &Arc<Context>, texel_access: TexelAccess) -> Result<PassRunner, GpuError> {
+        Ok(PassRunner {
+            context: context.clone(),
+            pipelines: Pipelines::new(context, embedded(), texel_access)?,
+            texel_access,
+        })
     }
 
     /// Bits of the weights that the device's own filter has, as it says.
@@ -48,13 +52,13 @@ impl PassRunner {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
-        let scene = &formats::suited(&self.context, self.fetch, scene.clone());
+        let scene = &formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
         let mut recorder = Recorder::new(&self.context, 0, pass.name, false)?;
-        let mut order = BarrierRecorder::default();
+        let mut barriers = BarrierRecorder::default();
         let pipeline = self.pipelines.get(pass, scene, args)?;
         let new = slots.fit(&plan, scene)?;
 
@@ -72,12 +76,12 @@ impl PassRunner {
         }
         for bind in &writes {
             let format = bind.slot.format(scene);
-            let poisoned = Texels::from_fn(size_of(bind.slot.shape(scene)), format.channels(), |_, _| poison);
+            let poisoned = Texels::from_fn(shape_size(bind.slot.shape(scene)), format.channels(), |_, _| poison);
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
-        recorder.begin(&mut order, &timelines)?;
-        recorder.clear_new(&mut order, &slots, &new);
+        recorder.begin(&mut barriers, &timelines)?;
+        recorder.clear_new(&mut barriers, &slots, &new);
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
@@ -88,19 +92,19 @@ impl PassRunner {
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_in(&mut order, &staging, image, Place { slot: bind.slot, copy, parts });
+            recorder.copy_in(&mut barriers, &staging, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(staging);
         }
-        recorder.dispatch(&mut order, &Work { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
+        recorder.dispatch(&mut barriers, &Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
             let buffer = Buffer::new(&self.context, "output", bind.slot.bytes(scene), Purpose::Readback)?;
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_out(&mut order, image, bind.slot, copy, &buffer);
-            results.push((bind.name, size_of(image.shape), image.format, buffer));
+            recorder.copy_out(&mut barriers, image, bind.slot, copy, &buffer);
+            results.push((bind.name, shape_size(image.shape), image.format, buffer));
         }
-        recorder.submit(&mut order, &mut timelines)?;
+        recorder.submit(&mut barriers, &mut timelines)?;
         let done = timelines.wait_all();
         // Everything above is freed at the end, also when waiting failed.
         timelines.drain();
@@ -114,21 +118,21 @@ impl PassRunner {
 }
 
 /// One pass of a scene, with slots and pipelines of its own, to be run and timed as often as wanted.
-pub struct Timed {
-    // Dropped in this order, after `drop` has waited for the device.
+pub struct PassTimer {
+    // Dropped in this barriers, after `drop` has waited for the device.
     recorder: Recorder,
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
     _pipelines: Pipelines,
     slots: Slots,
     timelines: Timelines,
-    order: BarrierRecorder,
+    barriers: BarrierRecorder,
     context: Arc<Context>,
     scene: Scene,
     pass: &'static Pass,
 }
 
-impl Timed {
+impl PassTimer {
     /// `contents` is what images hold before the first run; those left out hold zeros. What the scene makes itself is there in
     /// any case. A pass of frames works on layer 0 and the middle slice, one of volumes on all slices. Runs once, because
     /// drivers compile then.
@@ -140,19 +144,19 @@ impl Timed {
         scene: &Scene,
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
-    ) -> Result<Timed, GpuError> {
-        Timed::fetching(context, scene, pass, contents, Fetch::of(&context.candidate))
+    ) -> Result<PassTimer, GpuError> {
+        PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
     }
 
     /// The same with texels read in a way that may not be the device's fastest.
-    pub fn fetching(
+    pub fn with_texel_access(
         context: &Arc<Context>,
         scene: &Scene,
         pass: &'static Pass,
         contents: &[(Slot, Texels)],
-        fetch: Fetch,
-    ) -> Result<Timed, GpuError> {
-        let scene = &formats::suited(context, fetch, scene.clone());
+        texel_access: TexelAccess,
+    ) -> Result<PassTimer, GpuError> {
+        let scene = &formats::adapt_scene(context, texel_access, scene.clone());
         let first = DispatchArgs { slice: scene.slices() / 2, ..DispatchArgs::default() };
         let first = if pass.frequency == Frequency::Frame {
             first
@@ -162,7 +166,7 @@ impl Timed {
         let turns: Vec<DispatchArgs> =
             (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
-        let pipelines = Pipelines::new(context, embedded(), fetch)?;
+        let pipelines = Pipelines::new(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
         for args in turns {
             let binds = [(pass.reads)(scene, &args), (pass.writes)(scene, &args)].concat();
@@ -171,13 +175,13 @@ impl Timed {
         }
         plan.slots.sort();
         plan.slots.dedup();
-        let mut timed = Timed {
+        let mut timed = PassTimer {
             recorder: Recorder::new(context, 0, pass.name, false)?,
             dispatches,
             _pipelines: pipelines,
             slots: Slots::new(context, 1),
             timelines: Timelines::new(context, 1)?,
-            order: BarrierRecorder::default(),
+            barriers: BarrierRecorder::default(),
             context: context.clone(),
             scene: scene.clone(),
             pass,
@@ -189,8 +193,8 @@ impl Timed {
 
     fn fill(&mut self, plan: &Plan, contents: &[(Slot, Texels)]) -> Result<(), GpuError> {
         let new = self.slots.fit(plan, &self.scene)?;
-        self.recorder.begin(&mut self.order, &self.timelines)?;
-        self.recorder.clear_new(&mut self.order, &self.slots, &new);
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
+        self.recorder.clear_new(&mut self.barriers, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
             let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, t)| t.encode(slot.format(&self.scene)));
@@ -204,11 +208,11 @@ impl Timed {
             let mut staging = Buffer::new(&self.context, "contents", slot.bytes(&self.scene), Purpose::Staging)?;
             let length = bytes.len().min(staging.bytes().len());
             staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-            let place = Place { slot, copy, parts: 0..image.shape.parts() };
-            self.recorder.copy_in(&mut self.order, &staging, image, place);
+            let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
+            self.recorder.copy_in(&mut self.barriers, &staging, image, place);
             keep.push(staging);
         }
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
         // The staging buffers are freed at the end, also when waiting failed.
         self.timelines.drain();
@@ -218,32 +222,32 @@ impl Timed {
     /// Runs every iteration of the pass once, in one submission, and waits: the device's time for them all, ns; none where it
     /// has no time stamps. A pass that repeats works on what it left there the last time.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
-        self.recorder.begin(&mut self.order, &self.timelines)?;
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
         for (args, pipeline) in &self.dispatches {
-            let work = Work { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
-            self.recorder.dispatch(&mut self.order, &work)?;
+            let work = Dispatch { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
+            self.recorder.dispatch(&mut self.barriers, &work)?;
         }
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
-        let mut measured = Measured::new(&self.context, false);
-        self.recorder.collect(&self.timelines, &mut measured)?;
-        Ok(measured.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
+        let mut timings = Timings::new(&self.context, false);
+        self.recorder.collect(&self.timelines, &mut timings)?;
+        Ok(timings.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
     }
 
     /// What an image holds now; none for a slot that the pass does not touch, or that is a table.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
-        self.recorder.begin(&mut self.order, &self.timelines)?;
-        self.recorder.copy_out(&mut self.order, image, slot, 0, &buffer);
-        self.recorder.submit(&mut self.order, &mut self.timelines)?;
+        self.recorder.begin(&mut self.barriers, &self.timelines)?;
+        self.recorder.copy_out(&mut self.barriers, image, slot, 0, &buffer);
+        self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
         self.timelines.drain();
-        done.map(|()| Some(Texels::decode(size_of(image.shape), image.format, buffer.bytes())))
+        done.map(|()| Some(Texels::decode(shape_size(image.shape), image.format, buffer.bytes())))
     }
 }
 
-impl Drop for Timed {
+impl Drop for PassTimer {
     fn drop(&mut self) {
         self.timelines.drain();
     }
@@ -251,8 +255,8 @@ impl Drop for Timed {
 
 /// Times of `count` runs of one pass in a row, ns, each of all its iterations, over slots that hold zeros; empty where the
 /// device has no time stamps. A run before them, which compiles, is left out.
-pub fn time(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
-    let mut timed = Timed::new(context, scene, pass, &[])?;
+pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
+    let mut timed = PassTimer::new(context, scene, pass, &[])?;
     let mut times = Vec::new();
     for _ in 0..count {
         times.extend(timed.run()?);

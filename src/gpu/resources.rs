@@ -1,9 +1,8 @@
-//! Images and buffers that own their memory and free themselves.
+//! Images and buffers that own their memory.
 
-use super::GpuError;
 use super::context::Context;
-use super::error::Doing;
-use super::faults::Seam;
+use super::error::{ErrorContext, GpuError};
+use super::faults::InjectionPoint;
 use super::formats;
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Shape};
@@ -13,12 +12,13 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+/// An image, its memory and its views.
 pub struct Image {
     context: Arc<Context>,
     pub handle: vk::Image,
-    /// All of it.
+    /// A view of the complete image.
     pub view: vk::ImageView,
-    /// Each layer of an array by itself: what a frame is read through.
+    /// A view of each layer of an array: frames are read through these.
     pub layers: Vec<vk::ImageView>,
     pub extent: vk::Extent3D,
     pub shape: Shape,
@@ -26,25 +26,26 @@ pub struct Image {
     allocation: Option<Allocation>,
 }
 
+/// A buffer and its memory, mapped as long as it lives.
 pub struct Buffer {
     context: Arc<Context>,
     pub handle: vk::Buffer,
     pub size: u64,
-    /// A table as texels of one, two and four floats.
+    /// For a lookup table: views with texels of one, two and four floats.
     texels: [vk::BufferView; 3],
     allocation: Option<Allocation>,
 }
 
-/// What a buffer is for, which decides where it lives.
+/// The purpose of a buffer. It decides the kind of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// A table that shaders read.
+    /// A lookup table that shaders read.
     Table,
-    /// Numbers of passes, written by the CPU.
+    /// Uniform numbers of passes, written by the CPU.
     Params,
-    /// Frames on their way in, written by the CPU.
+    /// Data to upload, written by the CPU.
     Staging,
-    /// Results on their way out, read by the CPU.
+    /// Results to download, read by the CPU.
     Readback,
 }
 
@@ -54,13 +55,13 @@ fn allocate(
     requirements: vk::MemoryRequirements,
     location: MemoryLocation,
     linear: bool,
-    doing: &dyn Fn() -> String,
+    operation: &dyn Fn() -> String,
 ) -> Result<Allocation, GpuError> {
-    context.faults.pass(Seam::Allocate).doing(doing)?;
+    context.faults.check(InjectionPoint::Allocate).context(operation)?;
     context.counts.allocations.fetch_add(1, Ordering::Relaxed);
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     let Some(allocator) = allocator.as_mut() else {
-        return Err(GpuError::Memory { doing: doing(), fault: "the context is shutting down".into() });
+        return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
     };
     allocator
         .allocate(&AllocationCreateDesc {
@@ -70,19 +71,22 @@ fn allocate(
             linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         })
-        .map_err(|e| GpuError::Memory { doing: doing(), fault: e.to_string() })
+        .map_err(|e| GpuError::Memory { operation: operation(), fault: e.to_string() })
 }
 
 fn free(context: &Context, allocation: Option<Allocation>) {
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
-        // Freeing what this allocator made cannot fail; a Drop could not report it anyway.
+        // Freeing an allocation of this allocator cannot fail, and a Drop could not report it.
         let _ = allocator.free(allocation);
     }
 }
 
 impl Image {
     /// An image in layout UNDEFINED.
+    ///
+    /// # Errors
+    /// Out of memory; a device that fails.
     pub fn new(context: &Arc<Context>, slot: Slot, shape: Shape, format: Format) -> Result<Image, GpuError> {
         let (kind, view_kind, [width, height, depth], layers) = match shape {
             Shape::Two([w, h]) => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D, [w, h, 1], 1),
@@ -90,13 +94,13 @@ impl Image {
             Shape::Three(size) => (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D, size, 1),
             Shape::Buffer(_) => {
                 return Err(GpuError::Memory {
-                    doing: format!("create image '{}'", slot.name()),
-                    fault: "is a buffer".into(),
+                    operation: format!("create image '{}'", slot.name()),
+                    fault: "the slot is a buffer".into(),
                 });
             }
         };
         let mebibytes = shape.texels() * format.texel_bytes() as u64 / (1 << 20);
-        let doing = || {
+        let operation = || {
             format!(
                 "create image '{}' ({width}x{height}x{} {format:?}, {mebibytes} MiB)",
                 slot.name(),
@@ -118,8 +122,8 @@ impl Image {
         }
         let device = &context.device;
         // SAFETY: the create structure is complete and its pointers live; limits and formats were checked for the plan.
-        let handle = unsafe { device.create_image(&create, None) }.doing(doing)?;
-        // From here on a failure is cleaned up by dropping `image`.
+        let handle = unsafe { device.create_image(&create, None) }.context(operation)?;
+        // From here on, dropping `image` cleans up after a failure.
         let mut image = Image {
             context: context.clone(),
             handle,
@@ -132,11 +136,11 @@ impl Image {
         };
         // SAFETY: the image was just made by this device.
         let requirements = unsafe { device.get_image_memory_requirements(handle) };
-        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &doing)?;
+        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the image.
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
-        bound.doing(doing)?;
+        bound.context(operation)?;
         image.view = image.create_view(slot.name(), view_kind, 0, layers)?;
         if let Shape::Layers(_) = shape {
             for layer in 0..layers {
@@ -164,13 +168,13 @@ impl Image {
             .subresource_range(range);
         // SAFETY: the image is bound to memory and alive.
         let view = unsafe { self.context.device.create_image_view(&create, None) };
-        let view = view.doing(|| format!("create a view of image '{name}'"))?;
+        let view = view.context(|| format!("create a view of image '{name}'"))?;
         self.context.name(view, name);
         Ok(view)
     }
 }
 
-/// Every layer of the one mip level.
+/// All layers of the only mip level.
 pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
     base_mip_level: 0,
@@ -192,16 +196,25 @@ impl Drop for Image {
     }
 }
 
+/// Texels of a shape along x, y and z; the first varies fastest. A buffer counts as a row of floats.
+pub fn shape_size(shape: Shape) -> [usize; 3] {
+    match shape {
+        Shape::Two([w, h]) => [w as usize, h as usize, 1],
+        Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
+        Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
+    }
+}
+
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
-/// Whether a table of so many bytes can be read by texels, whatever its entries are.
+/// True if a lookup table of this size can be a texel buffer, for any size of its entries.
 pub fn has_texels(context: &Context, bytes: u64) -> bool {
     bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
 }
 
 impl Buffer {
     pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
-        let doing = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
+        let operation = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
         let (usage, location) = match purpose {
             Purpose::Table => (
                 vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
@@ -212,21 +225,21 @@ impl Buffer {
             Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
         };
         if size > context.candidate.max_bytes {
-            return Err(GpuError::Limit { what: doing(), needed: size, allowed: context.candidate.max_bytes });
+            return Err(GpuError::Limit { what: operation(), needed: size, allowed: context.candidate.max_bytes });
         }
         let create = vk::BufferCreateInfo::default().size(size.max(4)).usage(usage);
         let device = &context.device;
         // SAFETY: the create structure is complete.
-        let handle = unsafe { device.create_buffer(&create, None) }.doing(doing)?;
+        let handle = unsafe { device.create_buffer(&create, None) }.context(operation)?;
         let mut buffer =
             Buffer { context: context.clone(), handle, size, texels: Default::default(), allocation: None };
         // SAFETY: the buffer was just made by this device.
         let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-        let allocation = allocate(context, name, requirements, location, true, &doing)?;
+        let allocation = allocate(context, name, requirements, location, true, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the buffer.
         let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
         buffer.allocation = Some(allocation);
-        bound.doing(doing)?;
+        bound.context(operation)?;
         context.name(handle, name);
         if let Some(poison) = context.faults.poisoned() {
             buffer.bytes_mut().fill(poison.byte);
@@ -235,19 +248,19 @@ impl Buffer {
             for (n, format) in TEXELS.into_iter().enumerate() {
                 let create = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
                 // SAFETY: the buffer is bound to memory and alive; every device has these formats as texel buffers.
-                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.doing(doing)?;
+                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.context(operation)?;
                 context.name(buffer.texels[n], name);
             }
         }
         Ok(buffer)
     }
 
-    /// A table as texels of so many floats.
+    /// The view of a lookup table with texels of 1, 2 or 4 floats.
     pub fn texels(&self, components: u32) -> vk::BufferView {
         self.texels[components.ilog2().min(2) as usize]
     }
 
-    /// The bytes, mapped as long as the buffer lives. Every purpose is visible to the host.
+    /// The mapped bytes. Buffers of every purpose are visible to the host.
     pub fn bytes(&self) -> &[u8] {
         let bytes = self.allocation.as_ref().and_then(|a| a.mapped_slice()).unwrap_or(&[]);
         &bytes[..bytes.len().min(self.size as usize)]

@@ -1,21 +1,22 @@
-//! Timeline semaphores, one a queue: what was submitted, and whether it is done.
+//! Timeline semaphores, one for each queue: they say which submissions are done.
 
-use super::GpuError;
 use super::context::Context;
-use super::error::Doing;
-use super::faults::Seam;
+use super::error::{ErrorContext, GpuError};
+use super::faults::InjectionPoint;
 use ash::vk;
 use std::sync::Arc;
 
-/// A software device may need minutes for a picture of 16k pixels.
-const TIME_OUT: u64 = 600;
+/// A software device may need minutes for a picture 16384 pixels wide.
+const TIMEOUT_SECONDS: u64 = 600;
 
-/// Done when the timeline has reached a value.
+/// A submission is done when its queue's timeline has reached its value.
 pub struct Timeline {
     context: Arc<Context>,
     pub(super) semaphore: vk::Semaphore,
+    /// The value of the last submission.
     pub submitted: u64,
-    pub(super) doing: String,
+    /// Name of the last submission.
+    pub(super) label: String,
 }
 
 impl Timeline {
@@ -23,12 +24,16 @@ impl Timeline {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: the chain is complete and outlives the call.
-        let semaphore = unsafe { context.device.create_semaphore(&create, None) }.doing(|| "create timeline".into())?;
+        let semaphore =
+            unsafe { context.device.create_semaphore(&create, None) }.context(|| "create timeline".into())?;
         context.name(semaphore, "timeline");
-        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, doing: String::new() })
+        Ok(Timeline { context: context.clone(), semaphore, submitted: 0, label: String::new() })
     }
 
     /// Blocks until a submission is done.
+    ///
+    /// # Errors
+    /// A time-out; a device that fails.
     pub fn wait(&self, value: u64) -> Result<(), GpuError> {
         let (semaphores, values) = ([self.semaphore], [value]);
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
@@ -36,11 +41,13 @@ impl Timeline {
         let result = self
             .context
             .faults
-            .pass(Seam::Wait)
-            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIME_OUT * 1_000_000_000) });
+            .check(InjectionPoint::Wait)
+            .and_then(|()| unsafe { self.context.device.wait_semaphores(&wait, TIMEOUT_SECONDS * 1_000_000_000) });
         match result {
-            Err(vk::Result::TIMEOUT) => Err(GpuError::TimedOut { seconds: TIME_OUT, doing: self.doing.clone() }),
-            other => other.doing(|| format!("run {}", self.doing)),
+            Err(vk::Result::TIMEOUT) => {
+                Err(GpuError::TimedOut { seconds: TIMEOUT_SECONDS, operation: self.label.clone() })
+            }
+            other => other.context(|| format!("run {}", self.label)),
         }
     }
 
@@ -48,15 +55,15 @@ impl Timeline {
         self.wait(self.submitted)
     }
 
-    /// Whether a submission is done, without waiting for it.
+    /// True if a submission is done; does not wait.
     pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
         // SAFETY: the semaphore is alive.
         let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) };
-        reached.map(|reached| reached >= value).doing(|| format!("run {}", self.doing))
+        reached.map(|reached| reached >= value).context(|| format!("run {}", self.label))
     }
 
-    /// Before anything in flight is destroyed: waits for what was submitted, and if that fails for the whole device. One that is
-    /// lost answers that at once.
+    /// To be called before resources in flight are destroyed: waits for all submissions, and if that fails for an idle device. A
+    /// lost device returns at once.
     pub fn drain(&self) {
         if self.wait_all().is_err() {
             self.context.wait_idle();
@@ -64,7 +71,7 @@ impl Timeline {
     }
 }
 
-/// Those of all queues that a renderer uses.
+/// The timelines of all queues that a renderer uses.
 pub struct Timelines(Vec<Timeline>);
 
 impl Timelines {
@@ -92,8 +99,8 @@ impl Timelines {
 
 impl Drop for Timelines {
     fn drop(&mut self) {
-        // lavapipe (Mesa 22.3, `vk_queue_submit_destroy`) lets go of the timelines that a submission waited for after its own has told
-        // that it is done: one that is destroyed at once may still be locked there.
+        // lavapipe (Mesa 22.3, `vk_queue_submit_destroy`) releases the timelines that a submission waited for only after it has signalled
+        // its own. A timeline that is destroyed at once may still be locked there.
         if let [first, _, ..] = &self.0[..] {
             first.context.wait_idle();
         }

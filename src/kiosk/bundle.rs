@@ -1,8 +1,7 @@
-//! What whoever is to help needs to see, in one archive: the program and the machine, the configuration, and the logs; and nothing of
-//! a patient.
+//! The support bundle: one archive with information about program and machine, the configuration and the logs, without data of patients.
 
 use super::config::{self, Config};
-use super::log_rotation::{holds_a_log, numbered};
+use super::log_rotation::{is_log_file, rotated_name};
 use super::redaction::Redactor;
 use crate::scene::load;
 use flate2::Compression;
@@ -13,81 +12,81 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Of all files of the log together, the newest, bytes.
-const MOST_LOG: u64 = 20 << 20;
-/// Files of a log that are looked for.
-const MOST_FILES: u32 = 100;
-/// Longest text of anything else, bytes.
-const LONGEST: usize = 1 << 20;
+/// Largest size of all logs together, bytes; the newest ones are kept.
+const MAX_LOG_BYTES: u64 = 20 << 20;
+/// Largest number of log files.
+const MAX_LOG_FILES: u32 = 100;
+/// Largest size of any other text, bytes.
+const MAX_ENTRY: usize = 1 << 20;
 
 const ABOUT: &str = "\
-What Echolume packed for whoever is to help. All of it is text; have a look before you pass it on.
+A support bundle of Echolume. All of it is text; check it before you pass it on.
 
-What is NOT in it: recordings, pictures, volumes or anything that was rendered; names of patients; names of recordings and pictures, and
-folders outside of the system's own, for which `<file-1>.mha`, `<path-2>` and `<name-3>` stand, the same for the same name; users and
-passwords of addresses; comments of the configuration; the names of this machine and its users.
+It does NOT contain recordings, pictures, volumes or anything that was rendered; names of patients; names of recordings and pictures, and
+folders outside of the system folders, which are replaced by `<file-1>.mha`, `<path-2>` and `<name-3>` (the same for the same name); users
+and passwords of addresses; comments of the configuration; the names of this machine and its users.
 
-What stays: addresses such as that of a scanner, the port of a motor, and whatever somebody typed where no file is named, such as a tool.
+It does contain addresses such as that of a scanner, the port of a motor, and text that is not a file name, such as a tool.
 
-What is in it:
+Contents:
 
 ";
 
-/// The archive as it fills.
+/// A support bundle.
 pub struct Bundle {
     redactor: Redactor,
     entries: Vec<Entry>,
-    /// What the first page says beside the list.
+    /// Notes for the README, after the list of contents.
     notes: Vec<String>,
 }
 
 struct Entry {
     name: String,
-    what: String,
+    description: String,
     text: String,
 }
 
 impl Bundle {
-    /// With what is known of the system, the configuration and the logs that it names. `config`: the usual one where none is given.
-    /// Nothing of this fails: what cannot be had is said inside.
+    /// Collects the system information, the configuration and its logs. `config`: path of the configuration, or the default one. This
+    /// never fails: what cannot be read is noted in the bundle.
     pub fn new(config: Option<&Path>) -> Bundle {
         let mut bundle = Bundle { redactor: Redactor::new(), entries: Vec::new(), notes: Vec::new() };
-        let path = config.unwrap_or(Path::new(config::USUAL));
+        let path = config.unwrap_or(Path::new(config::DEFAULT_PATH));
         let text = load::read(path, "configuration").map_err(|error| error.to_string());
         let table = text.as_ref().ok().and_then(|text| toml::from_str::<toml::Table>(text).ok());
-        let log = bundle.learn(path, table.as_ref());
-        bundle.add("system.txt", "program, system, processor, memory, variables for Vulkan", &system());
+        let log = bundle.add_private_names(path, table.as_ref());
+        bundle.add("system.txt", "program, system, processor, memory, variables for Vulkan", &system_information());
         bundle.add_configuration(path, text, table);
         bundle.add_logs(&log);
         bundle
     }
 
-    /// What is private, from a configuration that need not be right; and where the log is.
-    fn learn(&mut self, path: &Path, table: Option<&toml::Table>) -> PathBuf {
+    /// Collects private names from a configuration, which may be invalid. Returns the path of the log.
+    fn add_private_names(&mut self, path: &Path, table: Option<&toml::Table>) -> PathBuf {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let said = |above: Option<&str>, key: &str| {
+        let value_of = |above: Option<&str>, key: &str| {
             let table = above.map_or(table, |above| table?.get(above)?.as_table());
             Some(table?.get(key)?.as_str()?.to_string())
         };
-        if let Some(source) = said(None, "source").filter(|s| s != config::PHANTOM && !s.contains("://")) {
+        if let Some(source) = value_of(None, "source").filter(|s| s != config::PHANTOM && !s.contains("://")) {
             self.redactor.add_recording(Path::new(&source));
             self.redactor.add_folder(folder.join(&source).parent().unwrap_or(folder));
         }
-        for private in [said(Some("files"), "pictures"), said(Some("live"), "record")].into_iter().flatten() {
+        for private in [value_of(Some("files"), "pictures"), value_of(Some("live"), "record")].into_iter().flatten() {
             self.redactor.add_folder(&folder.join(private));
         }
-        said(Some("files"), "log").map_or(config::USUAL_LOG.into(), |log| folder.join(log))
+        value_of(Some("files"), "log").map_or(config::DEFAULT_LOG.into(), |log| folder.join(log))
     }
 
-    /// An entry, without the names in it; what is longer than 1 MiB is cut.
-    pub fn add(&mut self, name: &str, what: &str, text: &str) {
-        let end = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
-        self.add_whole(name, what, &text[..end]);
+    /// Adds an entry with redacted text, cut at 1 MiB.
+    pub fn add(&mut self, name: &str, description: &str, text: &str) {
+        let end = text.char_indices().nth(MAX_ENTRY).map_or(text.len(), |(end, _)| end);
+        self.add_entry(name, description, &text[..end]);
     }
 
-    fn add_whole(&mut self, name: &str, what: &str, text: &str) {
-        let text = self.redactor.text(text);
-        self.entries.push(Entry { name: name.into(), what: what.into(), text });
+    fn add_entry(&mut self, name: &str, description: &str, text: &str) {
+        let text = self.redactor.redact(text);
+        self.entries.push(Entry { name: name.into(), description: description.into(), text });
     }
 
     fn add_configuration(&mut self, path: &Path, text: Result<String, String>, table: Option<toml::Table>) {
@@ -97,72 +96,70 @@ impl Bundle {
         };
         let written = match &table {
             Some(table) => toml::to_string(table).unwrap_or_else(|e| format!("cannot be shown: {e}\n")),
-            // Where nobody can say what is a comment and what a name, only the keys are left.
+            // Without valid TOML, comments and names cannot be told apart from keys: only the keys are kept.
             None => keys(&text),
         };
-        self.add("configuration/as-written.toml", "the file, in order of its keys, without comments", &written);
+        self.add("configuration/as-written.toml", "the file, sorted by key, without comments", &written);
         match Config::parse(&text, path) {
             Ok(config) => {
                 let read = config.to_toml().unwrap_or_else(|e| format!("cannot be shown: {e}\n"));
-                self.add(
-                    "configuration/as-read.toml",
-                    "the same as the program takes it, with what was left out",
-                    &read,
-                );
+                self.add("configuration/as-read.toml", "the configuration as read, including defaults", &read);
             }
-            Err(error) => self.add("configuration/refused.txt", "why the program refuses it", &format!("{error}\n")),
+            Err(error) => {
+                self.add("configuration/refused.txt", "the error in the configuration", &format!("{error}\n"))
+            }
         }
     }
 
-    /// The newest of the log and of what rotated away, 20 MiB in all.
+    /// Adds the log and its rotated files, newest first, at most 20 MiB in all.
     fn add_logs(&mut self, log: &Path) {
-        let (mut left, mut found) = (MOST_LOG, false);
-        for number in 0..MOST_FILES {
-            let file = numbered(log, number);
+        let (mut left, mut found) = (MAX_LOG_BYTES, false);
+        for number in 0..MAX_LOG_FILES {
+            let file = rotated_name(log, number);
             if left == 0 || !std::fs::metadata(&file).is_ok_and(|there| there.is_file()) {
-                // The one that is written may be between two rotations.
+                // During a rotation the current file is missing for a moment.
                 if number == 0 { continue } else { break }
             }
             found = true;
-            let name = numbered(Path::new("logs/echolume.log"), number).to_string_lossy().into_owned();
-            if !holds_a_log(&file) {
-                self.note(&format!("{name}: {} is no log and was left out", file.display()));
+            let name = rotated_name(Path::new("logs/echolume.log"), number).to_string_lossy().into_owned();
+            if !is_log_file(&file) {
+                self.note(&format!("{name}: {} is not a log and was left out", file.display()));
                 continue;
             }
             match tail(&file, left) {
                 Ok((bytes, cut)) => {
                     left -= left.min(bytes.len() as u64);
-                    let what = if cut { "the log, its last part" } else { "the log" };
-                    self.add_whole(&name, what, &String::from_utf8_lossy(&bytes));
+                    let description = if cut { "the end of the log" } else { "the log" };
+                    self.add_entry(&name, description, &String::from_utf8_lossy(&bytes));
                 }
                 Err(error) => self.note(&format!("{name}: {} cannot be read: {error}", file.display())),
             }
         }
         if !found {
-            self.note(&format!("logs: there is none at {}", log.display()));
+            self.note(&format!("logs: none found at {}", log.display()));
         }
     }
 
-    /// A line of the first page: what is missing, and why.
+    /// Adds a note to the README: what is missing, and why.
     pub fn note(&mut self, note: &str) {
-        let note = self.redactor.text(&crate::text::printable(note));
+        let note = self.redactor.redact(&crate::text::printable(note));
         self.notes.push(note);
     }
 
-    /// The archive (.tar.gz), beginning with `README.txt`, which lists the rest.
+    /// The archive (.tar.gz). It starts with `README.txt`, which lists the contents.
     ///
     /// # Errors
-    /// None that memory does not make.
+    /// Writing the archive to memory failed.
     pub fn pack(self) -> io::Result<Vec<u8>> {
         let mut about = ABOUT.to_string();
-        for Entry { name, what, text } in &self.entries {
-            about += &format!("    {name:<32} {:>9} bytes  {what}\n", text.len());
+        for Entry { name, description, text } in &self.entries {
+            about += &format!("    {name:<32} {:>9} bytes  {description}\n", text.len());
         }
         if !self.notes.is_empty() {
-            about += "\nWhat is missing or wrong:\n\n";
+            about += "\nMissing or wrong:\n\n";
             self.notes.iter().for_each(|note| about += &format!("    {note}\n"));
         }
-        let first = Entry { name: "README.txt".into(), what: String::new(), text: about };
+        let first = Entry { name: "README.txt".into(), description: String::new(), text: about };
         let mut archive = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::default()));
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         for Entry { name, text, .. } in [first].iter().chain(&self.entries) {
@@ -176,7 +173,7 @@ impl Bundle {
     }
 }
 
-/// The end of a file, from the beginning of a line; and whether anything was left out.
+/// The end of a file, from the start of a line, and whether something was left out.
 fn tail(path: &Path, most: u64) -> io::Result<(Vec<u8>, bool)> {
     let mut file = File::open(path)?;
     let start = file.metadata()?.len().saturating_sub(most);
@@ -190,58 +187,58 @@ fn tail(path: &Path, most: u64) -> io::Result<(Vec<u8>, bool)> {
     Ok((bytes, start > 0))
 }
 
-/// The tables and keys of what is no TOML, by line.
+/// The tables and keys of a text that is not valid TOML, with line numbers.
 fn keys(text: &str) -> String {
-    let mut said = String::from("# This is no TOML: only its keys are shown.\n");
+    let mut report = String::from("# This is not valid TOML: only its keys are shown.\n");
     for (number, line) in text.lines().enumerate() {
         let key = line.split(['=', '#']).next().unwrap_or("").trim();
         let plain = |c: char| c.is_ascii_alphanumeric() || "_-.[]".contains(c);
         if key.len() < 64 && !key.is_empty() && key.chars().all(plain) && (key.starts_with('[') || line.contains('=')) {
-            said += &format!("{}: {key}\n", number + 1);
+            report += &format!("{}: {key}\n", number + 1);
         }
     }
-    said
+    report
 }
 
-/// Longest file of the system that is read, bytes: of a processor with many cores, the first ones.
+/// Largest part of a system file that is read, bytes. For a processor with many cores these are the first ones.
 const MAX_SYSTEM_FILE: u64 = 64 << 10;
-/// How the variables begin that decide what Vulkan does.
+/// Prefixes of the environment variables that affect Vulkan.
 const VARIABLES: &[&str] = &["VK_", "LP_", "MESA_", "GALLIVM_"];
 
-/// Program, system, processor, memory, and what is set for Vulkan, one to a line.
-pub fn system() -> String {
-    let mut said = String::new();
-    let mut say = |what: &str, value: Option<String>| {
-        // Writing to a text does not fail.
-        let _ = writeln!(said, "{what}: {}", value.unwrap_or_else(|| "not told by this system".into()));
+/// Information about program, system, processor, memory and variables for Vulkan, one item a line. It does not name the machine.
+fn system_information() -> String {
+    let mut report = String::new();
+    let mut item = |name: &str, value: Option<String>| {
+        // Writing to a String does not fail.
+        let _ = writeln!(report, "{name}: {}", value.unwrap_or_else(|| "unknown".into()));
     };
     let build = if cfg!(debug_assertions) { "debug" } else { "release" };
-    say("program", Some(format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))));
-    say("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
-    say("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
+    item("program", Some(format!("{} {} ({build})", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))));
+    item("time", Some(humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string()));
+    item("built for", Some(format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH)));
     let kernel = ["ostype", "osrelease", "version"].map(|name| text(&format!("/proc/sys/kernel/{name}")));
     let kernel = kernel.map(|part| part.unwrap_or_default().trim().to_string()).join(" ");
-    say("kernel", Some(kernel.trim().to_string()).filter(|kernel| !kernel.is_empty()));
-    say("system", text("/etc/os-release").and_then(|text| value(&text, "PRETTY_NAME", '=')));
-    say("processor", text("/proc/cpuinfo").and_then(|text| value(&text, "model name", ':')));
-    say("cores", std::thread::available_parallelism().ok().map(|cores| cores.to_string()));
+    item("kernel", Some(kernel.trim().to_string()).filter(|kernel| !kernel.is_empty()));
+    item("system", text("/etc/os-release").and_then(|text| value(&text, "PRETTY_NAME", '=')));
+    item("processor", text("/proc/cpuinfo").and_then(|text| value(&text, "model name", ':')));
+    item("cores", std::thread::available_parallelism().ok().map(|cores| cores.to_string()));
     let memory = text("/proc/meminfo").unwrap_or_default();
-    say("memory", value(&memory, "MemTotal", ':'));
-    say("of it free", value(&memory, "MemAvailable", ':'));
-    say("up for", text("/proc/uptime").and_then(|up| Some(format!("{} s", up.split(' ').next()?))));
+    item("memory", value(&memory, "MemTotal", ':'));
+    item("memory available", value(&memory, "MemAvailable", ':'));
+    item("uptime", text("/proc/uptime").and_then(|up| Some(format!("{} s", up.split(' ').next()?))));
     let mut set: Vec<_> = std::env::vars_os()
         .map(|(name, value)| (name.to_string_lossy().into_owned(), value.to_string_lossy().into_owned()))
         .filter(|(name, _)| VARIABLES.iter().any(|start| name.starts_with(start)))
         .collect();
     set.sort();
-    let _ = writeln!(said, "variables that begin with {}:", VARIABLES.join(", "));
+    let _ = writeln!(report, "variables with the prefix {}:", VARIABLES.join(", "));
     for (name, value) in &set {
-        let _ = writeln!(said, "    {name}={}", value.escape_debug());
+        let _ = writeln!(report, "    {name}={}", value.escape_debug());
     }
     if set.is_empty() {
-        said += "    none\n";
+        report += "    none\n";
     }
-    said
+    report
 }
 
 fn text(path: &str) -> Option<String> {
@@ -250,7 +247,7 @@ fn text(path: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// What a line says that begins with a name.
+/// The value of the first line with this name.
 fn value(text: &str, name: &str, sign: char) -> Option<String> {
     let lines = text.lines().filter_map(|line| line.split_once(sign));
     let mut values = lines.filter(|(left, _)| left.trim() == name).map(|(_, value)| value.trim().trim_matches('"'));
@@ -262,7 +259,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_long_log_the_end_is_kept_in_whole_lines() {
+    fn the_end_of_a_long_log_is_kept_in_complete_lines() {
         let path = std::env::temp_dir().join(format!("echolume-tail-{}", std::process::id()));
         std::fs::write(&path, "2026-01-01T one\ntwo\nthree\n").expect("write");
         assert_eq!(tail(&path, 100).expect("read"), (b"2026-01-01T one\ntwo\nthree\n".to_vec(), false));
@@ -272,29 +269,30 @@ mod tests {
     }
 
     #[test]
-    fn of_what_is_no_toml_nothing_but_keys_is_told() {
-        let said = keys("source = \"/data/Anna\n# Anna = 1\n[files]\nlog = 'x' # Anna\nAnna's note\nAnna Smith = 3\n");
+    fn only_the_keys_of_invalid_toml_are_kept() {
+        let report =
+            keys("source = \"/data/Anna\n# Anna = 1\n[files]\nlog = 'x' # Anna\nAnna's note\nAnna Smith = 3\n");
         assert!(
-            ["1: source\n", "3: [files]\n", "4: log\n"].iter().all(|l| said.contains(l)) && !said.contains("Anna"),
-            "{said}"
+            ["1: source\n", "3: [files]\n", "4: log\n"].iter().all(|l| report.contains(l)) && !report.contains("Anna"),
+            "{report}"
         );
     }
 
     #[test]
-    fn the_program_and_the_system_are_named_and_the_machine_is_not() {
-        let said = system();
-        assert!(said.starts_with(&format!("program: echolume {}", env!("CARGO_PKG_VERSION"))), "{said}");
+    fn system_information_names_the_program_and_not_the_machine() {
+        let report = system_information();
+        assert!(report.starts_with(&format!("program: echolume {}", env!("CARGO_PKG_VERSION"))), "{report}");
         assert!(
-            ["kernel: ", "processor: ", "memory: ", "begin with VK_"].iter().all(|name| said.contains(name)),
-            "{said}"
+            ["kernel: ", "processor: ", "memory: ", "with the prefix VK_"].iter().all(|name| report.contains(name)),
+            "{report}"
         );
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-        assert!(host.trim().len() < 4 || !said.contains(host.trim()), "{said}");
-        assert!(!said.contains("PATH="));
+        assert!(host.trim().len() < 4 || !report.contains(host.trim()), "{report}");
+        assert!(!report.contains("PATH="));
     }
 
     #[test]
-    fn values_are_those_of_their_name() {
+    fn values_are_found_by_name() {
         let text = "NAME=\"a\"\nPRETTY_NAME=\"Some System 12\"\nodd line\n";
         assert_eq!(value(text, "PRETTY_NAME", '=').as_deref(), Some("Some System 12"));
         assert_eq!(value(text, "none", '='), None);

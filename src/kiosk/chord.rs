@@ -1,9 +1,9 @@
-//! Keys that are pressed together, as words: `ctrl+alt+q`.
+//! Key combinations as text, such as `ctrl+alt+q`.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Keys whose names are words. The first name of a key is the one that is shown; function keys and characters come besides.
+/// Names of keys. The first name of a key is the one that is displayed. Function keys and characters need no entry.
 const NAMES: &[(&str, Key)] = &[
     ("escape", Key::Escape),
     ("esc", Key::Escape),
@@ -24,13 +24,13 @@ const NAMES: &[(&str, Key)] = &[
     ("pagedown", Key::PageDown),
     ("home", Key::Home),
     ("end", Key::End),
-    // The character itself parts the words.
+    // The character itself separates keys.
     ("plus", Key::Char('+')),
 ];
-/// Keyboards have at most so many function keys.
-const FUNCTION_KEYS: u8 = 24;
+/// Highest number of a function key.
+const MAX_FUNCTION_KEY: u8 = 24;
 
-/// A key by what is printed on it, whatever is held with it: letters are lower-case.
+/// A key by its label, independent of modifiers; letters are lower-case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Key {
     Char(char),
@@ -51,6 +51,7 @@ pub enum Key {
     End,
 }
 
+/// The modifier keys that are held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Modifiers {
     pub shift: bool,
@@ -58,25 +59,26 @@ pub struct Modifiers {
     pub alt: bool,
 }
 
-/// A key and what is held with it.
+/// A key with its modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Chord {
     pub key: Key,
     pub modifiers: Modifiers,
 }
 
+/// Why a text is not a key combination.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{fault}; keys read as ctrl+alt+q, shift+f12 or escape: any of ctrl, alt and shift, and one key")]
+#[error("{fault}; examples of keys: ctrl+alt+q, shift+f12, escape (any of ctrl, alt and shift, then one key)")]
 pub struct ChordError {
     fault: String,
 }
 
 impl Chord {
-    /// From words that are parted by `+`, in any case: `ctrl` (or `control`), `alt`, `shift`, in any order, and last the key: a
-    /// character, `f1` to `f24`, or the name of a key such as `escape`, `page_up` or `plus`.
+    /// Parses words separated by `+`, in any case: `ctrl` (or `control`), `alt`, `shift` in any order, then the key: a character, `f1` to
+    /// `f24`, or a name such as `escape`, `page_up` or `plus`.
     ///
     /// # Errors
-    /// One line that says which word is wrong, and how keys read.
+    /// One line with the wrong word and examples.
     pub fn parse(text: &str) -> Result<Chord, ChordError> {
         let refuse = |fault: String| Err(ChordError { fault });
         let (held, last) = match text.rsplit_once('+') {
@@ -89,19 +91,19 @@ impl Chord {
                 "ctrl" | "control" => &mut modifiers.control,
                 "alt" => &mut modifiers.alt,
                 "shift" => &mut modifiers.shift,
-                other => return refuse(format!("{other:?} is no key that is held")),
+                other => return refuse(format!("{other:?} is not a modifier key")),
             };
             if std::mem::replace(flag, true) {
-                return refuse(format!("{:?} is there twice", word.trim()));
+                return refuse(format!("{:?} is given twice", word.trim()));
             }
         }
         match key(last.trim()) {
             Some(key) => Ok(Chord { key, modifiers }),
-            None => refuse(format!("{:?} is no key", last.trim())),
+            None => refuse(format!("{:?} is not a key", last.trim())),
         }
     }
 
-    /// Whether this is what is pressed: nothing else may be held.
+    /// True if exactly this combination is pressed.
     pub fn is(&self, key: Key, modifiers: Modifiers) -> bool {
         *self == Chord { key, modifiers }
     }
@@ -110,7 +112,7 @@ impl Chord {
 fn key(word: &str) -> Option<Key> {
     let mut characters = word.chars();
     if let (Some(c), None) = (characters.next(), characters.next()) {
-        // As a keyboard tells it: what is printed on the key, lower-case. Some letters have no single lower-case one.
+        // Keyboards report the lower-case label of the key. Some letters have no single lower-case character.
         let mut lower = c.to_lowercase();
         return match (lower.next(), lower.next()) {
             (Some(c), None) if !c.is_control() && !c.is_whitespace() => Some(Key::Char(c)),
@@ -122,7 +124,7 @@ fn key(word: &str) -> Option<Key> {
         return Some(*key);
     }
     let number = word.strip_prefix('f').filter(|n| n.bytes().all(|b| b.is_ascii_digit()))?;
-    number.parse().ok().filter(|n| (1..=FUNCTION_KEYS).contains(n)).map(Key::Function)
+    number.parse().ok().filter(|n| (1..=MAX_FUNCTION_KEY).contains(n)).map(Key::Function)
 }
 
 impl fmt::Display for Chord {
@@ -135,7 +137,7 @@ impl fmt::Display for Chord {
             (_, Some((name, _))) => write!(f, "{name}"),
             (Key::Function(n), None) => write!(f, "f{n}"),
             (Key::Char(c), None) => write!(f, "{c}"),
-            // Every other key has a name, which a test sees to.
+            // Every other key has a name; a test checks this.
             (other, None) => write!(f, "{other:?}"),
         }
     }
@@ -155,7 +157,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn keys_read_as_they_are_said() {
+    fn keys_are_parsed() {
         let held = |control, alt, shift| Modifiers { control, alt, shift };
         for (text, key, modifiers) in [
             ("ctrl+alt+q", Key::Char('q'), held(true, true, false)),
@@ -175,18 +177,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_key_is_named_in_one_line() {
+    fn a_wrong_key_is_named_in_one_line() {
         for (text, named) in [
-            ("", "\"\" is no key"),
-            ("ctrl+", "\"\" is no key"),
-            ("ctrl+alt", "\"alt\" is no key"),
+            ("", "\"\" is not a key"),
+            ("ctrl+", "\"\" is not a key"),
+            ("ctrl+alt", "\"alt\" is not a key"),
             ("ctrl+ctrl+q", "twice"),
-            ("super+q", "\"super\" is no key that is held"),
-            ("q+ctrl", "\"q\" is no key that is held"),
+            ("super+q", "\"super\" is not a modifier key"),
+            ("q+ctrl", "\"q\" is not a modifier key"),
             ("f0", "f0"),
             ("f25", "f25"),
             ("f+1", "\"f\""),
-            ("ctrl+\n", "is no key"),
+            ("ctrl+\n", "is not a key"),
             ("quit", "quit"),
         ] {
             let error = Chord::parse(text).expect_err(text).to_string();
@@ -195,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn every_named_key_is_shown_by_its_name() {
+    fn every_named_key_is_displayed_by_its_name() {
         for (_, key) in NAMES {
             let chord = Chord { key: *key, modifiers: Modifiers::default() };
             assert_eq!(Chord::parse(&chord.to_string()), Ok(chord));
@@ -204,7 +206,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_parses_is_read_again_as_it_is_shown(text in "\\PC{0,12}|((ctrl|alt|shift)\\+){0,3}(\\PC|f[0-9]{1,2}|home)") {
+        fn a_displayed_combination_parses_to_itself(text in "\\PC{0,12}|((ctrl|alt|shift)\\+){0,3}(\\PC|f[0-9]{1,2}|home)") {
             if let Ok(chord) = Chord::parse(&text) {
                 prop_assert_eq!(Chord::parse(&chord.to_string()), Ok(chord));
             }

@@ -1,4 +1,4 @@
-//! A log that stays within bounds: a file that is full becomes NAME.1, NAME.1 becomes NAME.2, and the oldest goes.
+//! Log rotation: a full file becomes NAME.1, NAME.1 becomes NAME.2, and the oldest one is deleted.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -6,67 +6,67 @@ use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Of a file of the program's own log, bytes.
-pub const USUAL_BYTES: u64 = 10 << 20;
-/// Files of it, the one that is written included.
-pub const USUAL_FILES: u32 = 5;
-/// A line that is longer than a file would never find room, so a file has some, bytes.
-const FEWEST_BYTES: u64 = 4096;
-/// Ends a line that was longer than a file.
-const CUT: &[u8] = b" ... (cut)\n";
+/// Default size of one log file, bytes.
+pub const DEFAULT_FILE_BYTES: u64 = 10 << 20;
+/// Default number of log files, including the current one.
+pub const DEFAULT_FILES: u32 = 5;
+/// Minimum size of a log file, bytes: a line that is longer than a file is cut.
+const MIN_FILE_BYTES: u64 = 4096;
+/// The end of a line that was cut.
+const CUT_MARK: &[u8] = b" ... (cut)\n";
 
-/// What a log is written to; the tests have one that is full.
+/// What a log is written to. Tests use one that gets full.
 trait Sink: Write + Send {
-    /// Takes back what was written beyond so many bytes.
-    fn cut(&self, bytes: u64) -> io::Result<()>;
+    /// Truncates the file to so many bytes.
+    fn truncate(&self, bytes: u64) -> io::Result<()>;
 }
 
 impl Sink for File {
-    fn cut(&self, bytes: u64) -> io::Result<()> {
+    fn truncate(&self, bytes: u64) -> io::Result<()> {
         self.set_len(bytes)
     }
 }
 
 type Opener = Box<dyn FnMut(&Path) -> io::Result<Box<dyn Sink>> + Send>;
 
-/// The writer of such a log. What is written up to an end of line is one event, whole or not there.
+/// The writer of a log with rotation. What is written up to the end of a line is one event; it is written completely or not at all.
 ///
-/// It never fails: what cannot be written, on a full disk or in a folder that is gone, is counted in lines, every later write tries
-/// again, and the first one that works says how many are missing. No line is ever divided between two files, and together they hold
-/// at most `bytes` times `files`. One process at a time may write to a log.
-pub struct Rotating {
+/// Writing never fails. Lines that cannot be written, on a full disk or in a deleted folder, are counted. Every later write tries again,
+/// and the first one that succeeds reports how many lines are missing. No line is split between two files, and all files together hold
+/// at most `bytes` times `files`. Only one process at a time may write to a log.
+pub struct RotatingLog {
     path: PathBuf,
     bytes: u64,
     files: u32,
     open: Opener,
     sink: Option<Box<dyn Sink>>,
-    /// Of the file that is written, bytes.
+    /// Size of the current file, bytes.
     size: u64,
-    /// What somebody left there did not end its last line.
+    /// The existing file ends in the middle of a line.
     within_line: bool,
-    /// Devices and pipes cannot be renamed.
+    /// False for devices and pipes, which cannot be renamed.
     rotates: bool,
-    /// The beginning of a line, when it comes in parts; no longer than a file.
-    begun: Vec<u8>,
-    /// Lines since the last one that was written.
-    lost: u64,
+    /// The start of a line that is written in parts; at most the size of a file.
+    partial_line: Vec<u8>,
+    /// Number of lines that were lost since the last one that was written.
+    lost_lines: u64,
 }
 
-impl Rotating {
-    /// Goes on with the log at `path`, or begins it. `bytes`: of one file, 4096 at least; `files`: in all, 1 or more.
+impl RotatingLog {
+    /// Opens the log at `path`, or creates it. `bytes`: size of one file, at least 4096; `files`: their number, at least 1.
     ///
     /// # Errors
-    /// One line that names the file: it cannot be written, or it, or a file that rotation would move, is there and is no log.
-    pub fn open(path: &Path, bytes: u64, files: u32) -> Result<Rotating, String> {
+    /// One line that names the file: it cannot be written, or it or a file that rotation would move exists and is not a log.
+    pub fn open(path: &Path, bytes: u64, files: u32) -> Result<RotatingLog, String> {
         for number in 0..files.max(1) {
-            let file = numbered(path, number);
+            let file = rotated_name(path, number);
             match fs::metadata(&file) {
-                Ok(there) if there.is_file() && !holds_a_log(&file) => {
-                    return Err(format!("{}: holds something else than a log; give another name", file.display()));
+                Ok(there) if there.is_file() && !is_log_file(&file) => {
+                    return Err(format!("{}: exists and is not a log; use another name", file.display()));
                 }
-                // Renaming the next newer one onto a folder would never work.
+                // A file cannot be renamed to an existing folder.
                 Ok(there) if number > 0 && !there.is_file() => {
-                    return Err(format!("{}: is in the way of the log; give another name", file.display()));
+                    return Err(format!("{}: is in the way of the log; use another name", file.display()));
                 }
                 _ => {}
             }
@@ -74,15 +74,15 @@ impl Rotating {
         let opener = |path: &Path| -> io::Result<Box<dyn Sink>> {
             Ok(Box::new(OpenOptions::new().create(true).append(true).open(path)?))
         };
-        Rotating::with(path, bytes, files, Box::new(opener))
+        RotatingLog::with(path, bytes, files, Box::new(opener))
             .map_err(|e| format!("{}: cannot be written: {e}", path.display()))
     }
 
-    fn with(path: &Path, bytes: u64, files: u32, mut open: Opener) -> io::Result<Rotating> {
+    fn with(path: &Path, bytes: u64, files: u32, mut open: Opener) -> io::Result<RotatingLog> {
         let sink = open(path)?;
-        let (bytes, files) = (bytes.max(FEWEST_BYTES), files.max(1));
+        let (bytes, files) = (bytes.max(MIN_FILE_BYTES), files.max(1));
         let rotates = fs::metadata(path).is_ok_and(|there| there.is_file());
-        let mut log = Rotating {
+        let mut log = RotatingLog {
             path: path.into(),
             bytes,
             files,
@@ -91,14 +91,14 @@ impl Rotating {
             size: 0,
             within_line: false,
             rotates,
-            begun: Vec::new(),
-            lost: 0,
+            partial_line: Vec::new(),
+            lost_lines: 0,
         };
         log.measure();
         Ok(log)
     }
 
-    /// Takes up what is there: the power may have gone in the middle of a line.
+    /// Reads size and end of the existing file: the power may have failed in the middle of a line.
     fn measure(&mut self) {
         (self.size, self.within_line) = match self.rotates {
             true => File::open(&self.path).and_then(|file| end_of(&file)).unwrap_or_default(),
@@ -106,30 +106,33 @@ impl Rotating {
         };
     }
 
-    fn keep(&mut self, event: &[u8]) {
+    /// Writes an event, or counts its lines as lost.
+    fn write_or_count(&mut self, event: &[u8]) {
         match self.write_event(event) {
-            Ok(()) => self.lost = 0,
-            Err(_) => self.lost = self.lost.saturating_add(event.iter().filter(|b| **b == b'\n').count() as u64),
+            Ok(()) => self.lost_lines = 0,
+            Err(_) => {
+                self.lost_lines = self.lost_lines.saturating_add(event.iter().filter(|b| **b == b'\n').count() as u64)
+            }
         }
     }
 
-    /// All of an event, or an error and nothing of it.
+    /// Writes a complete event, or returns an error and writes nothing.
     fn write_event(&mut self, event: &[u8]) -> io::Result<()> {
-        let mut whole = Vec::with_capacity(event.len() + 128);
-        if self.lost > 0 {
+        let mut text = Vec::with_capacity(event.len() + 128);
+        if self.lost_lines > 0 {
             let now = humantime::format_rfc3339_micros(SystemTime::now());
-            writeln!(whole, "{now}  WARN {} lines of the log could not be written", self.lost)?;
+            writeln!(text, "{now}  WARN {} lines of the log could not be written", self.lost_lines)?;
         }
-        whole.extend_from_slice(event);
-        // With room for the end of a line that was left without.
-        if self.rotates && whole.len() as u64 >= self.bytes {
-            let mut room = self.bytes as usize - CUT.len() - 1;
-            // Not within a character.
-            room -= (0..3).take_while(|back| whole[room - back] & 0xc0 == 0x80).count();
-            whole.truncate(room);
-            whole.extend_from_slice(CUT);
+        text.extend_from_slice(event);
+        // Reserves a byte to end an incomplete line before it.
+        if self.rotates && text.len() as u64 >= self.bytes {
+            let mut space = self.bytes as usize - CUT_MARK.len() - 1;
+            // Does not cut inside of a character.
+            space -= (0..3).take_while(|back| text[space - back] & 0xc0 == 0x80).count();
+            text.truncate(space);
+            text.extend_from_slice(CUT_MARK);
         }
-        if self.rotates && self.size > 0 && self.size + whole.len() as u64 >= self.bytes {
+        if self.rotates && self.size > 0 && self.size + text.len() as u64 >= self.bytes {
             self.rotate()?;
         }
         if self.sink.is_none() {
@@ -137,19 +140,19 @@ impl Rotating {
             self.measure();
         }
         if self.within_line {
-            whole.insert(0, b'\n');
+            text.insert(0, b'\n');
         }
         let Some(sink) = &mut self.sink else { return Ok(()) };
-        let written = sink.write_all(&whole);
+        let written = sink.write_all(&text);
         match written {
             Ok(()) => {
-                self.size += whole.len() as u64;
+                self.size += text.len() as u64;
                 self.within_line = false;
             }
             Err(_) => {
-                // A full disk takes a part of a line. Where that cannot be taken back, it is found when the file is opened anew.
+                // A full disk may take part of a line. If that cannot be truncated, it is detected when the file is opened again.
                 if self.rotates {
-                    let _ = sink.cut(self.size);
+                    let _ = sink.truncate(self.size);
                 }
                 self.sink = None;
             }
@@ -157,61 +160,61 @@ impl Rotating {
         written
     }
 
-    /// Moves every file on by one, from the oldest, which is replaced.
+    /// Renames every file to the next number, from the oldest one, which is replaced.
     fn rotate(&mut self) -> io::Result<()> {
-        // Closed first: not every system renames what is open.
+        // Closed first: not every system can rename an open file.
         self.sink = None;
-        let gone = |done: io::Result<()>| match done {
-            // Somebody else has cleaned up.
+        let ignore_missing = |done: io::Result<()>| match done {
+            // The file was deleted by someone else.
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
             done => done,
         };
         if self.files == 1 {
-            gone(fs::remove_file(&self.path))?;
+            ignore_missing(fs::remove_file(&self.path))?;
         }
         for number in (1..self.files).rev() {
-            gone(fs::rename(numbered(&self.path, number - 1), numbered(&self.path, number)))?;
+            ignore_missing(fs::rename(rotated_name(&self.path, number - 1), rotated_name(&self.path, number)))?;
         }
-        // From here on there is nothing to move, even if the new file cannot be made at once.
+        // Even if the new file cannot be created at once, there is nothing to rename any more.
         self.size = 0;
         self.within_line = false;
         Ok(())
     }
 }
 
-impl Write for Rotating {
-    /// Takes everything: a log that cannot be written must not stop what it tells of.
+impl Write for RotatingLog {
+    /// Always accepts everything: a fault of the log must not stop the program.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.begun.is_empty() && bytes.last() == Some(&b'\n') {
-            self.keep(bytes);
-        } else if self.begun.len() + bytes.len() < self.bytes as usize && bytes.last() != Some(&b'\n') {
-            self.begun.extend_from_slice(bytes);
+        if self.partial_line.is_empty() && bytes.last() == Some(&b'\n') {
+            self.write_or_count(bytes);
+        } else if self.partial_line.len() + bytes.len() < self.bytes as usize && bytes.last() != Some(&b'\n') {
+            self.partial_line.extend_from_slice(bytes);
         } else {
-            let mut event = std::mem::take(&mut self.begun);
+            let mut event = std::mem::take(&mut self.partial_line);
             event.extend_from_slice(bytes);
             if event.last() != Some(&b'\n') {
                 event.push(b'\n');
             }
-            self.keep(&event);
+            self.write_or_count(&event);
         }
         Ok(bytes.len())
     }
 
-    /// Does nothing: every line is written when it ends.
+    /// Does nothing: every line is written at its end.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }
 
-impl Drop for Rotating {
+impl Drop for RotatingLog {
     fn drop(&mut self) {
-        if !self.begun.is_empty() {
+        if !self.partial_line.is_empty() {
             let _ = self.write(b"\n");
         }
     }
 }
 
-/// Size, and whether a line is left without its end.
+/// Size of a file, and whether its last line is incomplete.
 fn end_of(mut file: &File) -> io::Result<(u64, bool)> {
     let size = file.seek(SeekFrom::End(0))?;
     if size == 0 {
@@ -223,8 +226,8 @@ fn end_of(mut file: &File) -> io::Result<(u64, bool)> {
     Ok((size, last != *b"\n"))
 }
 
-/// The name of the log's file so many rotations old; 0 is the one that is written.
-pub fn numbered(path: &Path, number: u32) -> PathBuf {
+/// The name of the log file after so many rotations; 0 is the current one.
+pub(super) fn rotated_name(path: &Path, number: u32) -> PathBuf {
     if number == 0 {
         return path.into();
     }
@@ -233,8 +236,8 @@ pub fn numbered(path: &Path, number: u32) -> PathBuf {
     name.into()
 }
 
-/// An empty file, or one whose first line begins with a time as ours do: a recording is never appended to.
-pub fn holds_a_log(path: &Path) -> bool {
+/// True for an empty file, and for one that starts with a time like our logs. Other files, such as recordings, are never written to.
+pub(super) fn is_log_file(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|f| f.take(11).read_to_end(&mut start));
     read.is_ok() && (start.is_empty() || (start.get(4) == Some(&b'-') && start.get(10) == Some(&b'T')))
@@ -246,7 +249,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::{Arc, Mutex};
 
-    /// A folder of one test, gone at its end.
+    /// A folder of one test, deleted at its end.
     struct Folder(PathBuf);
 
     impl Folder {
@@ -261,10 +264,10 @@ mod tests {
         }
 
         fn text(&self, number: u32) -> String {
-            fs::read_to_string(numbered(&self.log(), number)).unwrap_or_default()
+            fs::read_to_string(rotated_name(&self.log(), number)).unwrap_or_default()
         }
 
-        /// Every file from the oldest on.
+        /// Contents of all files, oldest first.
         fn texts(&self) -> Vec<String> {
             (0..20).rev().map(|n| self.text(n)).filter(|t| !t.is_empty()).collect()
         }
@@ -281,9 +284,9 @@ mod tests {
     }
 
     #[test]
-    fn full_files_are_numbered_and_the_oldest_goes() {
+    fn full_files_are_rotated_and_the_oldest_is_deleted() {
         let folder = Folder::new("count");
-        let mut log = Rotating::open(&folder.log(), 5000, 3).expect("open");
+        let mut log = RotatingLog::open(&folder.log(), 5000, 3).expect("open");
         let written: String = (0..1000).map(line).collect();
         for n in 0..1000 {
             log.write_all(line(n).as_bytes()).expect("never fails");
@@ -291,52 +294,52 @@ mod tests {
         let texts = folder.texts();
         assert_eq!(texts.len(), 3);
         assert!(texts.iter().all(|t| t.len() <= 5000 && t.starts_with("2026-") && t.ends_with('\n')));
-        // What is left is the end of what was written, without a gap.
+        // The files hold the end of what was written, without a gap.
         assert!(written.ends_with(&texts.concat()) && texts.concat().len() > 9000);
     }
 
     #[test]
-    fn a_restart_goes_on_where_the_log_ended_and_bounds_what_was_there() {
+    fn a_restart_continues_the_log_and_keeps_the_limits() {
         let folder = Folder::new("restart");
         for n in 0..300 {
-            let mut log = Rotating::open(&folder.log(), 5000, 2).expect("open");
+            let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open");
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
         let written: String = (0..300).map(line).collect();
         let texts = folder.texts();
         assert!(texts.len() == 2 && written.ends_with(&texts.concat()));
-        // The power goes in the middle of a line.
+        // The power fails in the middle of a line.
         fs::write(folder.log(), "2026-01-01T00:00:00.000000Z  INFO half").expect("write");
-        let mut log = Rotating::open(&folder.log(), 5000, 2).expect("open");
+        let mut log = RotatingLog::open(&folder.log(), 5000, 2).expect("open");
         log.write_all(line(7).as_bytes()).expect("never fails");
         assert_eq!(folder.text(0), format!("2026-01-01T00:00:00.000000Z  INFO half\n{}", line(7)));
     }
 
     #[test]
-    fn a_file_that_is_no_log_is_neither_written_to_nor_moved() {
+    fn a_file_that_is_not_a_log_is_neither_written_nor_renamed() {
         let folder = Folder::new("foreign");
         fs::write(folder.log(), "ObjectType = Image").expect("write");
         let refused = |named: &str| {
-            let error = Rotating::open(&folder.log(), 5000, 3).map(drop).expect_err("refused");
+            let error = RotatingLog::open(&folder.log(), 5000, 3).map(drop).expect_err("refused");
             assert!(error.contains(named) && error.lines().count() == 1, "{error}");
         };
-        refused("something else");
+        refused("is not a log");
         fs::write(folder.log(), line(0)).expect("write");
-        fs::write(numbered(&folder.log(), 2), "mine").expect("write");
+        fs::write(rotated_name(&folder.log(), 2), "mine").expect("write");
         refused("a.log.2");
-        fs::remove_file(numbered(&folder.log(), 2)).expect("remove");
-        fs::create_dir(numbered(&folder.log(), 1)).expect("make a folder");
+        fs::remove_file(rotated_name(&folder.log(), 2)).expect("remove");
+        fs::create_dir(rotated_name(&folder.log(), 1)).expect("make a folder");
         refused("a.log.1: is in the way");
-        // A number that rotation never reaches is nobody's business.
-        assert!(Rotating::open(&folder.log(), 5000, 1).is_ok());
-        let missing = Rotating::open(&folder.0.join("none/a.log"), 5000, 3).map(drop).expect_err("refused");
+        // A number that rotation does not reach is not checked.
+        assert!(RotatingLog::open(&folder.log(), 5000, 1).is_ok());
+        let missing = RotatingLog::open(&folder.0.join("none/a.log"), 5000, 3).map(drop).expect_err("refused");
         assert!(missing.contains("none/a.log: cannot be written"), "{missing}");
     }
 
     #[test]
-    fn lines_in_parts_and_lines_longer_than_a_file_stay_whole_and_within_bounds() {
+    fn lines_in_parts_and_lines_longer_than_a_file_stay_within_the_limits() {
         let folder = Folder::new("parts");
-        let mut log = Rotating::open(&folder.log(), 5000, 3).expect("open");
+        let mut log = RotatingLog::open(&folder.log(), 5000, 3).expect("open");
         for n in 0..200 {
             // In several parts, and as an event of two lines.
             writeln!(log, "2026-01-01T{n:06} {}b", "a".repeat(40)).expect("never fails");
@@ -356,7 +359,7 @@ mod tests {
     #[test]
     fn threads_do_not_mix_their_lines_and_lose_none() {
         let folder = Folder::new("threads");
-        let log = Mutex::new(Rotating::open(&folder.log(), 20_000, 20).expect("open"));
+        let log = Mutex::new(RotatingLog::open(&folder.log(), 20_000, 20).expect("open"));
         std::thread::scope(|scope| {
             for thread in 0..8 {
                 let log = &log;
@@ -378,20 +381,20 @@ mod tests {
         assert_eq!(lines, expected);
     }
 
-    /// A file on a disk with so much room.
+    /// A file on a disk with limited space.
     struct Disk {
         file: File,
-        room: Arc<AtomicU64>,
+        space: Arc<AtomicU64>,
     }
 
     impl Write for Disk {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let room = self.room.load(Ordering::Relaxed).min(bytes.len() as u64);
-            if room == 0 {
+            let space = self.space.load(Ordering::Relaxed).min(bytes.len() as u64);
+            if space == 0 {
                 return Err(io::Error::from(ErrorKind::StorageFull));
             }
-            self.room.fetch_sub(room, Ordering::Relaxed);
-            self.file.write(&bytes[..room as usize])
+            self.space.fetch_sub(space, Ordering::Relaxed);
+            self.file.write(&bytes[..space as usize])
         }
 
         fn flush(&mut self) -> io::Result<()> {
@@ -400,26 +403,26 @@ mod tests {
     }
 
     impl Sink for Disk {
-        fn cut(&self, bytes: u64) -> io::Result<()> {
+        fn truncate(&self, bytes: u64) -> io::Result<()> {
             self.file.set_len(bytes)
         }
     }
 
     #[test]
-    fn a_full_disk_leaves_no_half_line_and_is_told_once_there_is_room() {
+    fn a_full_disk_leaves_no_partial_line_and_is_reported_when_there_is_space() {
         let folder = Folder::new("full");
-        let room = Arc::new(AtomicU64::new(2 * line(0).len() as u64 + 30));
-        let theirs = room.clone();
+        let space = Arc::new(AtomicU64::new(2 * line(0).len() as u64 + 30));
+        let disk_space = space.clone();
         let opener = move |path: &Path| -> io::Result<Box<dyn Sink>> {
             let file = OpenOptions::new().create(true).append(true).open(path)?;
-            Ok(Box::new(Disk { file, room: theirs.clone() }))
+            Ok(Box::new(Disk { file, space: disk_space.clone() }))
         };
-        let mut log = Rotating::with(&folder.log(), 5000, 20, Box::new(opener)).expect("open");
+        let mut log = RotatingLog::with(&folder.log(), 5000, 20, Box::new(opener)).expect("open");
         for n in 0..9 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
         assert_eq!(folder.text(0), format!("{}{}", line(0), line(1)));
-        room.store(1 << 20, Ordering::Relaxed);
+        space.store(1 << 20, Ordering::Relaxed);
         for n in 9..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
@@ -430,14 +433,14 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_is_gone_costs_lines_and_no_more() {
+    fn a_deleted_folder_loses_lines_only() {
         let folder = Folder::new("gone");
-        let mut log = Rotating::open(&folder.log(), 4096, 3).expect("open");
+        let mut log = RotatingLog::open(&folder.log(), 4096, 3).expect("open");
         for n in 0..40 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
         fs::remove_dir_all(&folder.0).expect("remove the folder");
-        // Some go into a file without a name, until it is full.
+        // Some lines go into the deleted file, until it is full.
         for n in 0..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
@@ -449,28 +452,28 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_moved_is_not_destroyed() {
+    fn a_file_that_cannot_be_renamed_is_not_overwritten() {
         let folder = Folder::new("stuck");
-        let mut log = Rotating::open(&folder.log(), 4096, 2).expect("open");
-        fs::create_dir(numbered(&folder.log(), 1)).expect("something is in the way");
+        let mut log = RotatingLog::open(&folder.log(), 4096, 2).expect("open");
+        fs::create_dir(rotated_name(&folder.log(), 1)).expect("something is in the way");
         for n in 0..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
         assert!(folder.text(0).starts_with(&line(0)) && folder.text(0).len() <= 4096);
-        fs::remove_dir(numbered(&folder.log(), 1)).expect("out of the way");
+        fs::remove_dir(rotated_name(&folder.log(), 1)).expect("out of the way");
         log.write_all(line(200).as_bytes()).expect("never fails");
         assert!(folder.text(1).starts_with(&line(0)) && folder.text(0).contains("lines of the log could not be"));
     }
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_device_that_is_always_full_stops_nobody_and_is_not_renamed() {
+    fn a_full_device_does_not_block_and_is_not_renamed() {
         let full = Path::new("/dev/full");
-        let mut log = Rotating::open(full, 4096, 5).expect("open");
+        let mut log = RotatingLog::open(full, 4096, 5).expect("open");
         for n in 0..200 {
             log.write_all(line(n).as_bytes()).expect("never fails");
         }
-        assert_eq!(log.lost, 200);
-        assert!(full.exists() && !numbered(full, 1).exists());
+        assert_eq!(log.lost_lines, 200);
+        assert!(full.exists() && !rotated_name(full, 1).exists());
     }
 }

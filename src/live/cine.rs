@@ -1,25 +1,25 @@
-//! The last volumes as they arrived, for looking back: frames are kept as acquired, so that every setting, those of stage 1 too, can
+//! The cine loop: the last volumes, for looking back. Their frames are kept as acquired, so that every setting, also of stage 1, can
 //! still be changed. Bounded in volumes and bytes. Pure.
 
 use crate::source::Frame;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// A volume whose frames have all come.
+/// A complete volume.
 #[derive(Clone, Debug)]
 pub struct CineVolume {
     pub volume: u32,
-    /// By slice.
+    /// In order of the slices.
     pub frames: Vec<Arc<Frame>>,
     bytes: usize,
 }
 
-/// How much is kept at most.
+/// Size of a cine loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CineLimits {
-    /// 0: none is.
+    /// Most volumes; 0 switches the cine loop off.
     pub volumes: usize,
-    /// The newest volume is kept also where it alone has more.
+    /// Most bytes of samples. The newest volume is kept even if it alone is larger.
     pub bytes: usize,
 }
 
@@ -31,70 +31,71 @@ struct Filling {
 
 /// The cine loop.
 pub struct Cine {
-    room: CineLimits,
+    limits: CineLimits,
     slices: usize,
-    kept: VecDeque<CineVolume>,
+    volumes: VecDeque<CineVolume>,
     filling: Option<Filling>,
     /// A frame whose lines are arriving.
-    lines: Option<Frame>,
+    partial: Option<Frame>,
     bytes: usize,
 }
 
 impl Cine {
-    /// `slices`: frames of a volume.
-    pub fn new(room: CineLimits, slices: usize) -> Cine {
-        Cine { room, slices, kept: VecDeque::new(), filling: None, lines: None, bytes: 0 }
+    /// An empty loop of volumes of `slices` frames.
+    pub fn new(limits: CineLimits, slices: usize) -> Cine {
+        Cine { limits, slices, volumes: VecDeque::new(), filling: None, partial: None, bytes: 0 }
     }
 
-    /// Whether volumes of so many frames are kept here.
+    /// True if the volumes have so many frames.
     pub fn is_of(&self, slices: usize) -> bool {
         self.slices == slices
     }
 
-    /// From the oldest to the newest.
+    /// The volumes, the oldest first.
     pub fn volumes(&self) -> &VecDeque<CineVolume> {
-        &self.kept
+        &self.volumes
     }
 
-    /// Bytes of samples that are kept.
+    /// Bytes of all samples.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// None of it is wanted any more.
+    /// Removes all volumes.
     pub fn clear(&mut self) {
-        *self = Cine::new(self.room, self.slices);
+        *self = Cine::new(self.limits, self.slices);
     }
 
-    /// What was being filled will not be whole.
-    pub fn cut(&mut self) {
-        (self.filling, self.lines) = (None, None);
+    /// Removes the volume that is being filled: its remaining frames will not come.
+    pub fn discard_partial(&mut self) {
+        (self.filling, self.partial) = (None, None);
     }
 
-    /// Lines of a frame of `whole` bytes; `at`: how many bytes of it come before them.
-    pub fn lines(&mut self, frame: Frame, at: usize, whole: usize) {
-        if self.room.volumes == 0 {
+    /// Adds lines of a frame of `total` bytes, `at` bytes into it. Lines that do not continue those before are discarded.
+    pub fn lines(&mut self, frame: Frame, at: usize, total: usize) {
+        if self.limits.volumes == 0 {
             return;
         }
-        match &mut self.lines {
-            Some(there) if at > 0 => {
-                let follows = there.bytes.len() == at && (there.volume, there.slice) == (frame.volume, frame.slice);
-                match follows && at + frame.bytes.len() <= whole {
-                    true => there.bytes.extend(frame.bytes),
-                    false => self.lines = None,
+        match &mut self.partial {
+            Some(partial) if at > 0 => {
+                let follows =
+                    partial.bytes.len() == at && (partial.volume, partial.slice) == (frame.volume, frame.slice);
+                match follows && at + frame.bytes.len() <= total {
+                    true => partial.bytes.extend(frame.bytes),
+                    false => self.partial = None,
                 }
             }
             None if at > 0 => {}
-            lines => *lines = Some(frame),
+            partial => *partial = Some(frame),
         }
-        if let Some(frame) = self.lines.take_if(|l| l.bytes.len() == whole) {
+        if let Some(frame) = self.partial.take_if(|partial| partial.bytes.len() == total) {
             self.frame(frame);
         }
     }
 
-    /// A whole frame.
+    /// Adds a complete frame.
     pub fn frame(&mut self, frame: Frame) {
-        if self.room.volumes == 0 || frame.slice >= self.slices {
+        if self.limits.volumes == 0 || frame.slice >= self.slices {
             return;
         }
         if self.filling.as_ref().is_none_or(|f| f.volume != frame.volume) {
@@ -110,11 +111,11 @@ impl Cine {
             let frames: Vec<_> = frames.into_iter().flatten().collect();
             let bytes = frames.iter().map(|f| f.bytes.len()).sum();
             self.bytes += bytes;
-            self.kept.push_back(CineVolume { volume, frames, bytes });
+            self.volumes.push_back(CineVolume { volume, frames, bytes });
         }
-        while self.kept.len() > self.room.volumes || (self.bytes > self.room.bytes && self.kept.len() > 1) {
-            let gone = self.kept.pop_front();
-            self.bytes -= gone.map_or(0, |kept| kept.bytes);
+        while self.volumes.len() > self.limits.volumes || (self.bytes > self.limits.bytes && self.volumes.len() > 1) {
+            let removed = self.volumes.pop_front();
+            self.bytes -= removed.map_or(0, |volume| volume.bytes);
         }
     }
 }
@@ -132,10 +133,10 @@ mod tests {
     }
 
     #[test]
-    fn whole_volumes_are_kept_and_the_oldest_go() {
+    fn complete_volumes_are_kept_and_the_oldest_removed() {
         let mut cine = Cine::new(CineLimits { volumes: 3, bytes: 1000 }, 4);
         for volume in 0..6 {
-            // Of volume 2 a frame is missing.
+            // A frame of volume 2 is missing.
             (0..4).filter(|slice| (volume, *slice) != (2, 1)).for_each(|s| cine.frame(frame(volume, s, vec![0; 10])));
         }
         assert_eq!(numbers(&cine), [3, 4, 5]);
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_bound_it_too_but_the_newest_stays() {
+    fn the_bytes_are_bounded_but_the_newest_volume_stays() {
         let mut cine = Cine::new(CineLimits { volumes: 9, bytes: 100 }, 2);
         for (volume, bytes) in [(0, 30), (1, 30), (2, 10), (3, 200)] {
             (0..2).for_each(|s| cine.frame(frame(volume, s, vec![0; bytes])));
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_sent_again_counts_once_and_one_beyond_the_volume_not_at_all() {
+    fn a_repeated_frame_counts_once_and_one_beyond_the_volume_is_ignored() {
         let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 2);
         [0, 0, 7].into_iter().for_each(|s| cine.frame(frame(1, s, vec![1])));
         assert!(cine.volumes().is_empty());
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_make_frames_and_a_gap_makes_none() {
+    fn lines_make_a_frame_unless_there_is_a_gap() {
         let mut cine = Cine::new(CineLimits { volumes: 2, bytes: 100 }, 1);
         cine.lines(frame(0, 0, vec![1, 2]), 0, 4);
         cine.lines(frame(0, 0, vec![3, 4]), 2, 4);
@@ -175,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn without_room_nothing_is_kept() {
+    fn a_loop_of_size_zero_keeps_nothing() {
         let mut cine = Cine::new(CineLimits::default(), 1);
         cine.frame(frame(0, 0, vec![1]));
         cine.lines(frame(1, 0, vec![1]), 0, 1);

@@ -1,25 +1,26 @@
-//! A live source on a thread of its own, and what has arrived and not been taken yet: bounded, whole frames or lines in order. Where it
-//! overflows a source that can wait is kept waiting, and one that cannot loses frames, which are counted.
+//! A live source on its own thread, and a bounded queue of what it reported. If the queue is full, a source that can wait is kept
+//! waiting; a source that cannot wait loses frames, which are counted. The thread also records the frames.
 
-use super::recording::RecordingTap;
 use crate::gpu::Wake;
+use crate::source::Frame;
 use crate::source::live::{Event, Live};
+use crate::source::recorder::{Header, Writer};
 use std::collections::VecDeque;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Bytes of frames that wait at most, unless a single frame is larger.
-const MOST_BYTES: usize = 256 << 20;
-/// Frames and other events that wait at most.
-const MOST_EVENTS: usize = 4096;
-/// How long the thread goes without looking whether it is to end.
+/// Largest total size of the queued frames, bytes. A single larger frame is still queued.
+const MAX_BYTES: usize = 256 << 20;
+/// Most events in the queue.
+const MAX_EVENTS: usize = 4096;
+/// Longest wait of the thread before it checks whether it is to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Something that arrived, and when.
+/// An event, and when it arrived.
 #[derive(Clone, Debug)]
 pub struct Arrived {
     pub event: Event,
@@ -35,9 +36,9 @@ pub struct Feed {
 
 #[derive(Default)]
 struct Shared {
-    waiting: Mutex<Waiting>,
-    /// Something was put in or taken out.
-    moved: Condvar,
+    queue: Mutex<Queue>,
+    /// Signalled when an event is added or removed.
+    changed: Condvar,
     stop: AtomicBool,
     lost: AtomicU64,
     unrecorded: AtomicU64,
@@ -45,12 +46,12 @@ struct Shared {
 }
 
 #[derive(Default)]
-struct Waiting {
+struct Queue {
     events: VecDeque<Arrived>,
     bytes: usize,
-    /// The volume whose frame came last.
+    /// The volume of the last frame that arrived.
     newest: Option<u32>,
-    /// Of this volume a frame was lost: the rest of it would be of no use.
+    /// A frame of this volume was lost. Its remaining frames are of no use.
     lost_volume: Option<u32>,
 }
 
@@ -62,34 +63,32 @@ fn bytes_of(event: &Event) -> usize {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Waiting> {
-        self.waiting.lock().unwrap_or_else(|e| e.into_inner())
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Puts an event behind the others: waits for room, or loses it, and all that is left of its volume with it. What is no frame is
-    /// never lost.
+    /// Adds an event. For a frame, waits until it fits, or loses it together with the rest of its volume. Other events are never lost.
     fn put(&self, arrived: Arrived, can_wait: bool) {
         let bytes = bytes_of(&arrived.event);
-        let mut waiting = self.lock();
-        let is_full =
-            |w: &Waiting| !w.events.is_empty() && (w.bytes + bytes > MOST_BYTES || w.events.len() >= MOST_EVENTS);
+        let mut queue = self.lock();
+        let is_full = |q: &Queue| !q.events.is_empty() && (q.bytes + bytes > MAX_BYTES || q.events.len() >= MAX_EVENTS);
         if let Event::Frame(frame) | Event::Lines { frame, .. } = &arrived.event {
-            while can_wait && is_full(&waiting) && !self.stop.load(Ordering::Relaxed) {
-                waiting = self.moved.wait_timeout(waiting, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
+            while can_wait && is_full(&queue) && !self.stop.load(Ordering::Relaxed) {
+                queue = self.changed.wait_timeout(queue, PATIENCE).map_or_else(|e| e.into_inner().0, |w| w.0);
             }
-            waiting.newest = Some(frame.volume);
-            if is_full(&waiting) {
-                waiting.lost_volume = Some(frame.volume);
+            queue.newest = Some(frame.volume);
+            if is_full(&queue) {
+                queue.lost_volume = Some(frame.volume);
             }
-            if waiting.lost_volume == Some(frame.volume) {
+            if queue.lost_volume == Some(frame.volume) {
                 self.lost.fetch_add(1, Ordering::Relaxed);
                 return;
             }
         }
-        waiting.bytes += bytes;
-        waiting.events.push_back(arrived);
-        drop(waiting);
-        self.moved.notify_all();
+        queue.bytes += bytes;
+        queue.events.push_back(arrived);
+        drop(queue);
+        self.changed.notify_all();
         if let Some(wake) = &self.wake {
             wake();
         }
@@ -97,67 +96,67 @@ impl Shared {
 }
 
 impl Feed {
-    /// Listens to a source until it ends or the feed is dropped, and writes every frame to a file of frames where one is given. Another
-    /// geometry begins another file: NAME-2.frames.
+    /// Listens to a source until it ends or the feed is dropped. If `record` is given, every frame is also written to this `.frames`
+    /// file. Each further geometry gets a file of its own: NAME-2.frames.
     ///
     /// # Errors
-    /// A thread that cannot be started.
+    /// The thread cannot be started.
     pub fn new(source: Box<dyn Live>, record: Option<&Path>) -> io::Result<Feed> {
         Feed::waking(source, record, None)
     }
 
-    /// A source that never says anything.
+    /// A feed without a source: no event ever arrives.
     pub fn none() -> Feed {
         Feed { shared: Arc::default(), can_wait: true, thread: None }
     }
 
-    /// The same as [`Feed::new`], with something to call after each event.
+    /// As [`Feed::new`]. `wake` is called after each event.
     ///
     /// # Errors
-    /// A thread that cannot be started.
+    /// The thread cannot be started.
     pub fn waking(source: Box<dyn Live>, record: Option<&Path>, wake: Option<Wake>) -> io::Result<Feed> {
         let (shared, can_wait) = (Arc::new(Shared { wake, ..Shared::default() }), source.can_wait());
         let theirs = shared.clone();
-        let tape = record.map(RecordingTap::new);
-        let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tape, &theirs))?;
+        let tap = record.map(RecordingTap::new);
+        let thread = std::thread::Builder::new().name("source".into()).spawn(move || listen(source, tap, &theirs))?;
         Ok(Feed { shared, can_wait, thread: Some(thread) })
     }
 
-    /// What came next, waiting for it at most so long.
+    /// The oldest queued event. Waits for one for at most `patience`.
     pub fn next(&self, patience: Duration) -> Option<Arrived> {
-        let mut waiting = self.shared.lock();
-        if waiting.events.is_empty() && !patience.is_zero() {
-            let woken = self.shared.moved.wait_timeout_while(waiting, patience, |w| w.events.is_empty());
-            waiting = woken.map_or_else(|e| e.into_inner().0, |w| w.0);
+        let mut queue = self.shared.lock();
+        if queue.events.is_empty() && !patience.is_zero() {
+            let woken = self.shared.changed.wait_timeout_while(queue, patience, |q| q.events.is_empty());
+            queue = woken.map_or_else(|e| e.into_inner().0, |w| w.0);
         }
-        let arrived = waiting.events.pop_front()?;
-        waiting.bytes -= bytes_of(&arrived.event);
-        drop(waiting);
-        self.shared.moved.notify_all();
+        let arrived = queue.events.pop_front()?;
+        queue.bytes -= bytes_of(&arrived.event);
+        drop(queue);
+        self.shared.changed.notify_all();
         Some(arrived)
     }
 
-    /// Whether the source loses nothing by being kept waiting.
+    /// True if the source loses nothing while it is kept waiting.
     pub fn can_wait(&self) -> bool {
         self.can_wait
     }
 
-    /// Frames and other events that wait.
+    /// Number of queued events.
     pub fn waiting(&self) -> usize {
         self.shared.lock().events.len()
     }
 
-    /// Frames that were to be recorded and could not be, and what else went wrong with the recording.
+    /// Number of frames that could not be recorded, and of other failures of the recording.
     pub fn unrecorded(&self) -> u64 {
         self.shared.unrecorded.load(Ordering::Relaxed)
     }
 
-    /// Whether a volume that is about to be taken is stale: a whole one has come after it, and the source does not wait.
+    /// True if a complete volume has arrived after this one and the source cannot wait: then this one need not be drawn.
     pub fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 
-    /// Frames, or parts of frames that came line by line, for which there was no room.
+    /// Number of frames, or of parts of frames that arrive line by line, that were lost because the queue was full.
     pub fn lost(&self) -> u64 {
         self.shared.lost.load(Ordering::Relaxed)
     }
@@ -166,39 +165,40 @@ impl Feed {
 impl Drop for Feed {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.moved.notify_all();
+        self.shared.changed.notify_all();
         if let Some(thread) = self.thread.take() {
-            // A source that panicked has nothing more to say.
+            // A panic of the source was reported as its end.
             let _ = thread.join();
         }
     }
 }
 
-fn listen(mut source: Box<dyn Live>, mut tape: Option<RecordingTap>, shared: &Shared) {
-    let (can_wait, records) = (source.can_wait(), tape.is_some());
-    let _ended = Ended(shared);
+fn listen(mut source: Box<dyn Live>, mut tap: Option<RecordingTap>, shared: &Shared) {
+    let (can_wait, records) = (source.can_wait(), tap.is_some());
+    let _guard = EndOnPanic(shared);
     while !shared.stop.load(Ordering::Relaxed) {
         let event = source.next(PATIENCE);
         let at = Instant::now();
         let is_frame = matches!(event, Event::Frame(_) | Event::Lines { .. });
-        if records && is_frame && tape.is_none() {
+        if records && is_frame && tap.is_none() {
             shared.unrecorded.fetch_add(1, Ordering::Relaxed);
         }
-        if let Some(Err(fault)) = tape.as_mut().map(|tape| tape.write(&event, at)) {
-            // Without a file nothing can be written; a frame that cannot be leaves the next one its chance, and is told of once.
+        if let Some(Err(fault)) = tap.as_mut().map(|tap| tap.write(&event, at)) {
+            // Without a file the recording ends. A frame that cannot be written does not prevent the next; failures in a row are
+            // reported once.
             shared.unrecorded.fetch_add(1, Ordering::Relaxed);
             let ends = matches!(event, Event::Begin(_));
-            let told = tape.as_mut().is_some_and(|tape| std::mem::replace(&mut tape.failing, true));
-            tape = tape.filter(|_| !ends);
-            if !told {
+            let is_reported = tap.as_mut().is_some_and(|tap| std::mem::replace(&mut tap.is_failing, true));
+            tap = tap.filter(|_| !ends);
+            if !is_reported {
                 let what = if ends { "the recording ends" } else { "the recording lacks a frame" };
                 shared.put(Arrived { event: Event::Fault(format!("{what}: {fault}")), at }, can_wait);
             }
-        } else if let Some(tape) = tape.as_mut().filter(|_| is_frame) {
-            tape.failing = false;
+        } else if let Some(tap) = tap.as_mut().filter(|_| is_frame) {
+            tap.is_failing = false;
         }
         let ends = matches!(event, Event::End(_));
-        if ends && let Some(Err(fault)) = tape.take().map(RecordingTap::finish) {
+        if ends && let Some(Err(fault)) = tap.take().map(RecordingTap::finish) {
             shared.put(Arrived { event: Event::Fault(format!("the recording has no index: {fault}")), at }, can_wait);
         }
         if !matches!(event, Event::Idle) {
@@ -208,37 +208,124 @@ fn listen(mut source: Box<dyn Live>, mut tape: Option<RecordingTap>, shared: &Sh
             return;
         }
     }
-    if let Some(Err(fault)) = tape.map(RecordingTap::finish) {
+    if let Some(Err(fault)) = tap.map(RecordingTap::finish) {
         tracing::warn!("the recording has no index: {fault}");
     }
 }
 
-/// Whatever becomes of the thread, its end is told.
-struct Ended<'a>(&'a Shared);
+/// Reports the end of the source if its thread panics.
+struct EndOnPanic<'a>(&'a Shared);
 
-impl Drop for Ended<'_> {
+impl Drop for EndOnPanic<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            let event = Event::End(Some("the source broke down".into()));
+            let event = Event::End(Some("the source panicked".into()));
             self.0.put(Arrived { event, at: Instant::now() }, false);
         }
     }
 }
 
+/// Writes what arrives to `.frames` files, one for each geometry.
+struct RecordingTap {
+    path: PathBuf,
+    /// Number of file names tried so far.
+    files: u32,
+    writer: Option<Writer>,
+    header: Option<Header>,
+    /// A frame whose lines are arriving.
+    partial: Option<Frame>,
+    /// The last frame could not be written.
+    is_failing: bool,
+}
+
+impl RecordingTap {
+    fn new(path: &Path) -> RecordingTap {
+        RecordingTap { path: path.into(), files: 0, writer: None, header: None, partial: None, is_failing: false }
+    }
+
+    /// Writes a frame, or collects lines until their frame is complete.
+    ///
+    /// # Errors
+    /// A file that cannot be created, or a frame that cannot be written. The next frame may succeed.
+    fn write(&mut self, event: &Event, at: Instant) -> Result<(), String> {
+        // Readers of a recording use differences only, so any steady clock will do.
+        static BEGAN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+        let seconds = at.saturating_duration_since(*BEGAN.get_or_init(|| at)).as_secs_f64();
+        match event {
+            Event::Begin(header) if self.header.as_ref() != Some(header) => {
+                self.finish_file()?;
+                self.partial = None;
+                let path = self.free_name();
+                self.writer = Some(Writer::create(&path, (**header).clone()).map_err(|e| e.to_string())?);
+                self.header = Some((**header).clone());
+                Ok(())
+            }
+            Event::Frame(frame) => self.frame(frame, seconds),
+            Event::Lines { frame, first } => {
+                match &mut self.partial {
+                    Some(partial) if follows(partial, frame, *first, self.header.as_ref()) => {
+                        partial.bytes.extend(&frame.bytes);
+                    }
+                    partial => *partial = Some(frame.clone()),
+                }
+                let total = self.header.as_ref().and_then(Header::frame_bytes);
+                match self.partial.take_if(|partial| Some(partial.bytes.len() as u64) == total) {
+                    Some(frame) => self.frame(&frame, seconds),
+                    None => Ok(()),
+                }
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The given name for the first file, then the name with the next number that is free: no recording is overwritten.
+    fn free_name(&mut self) -> PathBuf {
+        loop {
+            self.files += 1;
+            let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+            let path = match self.files {
+                1 => return self.path.clone(),
+                n => self.path.with_file_name(format!("{stem}-{n}.frames")),
+            };
+            if !path.exists() {
+                return path;
+            }
+        }
+    }
+
+    fn frame(&mut self, frame: &Frame, at: f64) -> Result<(), String> {
+        self.writer.as_mut().map_or(Ok(()), |w| w.frame(frame, at)).map_err(|e| e.to_string())
+    }
+
+    fn finish_file(&mut self) -> Result<(), String> {
+        self.writer.take().map_or(Ok(()), Writer::finish).map_err(|e| e.to_string())
+    }
+
+    /// Ends the current file with its index.
+    fn finish(mut self) -> Result<(), String> {
+        self.finish_file()
+    }
+}
+
+/// True if lines from `first` on continue the partial frame.
+fn follows(partial: &Frame, frame: &Frame, first: usize, header: Option<&Header>) -> bool {
+    let line = header.map_or(0, |h| h.forward.frame_size()[0] * h.stored.bytes());
+    first > 0 && partial.bytes.len() == first * line && (partial.volume, partial.slice) == (frame.volume, frame.slice)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Frame;
 
-    /// Frames of two volumes of three, as fast as they are asked for.
-    struct Quick {
+    /// Volumes of three frames, as fast as they are asked for.
+    struct FastSource {
         next: u32,
         frames: u32,
         bytes: usize,
         waits: bool,
     }
 
-    impl Live for Quick {
+    impl Live for FastSource {
         fn next(&mut self, _: Duration) -> Event {
             if self.next == self.frames {
                 return Event::End(None);
@@ -274,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_source_that_can_wait_loses_nothing() {
-        let source = Quick { next: 0, frames: 30, bytes: MOST_BYTES / 4, waits: true };
+        let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: true };
         let feed = Feed::new(Box::new(source), None).expect("thread");
         assert_eq!(all(&feed, Duration::from_millis(1)), (0..30).collect::<Vec<_>>());
         assert_eq!(feed.lost(), 0);
@@ -282,10 +369,10 @@ mod tests {
 
     #[test]
     fn a_source_that_cannot_wait_loses_the_rest_of_a_volume_and_memory_stays_bounded() {
-        let source = Quick { next: 0, frames: 30, bytes: MOST_BYTES / 4, waits: false };
+        let source = FastSource { next: 0, frames: 30, bytes: MAX_BYTES / 4, waits: false };
         let feed = Feed::new(Box::new(source), None).expect("thread");
         std::thread::sleep(Duration::from_millis(300));
-        assert!(feed.shared.lock().bytes <= MOST_BYTES);
+        assert!(feed.shared.lock().bytes <= MAX_BYTES);
         let came = all(&feed, Duration::ZERO);
         assert_eq!(came.len() as u64 + feed.lost(), 30);
         for pair in came.windows(2).filter(|w| w[0] + 1 != w[1]) {
@@ -295,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_feed_that_is_dropped_ends_its_source() {
-        let source = Quick { next: 0, frames: u32::MAX, bytes: 1 << 20, waits: true };
+        let source = FastSource { next: 0, frames: u32::MAX, bytes: 1 << 20, waits: true };
         let begun = Instant::now();
         drop(Feed::new(Box::new(source), None).expect("thread"));
         assert!(begun.elapsed() < Duration::from_secs(10));

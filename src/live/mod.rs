@@ -1,20 +1,20 @@
-//! Frames that arrive on their own clock, and the pictures of them: what a source says goes into volume images while those before are
-//! drawn. One thread listens ([`feed`]), one drives the device ([`Stream::step`]); [`turns`] says which image is whose, [`views`] in
-//! which geometry a volume is seen, [`statistics`] what came of it, [`cine`] keeps the last volumes for looking back. Nothing here allocates, compiles or waits for the whole device once
-//! a geometry's first frame has been taken.
+//! Live streams: frames arrive on their own clock and go into volume images while the previous volume is drawn.
+//!
+//! One thread listens to the source ([`feed`]), another one drives the device ([`Stream::step`]). [`volume_pool`] assigns volume images,
+//! `session` holds everything that depends on the geometry of the frames, `phase` its state, [`statistics`] the counts and latencies,
+//! and [`cine`] the last volumes for looking back. After the first frame of a geometry nothing allocates, compiles or waits for the
+//! whole device.
 
 pub mod cine;
 pub mod feed;
-mod recording;
-mod replay;
+mod phase;
 mod session;
 pub mod statistics;
-mod status;
 mod stream;
-pub mod views;
 pub mod volume_pool;
 
 pub use feed::Feed;
+pub use session::{FinishedPicture, Views};
 pub use statistics::Statistics;
-pub use stream::{FinishedPicture, Step, Stream, StreamError, StreamOptions};
+pub use stream::{Step, Stream, StreamError, StreamOptions};
 pub use volume_pool::Update;

@@ -1,4 +1,4 @@
-//! What a stream did: counts, and how long frames took from their arrival to the pixels that show them.
+//! Counts of a stream, and the latency from the arrival of a frame to the pixels that show it.
 
 use super::volume_pool::VolumeCounts;
 use crate::passes::PassTime;
@@ -6,19 +6,19 @@ use hdrhistogram::Histogram;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// Latencies up to a minute, in us, to three digits.
-const LONGEST: u64 = 60_000_000;
+/// Largest latency that is told apart, us: a minute. Latencies have three significant digits.
+const MAX_LATENCY: u64 = 60_000_000;
 
-/// Of a stream since it began, or since its statistics were taken last.
+/// Statistics of a stream since it began, or since they were last taken.
 #[derive(Clone, Debug)]
 pub struct Statistics {
-    /// Time that they cover.
+    /// Time covered.
     pub time: Duration,
-    /// Frames that came.
+    /// Frames that arrived.
     pub frames: u64,
-    /// Frames that found no room while they waited.
+    /// Frames that were lost because the queue was full.
     pub lost: u64,
-    /// Frames that the renderer could not take, as those of the wrong size.
+    /// Frames that the renderer refused, for example of the wrong size.
     pub refused: u64,
     pub pictures: u64,
     pub volumes: VolumeCounts,
@@ -29,8 +29,8 @@ pub struct Statistics {
 
 impl Default for Statistics {
     fn default() -> Statistics {
-        // Bounds that the library takes: it never fails on them.
-        let latency = Histogram::new_with_bounds(1, LONGEST, 3).unwrap_or_else(|_| unreachable!());
+        // Never fails with these constants.
+        let latency = Histogram::new_with_bounds(1, MAX_LATENCY, 3).unwrap_or_else(|_| unreachable!());
         Statistics {
             time: Duration::ZERO,
             frames: 0,
@@ -45,16 +45,16 @@ impl Default for Statistics {
 }
 
 impl Statistics {
-    pub(super) fn seen_after(&mut self, latency: Duration) {
+    pub(super) fn record_latency(&mut self, latency: Duration) {
         self.latency.saturating_record((latency.as_micros() as u64).max(1));
     }
 
-    /// The latency that this share of the frames does not exceed, ms.
+    /// Quantile `share` (0..=1) of the latencies, ms.
     pub fn latency_ms(&self, share: f64) -> f64 {
         self.latency.value_at_quantile(share) as f64 / 1e3
     }
 
-    /// Since `before`, which these go on from. Latencies and passes are those since then already.
+    /// The difference to the earlier statistics `before`. Latencies and passes are not subtracted: they are reset when they are taken.
     pub fn since(&self, before: &Statistics) -> Statistics {
         let counts = |now: VolumeCounts, then: VolumeCounts| VolumeCounts {
             shown: now.shown.saturating_sub(then.shown),
@@ -73,7 +73,7 @@ impl Statistics {
         }
     }
 
-    /// Adds what happened later.
+    /// Adds the statistics of a later period.
     pub fn add(&mut self, later: &Statistics) {
         self.time += later.time;
         self.frames += later.frames;
@@ -84,7 +84,7 @@ impl Statistics {
         self.volumes.dropped += later.volumes.dropped;
         self.volumes.incomplete += later.volumes.incomplete;
         self.volumes.left_out += later.volumes.left_out;
-        // Of the same bounds: nothing is lost.
+        // Cannot fail: both histograms have the same bounds.
         let _ = self.latency.add(&later.latency);
         for pass in &later.passes {
             match self.passes.iter_mut().find(|p| p.name == pass.name) {
@@ -97,7 +97,7 @@ impl Statistics {
         }
     }
 
-    /// One line. `floor`: the time that sound needs for a volume, s, where there is one.
+    /// The statistics on one line. `floor`: the time that sound needs for a volume, s, if it is known.
     pub fn line(&self, floor: Option<f64>) -> String {
         let seconds = self.time.as_secs_f64().max(1e-9);
         let rate = |n: u64| n as f64 / seconds;
@@ -122,8 +122,8 @@ impl Statistics {
             line.push_str("  no picture");
         } else {
             let [p50, p95, p99] = [0.5, 0.95, 0.99].map(|share| self.latency_ms(share));
-            let most = self.latency.max() as f64 / 1e3;
-            let _ = write!(line, "  latency ms p50 {p50:.1} p95 {p95:.1} p99 {p99:.1} max {most:.1}");
+            let max = self.latency.max() as f64 / 1e3;
+            let _ = write!(line, "  latency ms p50 {p50:.1} p95 {p95:.1} p99 {p99:.1} max {max:.1}");
         }
         let mut passes: Vec<&PassTime> = self.passes.iter().filter(|p| p.total > 0.0).collect();
         passes.sort_by(|a, b| b.total.total_cmp(&a.total));
@@ -143,9 +143,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_says_rates_drops_and_percentiles() {
+    fn the_line_has_rates_drops_and_percentiles() {
         let mut statistics = Statistics { time: Duration::from_secs(2), frames: 74, pictures: 4, ..Default::default() };
-        (1..=100).for_each(|n| statistics.seen_after(Duration::from_millis(n)));
+        (1..=100).for_each(|n| statistics.record_latency(Duration::from_millis(n)));
         statistics.volumes = VolumeCounts { shown: 2, dropped: 1, incomplete: 3, left_out: 0 };
         statistics.passes = vec![PassTime { name: "scan_convert", runs: 74, total: 74e6 }];
         let line = statistics.line(Some(0.25));
@@ -167,10 +167,10 @@ mod tests {
     }
 
     #[test]
-    fn latencies_beyond_all_bounds_are_kept_at_the_bound() {
+    fn latencies_beyond_the_bound_are_recorded_as_the_bound() {
         let mut statistics = Statistics::default();
-        statistics.seen_after(Duration::from_secs(1_000_000));
-        statistics.seen_after(Duration::ZERO);
+        statistics.record_latency(Duration::from_secs(1_000_000));
+        statistics.record_latency(Duration::ZERO);
         assert_eq!(statistics.latency.len(), 2);
         assert!(statistics.latency_ms(1.0) >= 60_000.0);
     }

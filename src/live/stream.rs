@@ -2,36 +2,40 @@
 
 use super::cine::{Cine, CineLimits};
 use super::feed::{Arrived, Feed};
-use super::replay::Replay;
-use super::session::Session;
+use super::phase::{Pending, Phase};
+use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
-use super::views::Views;
-use super::volume_pool::{Update, VolumePool};
+use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::pipelines::embedded;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
-use crate::picture::Picture;
-use crate::scene::{SceneError, Settings};
+use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
 use crate::source::live::Event;
 use crate::source::recorder::Header;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+/// Longest wait for an event while a picture is being drawn: its end is noticed no later than that.
+const DRAWING_WAIT: Duration = Duration::from_micros(200);
+
+/// How a [`Stream`] renders.
 #[derive(Clone)]
 pub struct StreamOptions {
     pub update: Update,
-    /// Volume images that take turns where volumes are whole: 2, or 3 so that a volume need not wait for a picture.
+    /// Volume images used in rotation if volumes are shown whole: 2, or 3 so that a volume need not wait for a picture.
     pub images: u32,
-    /// Queues that share the work; as many as the device has unless given.
+    /// Queues to use; None: as many as the device offers.
     pub queues: Option<usize>,
-    /// Bring every picture back; otherwise it stays on the device, where it is shown.
+    /// Copies every picture to host memory. Otherwise it stays on the device, for a window.
     pub readback: bool,
-    /// How much of what came last is kept for looking back.
+    /// Size of the cine loop; none by default.
     pub cine: CineLimits,
-    /// Called when there is something to look at: a source said something, something was made beside the drawing.
+    /// Called when the next step has work: the source reported an event, or a pipeline was compiled. If set, pipelines of changed
+    /// settings are compiled in the background.
     pub wake: Option<Wake>,
-    /// Shaders to use instead of the embedded ones; what changes there is drawn with from then on.
+    /// Shaders to use instead of the embedded ones. Those that change are loaded again between two pictures.
     pub shaders: Option<Arc<ShaderFolder>>,
 }
 
@@ -49,32 +53,20 @@ impl Default for StreamOptions {
     }
 }
 
-/// What became of a step.
+/// The result of a step.
 #[derive(Debug)]
 pub enum Step {
     /// A picture is done.
     Picture(FinishedPicture),
-    /// Something was left out, and why; the stream goes on.
+    /// A frame or a change of settings was refused, or the source reported a fault: the reason. The stream goes on.
     Fault(String),
-    /// Something else was done, or nothing.
+    /// Anything else, or nothing, was done.
     Progress,
-    /// No more frames will come, and why if that was not to be expected; all that came is in the last picture.
+    /// The source has ended, with the reason if it ended unexpectedly. Everything that came is in the last picture.
     End(Option<String>),
 }
 
-/// A picture, and what it is of.
-#[derive(Debug)]
-pub struct FinishedPicture {
-    /// The volume that is shown; rolling: the newest that has a slice in it.
-    pub volume: u32,
-    /// None where pictures stay on the device.
-    pub picture: Option<Picture>,
-    /// From the arrival of the last frame that is new in it to now.
-    pub latency: Duration,
-    /// From the beginning of its drawing to now.
-    pub took: Duration,
-}
-
+/// Why a step or a change of settings failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     #[error(transparent)]
@@ -83,131 +75,152 @@ pub enum StreamError {
     Scene(#[from] SceneError),
 }
 
-/// A source that is being rendered.
+/// A live source that is rendered. The caller drives it by calling [`Stream::step`] again and again, on one thread.
 pub struct Stream {
-    pub(super) context: Arc<Context>,
-    pub(super) feed: Feed,
+    context: Arc<Context>,
+    feed: Feed,
     settings: Settings,
     options: StreamOptions,
-    pub(super) now: Option<Session>,
-    pub(super) cine: Cine,
-    /// A volume of the cine loop that is being sent once more.
-    pub(super) replay: Option<Replay>,
-    /// What comes is not shown.
-    pub(super) frozen: bool,
-    /// The geometry of now, also where nothing could be made for it.
-    pub(super) header: Option<Header>,
-    /// A geometry that begins when what is on its way has been shown.
-    next: Option<Header>,
-    /// What the volumes of this source are numbered from, and the newest number: volumes of several sources lie in one cine loop.
-    pub(super) first: u32,
-    pub(super) newest: Option<u32>,
-    /// Of a geometry that nothing could be made after.
-    pub(super) before: Option<VolumePool>,
-    pub(super) end: Option<Option<String>>,
-    pub(super) began: Instant,
-    pub(super) statistics: Statistics,
-    pub(super) taken: Statistics,
+    /// None before the first frame header, and after a geometry that could not be set up.
+    session: Option<Session>,
+    cine: Cine,
+    /// Frames that arrive are not shown.
+    is_frozen: bool,
+    /// The geometry of the frames, also if no session could be made for it.
+    header: Option<Header>,
+    /// A geometry that begins when the picture in flight is done.
+    next_header: Option<Header>,
+    /// Added to the volume numbers of the current source, so that volumes of several sources differ in the cine loop.
+    volume_base: u32,
+    /// The highest volume number so far.
+    newest: Option<u32>,
+    /// Its counts go on in the next session.
+    previous_pool: Option<VolumePool>,
+    /// The source has ended, and why.
+    end: Option<Option<String>>,
+    began: Instant,
+    statistics: Statistics,
+    /// The statistics that were reported last.
+    reported: Statistics,
 }
 
 impl Stream {
+    /// A stream of the frames of `feed`. Nothing is created on the device before the first frame header.
     pub fn new(context: &Arc<Context>, feed: Feed, settings: Settings, options: StreamOptions) -> Stream {
         Stream {
             context: context.clone(),
             feed,
             settings,
             options,
-            now: None,
+            session: None,
             cine: Cine::new(CineLimits::default(), 0),
-            replay: None,
-            frozen: false,
+            is_frozen: false,
             header: None,
-            next: None,
-            first: 0,
+            next_header: None,
+            volume_base: 0,
             newest: None,
-            before: None,
+            previous_pool: None,
             end: None,
             began: Instant::now(),
             statistics: Statistics::default(),
-            taken: Statistics::default(),
+            reported: Statistics::default(),
         }
     }
 
-    /// What comes next: a picture that is done, a new one to begin, or an event of the source, waiting for that at most so long.
+    /// Does the next piece of work: finishes or begins a picture, or takes an event of the source. Waits for an event for at most
+    /// `patience`.
     ///
     /// # Errors
-    /// A device that fails, and settings that cannot be drawn of a geometry that has begun.
+    /// A device that fails, and settings that a new geometry cannot be drawn with.
     pub fn step(&mut self, patience: Duration) -> Result<Step, StreamError> {
-        let went = self.go(patience);
-        // What cannot draw any more is made anew with the next geometry that is told.
-        if went.is_err()
-            && let Some(Session { turns, .. }) = self.now.take_if(|now| now.renderer.is_broken())
+        let result = self.advance(patience);
+        // A renderer that cannot draw any more is made anew with the next geometry.
+        if result.is_err()
+            && let Some(Session { pool, .. }) = self.session.take_if(|session| session.renderer.needs_rebuild())
         {
-            (self.before, self.replay) = (Some(turns), None);
+            self.previous_pool = Some(pool);
         }
-        went
+        result
     }
 
-    fn go(&mut self, mut patience: Duration) -> Result<Step, StreamError> {
-        // What is on its way is shown first, and nothing more is taken.
-        let over = self.end.is_some() || (self.next.is_some() && !self.frozen);
-        if let Some(now) = &mut self.now {
-            if now.drawing.is_some() {
-                if over || !now.renderer.is_drawing()? {
-                    now.behind = if now.turns.is_rolling() && !over { self.feed.waiting() } else { 0 };
-                    return Ok(Step::Picture(now.finish(&mut self.statistics)?));
-                }
-                patience = patience.min(Duration::from_micros(200));
-                if self.feed.can_wait() && now.turns.is_waiting() {
-                    // Another volume would take its place.
-                    std::thread::sleep(patience);
-                    return Ok(Step::Progress);
-                }
-            } else if now.behind > 0 && !over {
-                now.behind -= 1;
-                if let Some(Arrived { event, at }) = self.feed.next(Duration::ZERO) {
-                    return self.take(event, at);
-                }
-                now.behind = 0;
-                return Ok(Step::Progress);
-            } else {
-                if let Some(folder) = &self.options.shaders
-                    && let Some(changed) = folder.take_changed()
-                {
-                    match now.renew_shaders(&changed) {
-                        Ok(()) => folder.accept(),
-                        Err(error) if error.is_device_lost() => return Err(error.into()),
-                        // What was drawn before stays.
-                        Err(error) => folder.refuse(changed, error.to_string()),
-                    }
-                }
-                let begun = now.begin()?;
-                // What was sent of a volume went through stage 1 as it was before.
-                if std::mem::take(&mut now.anew)
-                    && let Some(replay) = self.replay.take()
-                {
-                    now.lost = Some(replay.kept.volume);
-                }
-                if begun {
-                    return Ok(Step::Progress);
-                } else if let Some(fault) = now.fault.take() {
-                    // What could not be drawn is not to be made of another geometry or device either.
-                    if now.next.is_none() {
-                        self.settings = now.views.first().settings.clone();
-                    }
-                    return Ok(Step::Fault(fault));
-                } else if let Some(volume) = now.lost.take() {
-                    self.show_again(volume);
-                }
+    fn advance(&mut self, patience: Duration) -> Result<Step, StreamError> {
+        // The picture in flight is finished first, and no more events are taken.
+        let is_ending = self.end.is_some() || (self.next_header.is_some() && !self.is_frozen);
+        match self.session.as_ref().map(|session| &session.phase) {
+            None => self.next_event(patience),
+            Some(Phase::Drawing { .. }) => self.step_drawing(is_ending, patience),
+            Some(Phase::Draining { .. }) if !is_ending => self.step_draining(),
+            Some(Phase::Idle | Phase::Replaying(_) | Phase::Draining { .. }) => self.step_between_pictures(patience),
+        }
+    }
+
+    fn step_drawing(&mut self, is_ending: bool, patience: Duration) -> Result<Step, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
+        if is_ending || !session.renderer.is_drawing()? {
+            let queued = if session.pool.is_rolling() && !is_ending { self.feed.waiting() } else { 0 };
+            return Ok(Step::Picture(session.finish(queued, &mut self.statistics)?));
+        }
+        let patience = patience.min(DRAWING_WAIT);
+        if self.feed.can_wait() && session.pool.is_waiting() {
+            // A further volume would replace the one that waits to be shown.
+            std::thread::sleep(patience);
+            return Ok(Step::Progress);
+        }
+        self.replay_or_next_event(patience)
+    }
+
+    fn step_draining(&mut self) -> Result<Step, StreamError> {
+        let arrived = self.feed.next(Duration::ZERO);
+        if let Some(session) = &mut self.session {
+            session.phase.drained(arrived.is_none());
+        }
+        match arrived {
+            Some(Arrived { event, at }) => self.take(event, at),
+            None => Ok(Step::Progress),
+        }
+    }
+
+    fn step_between_pictures(&mut self, patience: Duration) -> Result<Step, StreamError> {
+        let Some(session) = &mut self.session else { return Ok(Step::Progress) };
+        if let Some(folder) = &self.options.shaders
+            && let Some(changed) = folder.take_changed()
+        {
+            match session.reload_shaders(&changed) {
+                Ok(()) => folder.accept(),
+                Err(error) if error.is_device_lost() => return Err(error.into()),
+                // The previous pipelines remain.
+                Err(error) => folder.refuse(changed, error.to_string()),
             }
         }
-        if self.replay.is_some() {
-            return self.send_again().map(|()| Step::Progress);
+        match session.begin()? {
+            Begun::Picture => return Ok(Step::Progress),
+            Begun::Refused(fault) => {
+                // Another geometry or device does not try the refused settings again.
+                if session.pending.is_none() {
+                    self.settings = session.views.first().settings.clone();
+                }
+                return Ok(Step::Fault(fault));
+            }
+            Begun::Restore(volume) => session.restore(volume, &self.cine),
+            Begun::Nothing => {}
         }
-        // A geometry that begins would take what is frozen away.
-        let shows = self.frozen && self.now.is_some();
-        if let Some(header) = self.next.take_if(|_| !shows) {
-            return self.make(header).map(|()| Step::Progress);
+        self.replay_or_next_event(patience)
+    }
+
+    fn replay_or_next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
+        if let Some(session) = self.session.as_mut().filter(|session| session.phase.replay().is_some()) {
+            session.continue_replay()?;
+            return Ok(Step::Progress);
+        }
+        self.next_event(patience)
+    }
+
+    fn next_event(&mut self, patience: Duration) -> Result<Step, StreamError> {
+        // A new geometry would discard the volume that is frozen.
+        let shows_frozen = self.is_frozen && self.session.is_some();
+        if let Some(header) = self.next_header.take_if(|_| !shows_frozen) {
+            self.begin_geometry(header)?;
+            return Ok(Step::Progress);
         }
         if let Some(end) = &self.end {
             return Ok(Step::End(end.clone()));
@@ -221,29 +234,31 @@ impl Stream {
     fn take(&mut self, event: Event, at: Instant) -> Result<Step, StreamError> {
         match event {
             Event::Begin(header) => {
-                self.next = Some(*header).filter(|h| self.now.is_none() || Some(h) != self.header.as_ref())
+                let is_new = self.session.is_none() || Some(&*header) != self.header.as_ref();
+                self.next_header = is_new.then_some(*header);
             }
-            Event::Frame(_) | Event::Lines { .. } if self.frozen || self.next.is_some() => {}
+            Event::Frame(_) | Event::Lines { .. } if self.is_frozen || self.next_header.is_some() => {}
             Event::Frame(mut frame) => {
-                frame.volume = frame.volume.saturating_add(self.first);
-                let went = self.lines(&frame, None, at);
-                if matches!(went, Ok(Step::Progress)) {
+                frame.volume = frame.volume.saturating_add(self.volume_base);
+                let result = self.upload(&frame, None, at);
+                if matches!(result, Ok(Step::Progress)) {
                     self.cine.frame(frame);
                 }
-                return went;
+                return result;
             }
             Event::Lines { mut frame, first } => {
-                frame.volume = frame.volume.saturating_add(self.first);
-                let went = self.lines(&frame, Some(first), at);
-                if let (Ok(Step::Progress), Some(now)) = (&went, &self.now) {
-                    let (whole, lines) = (now.renderer.frame_bytes(), now.renderer.scene().frame_size()[1] as usize);
-                    self.cine.lines(frame, first * (whole / lines), whole);
+                frame.volume = frame.volume.saturating_add(self.volume_base);
+                let result = self.upload(&frame, Some(first), at);
+                if let (Ok(Step::Progress), Some(session)) = (&result, &self.session) {
+                    let (total, lines) =
+                        (session.renderer.frame_bytes(), session.renderer.scene().frame_size()[1] as usize);
+                    self.cine.lines(frame, first * (total / lines), total);
                 }
-                return went;
+                return result;
             }
             Event::Fault(fault) => return Ok(Step::Fault(fault)),
             Event::End(why) => {
-                self.now.iter_mut().for_each(|now| now.turns.end());
+                self.session.iter_mut().for_each(|session| session.pool.end());
                 self.end = Some(why);
             }
             Event::Idle => {}
@@ -251,99 +266,38 @@ impl Stream {
         Ok(Step::Progress)
     }
 
-    /// Goes on with another device, or the same one anew after it was lost: with the volume that begins next.
-    ///
-    /// # Errors
-    /// A device that cannot hold what the geometry needs.
-    pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
-        self.context = context.clone();
-        match self.header.clone() {
-            Some(header) => self.make(header),
-            None => Ok(()),
-        }
-    }
-
-    /// Makes everything for a geometry. Where it is the one of before, what was kept stays, and what was shown comes again.
-    fn make(&mut self, header: Header) -> Result<(), StreamError> {
-        let is_same = self.header.as_ref() == Some(&header);
-        let (asked, now) = (self.replay.take().map(|replay| replay.kept.volume), self.now.as_ref());
-        let shown = asked.or_else(|| now.and_then(Session::seen));
-        let shown = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
-        self.header = Some(header.clone());
-        // Gone before the new one comes: both may not fit the device.
-        if let Some(Session { turns, .. }) = self.now.take() {
-            self.before = Some(turns);
-        }
-        let views = Views::new(&header, &self.settings, self.options.update)?;
-        let slices = views.first().slices() as usize;
-        if !is_same || !self.cine.is_of(slices) {
-            self.cine = Cine::new(self.options.cine, slices);
-        }
-        self.cine.cut();
-        let mut turns = VolumePool::new(self.options.update, self.options.images, slices);
-        let options = gpu::Options {
-            volume_images: turns.images(),
-            queues: self.options.queues,
-            readback: self.options.readback,
-            wake: self.options.wake.clone(),
-            shaders: self.options.shaders.as_ref().map_or_else(embedded, ShaderFolder::shaders_or_embedded),
-            ..gpu::Options::default()
-        };
-        let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
-        if let Some(before) = self.before.take() {
-            turns.go_on_from(before);
-        }
-        self.now = Some(Session {
-            arrived: vec![(0, Vec::new()); turns.images() as usize],
-            backward: vec![false; slices],
-            views,
-            renderer,
-            turns,
-            drawing: None,
-            begun: Instant::now(),
-            next: None,
-            waits: false,
-            fault: None,
-            prepares: self.options.wake.is_some(),
-            lost: shown,
-            anew: false,
-            redraw: false,
-            volume: None,
-            behind: 0,
-        });
-        Ok(())
-    }
-
-    /// A whole frame, or lines of one from `first` on.
-    fn lines(&mut self, frame: &Frame, first: Option<usize>, at: Instant) -> Result<Step, StreamError> {
+    /// Uploads a whole frame, or lines of one from line `first` on.
+    fn upload(&mut self, frame: &Frame, first: Option<usize>, at: Instant) -> Result<Step, StreamError> {
         self.statistics.frames += u64::from(first.unwrap_or(0) == 0);
         let feed = &self.feed;
-        let Some(now) = &mut self.now else {
-            return Ok(Step::Fault("a frame came of a geometry that was not told or cannot be drawn".into()));
+        let Some(session) = &mut self.session else {
+            return Ok(Step::Fault("a frame has a geometry that was not announced or cannot be drawn".into()));
         };
-        let (slice, slices) = (frame.slice as u32, now.renderer.scene().slices());
-        let (got, expected) = (frame.bytes.len(), now.renderer.frame_bytes());
-        // Before its volume's number is believed.
+        let (slice, slices) = (frame.slice as u32, session.renderer.scene().slices());
+        let (got, expected) = (frame.bytes.len(), session.renderer.frame_bytes());
+        // Checked before the frame's volume number has any effect.
         let wrong = match first {
             _ if frame.slice >= slices as usize => Some(GpuError::FrameSlice { slice, slices }),
             None if got != expected => Some(GpuError::FrameSize { got, expected }),
             _ => None,
         };
         let first = first.unwrap_or(0) as u32;
-        let went = match wrong {
+        // The image of a frame that is complete.
+        let uploaded = match wrong {
             Some(wrong) => Err(wrong),
-            None => match now.turns.place(frame.volume, || feed.is_behind(frame.volume - self.first)) {
-                Some(image) => {
-                    now.renderer.lines(slice, first, &frame.bytes, image).map(|whole| whole.then_some(image))
-                }
+            None => match session.pool.place(frame.volume, || feed.is_behind(frame.volume - self.volume_base)) {
+                Some(image) => session
+                    .renderer
+                    .lines(slice, first, &frame.bytes, image)
+                    .map(|is_complete| is_complete.then_some(image)),
                 None => Ok(None),
             },
         };
-        match went {
+        match uploaded {
             Ok(Some(image)) => {
-                now.came(image, frame.volume, at);
+                session.frame_arrived(image, frame.volume, at);
                 self.newest = self.newest.max(Some(frame.volume));
-                now.turns.arrived(frame.slice, frame.backward);
+                session.pool.arrived(frame.slice, frame.backward);
                 Ok(Step::Progress)
             }
             Ok(None) => Ok(Step::Progress),
@@ -355,15 +309,204 @@ impl Stream {
         }
     }
 
-    /// Other settings: what is shown is drawn anew, and of what has to go through stage 1 again the frames that come from here on.
+    /// Creates the session of a geometry. If the geometry is the previous one, the cine loop is kept and the volume on display is
+    /// sent again.
+    fn begin_geometry(&mut self, header: Header) -> Result<(), StreamError> {
+        let is_same = self.header.as_ref() == Some(&header);
+        let session = self.session.take();
+        let shown = session.as_ref().and_then(|session| session.replayed_volume().or(session.current_volume()));
+        let to_restore = shown.or_else(|| self.cine.volumes().back().map(|kept| kept.volume)).filter(|_| is_same);
+        self.header = Some(header.clone());
+        // Freed before the new one is created: both may not fit into device memory.
+        if let Some(Session { pool, .. }) = session {
+            self.previous_pool = Some(pool);
+        }
+        let views = Views::new(&header, &self.settings, self.options.update)?;
+        let slices = views.first().slices() as usize;
+        if !is_same || !self.cine.is_of(slices) {
+            self.cine = Cine::new(self.options.cine, slices);
+        }
+        self.cine.discard_partial();
+        let mut pool = VolumePool::new(self.options.update, self.options.images, slices);
+        let options = gpu::RendererOptions {
+            volume_images: pool.images(),
+            queues: self.options.queues,
+            readback: self.options.readback,
+            wake: self.options.wake.clone(),
+            shaders: self.options.shaders.as_ref().map_or_else(embedded, ShaderFolder::shaders_or_embedded),
+            ..gpu::RendererOptions::default()
+        };
+        let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
+        if let Some(previous) = self.previous_pool.take() {
+            pool.continue_from(previous);
+        }
+        self.session = Some(Session::new(views, renderer, pool, self.options.wake.is_some(), to_restore));
+        Ok(())
+    }
+
+    /// Continues on another device, or on the same one after it was lost. The volume on display is sent again from the cine loop.
     ///
     /// # Errors
-    /// Settings that cannot be drawn: those before stay.
+    /// A device that cannot hold what the geometry needs.
+    pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
+        self.context = context.clone();
+        match self.header.clone() {
+            Some(header) => self.begin_geometry(header),
+            None => Ok(()),
+        }
+    }
+
+    /// Changes the settings. The volume on display is drawn again; if stage 1 has to run again, it is sent again from the cine loop.
+    ///
+    /// # Errors
+    /// Settings that the geometry cannot be drawn with; the previous ones remain. What only the device refuses is reported by a later
+    /// [`Step::Fault`].
     pub fn change(&mut self, settings: Settings) -> Result<(), StreamError> {
-        if let (Some(now), Some(header)) = (&mut self.now, &self.header) {
-            now.next = Some(Views::new(header, &settings, self.options.update)?);
+        if let (Some(session), Some(header)) = (&mut self.session, &self.header) {
+            session.pending = Pending::Ready(Views::new(header, &settings, self.options.update)?);
         }
         self.settings = settings;
         Ok(())
+    }
+
+    /// Freezes the display, or continues. While it is frozen, frames that arrive are recorded but not shown.
+    pub fn freeze(&mut self, is_frozen: bool) {
+        if self.is_frozen == is_frozen {
+            return;
+        }
+        self.is_frozen = is_frozen;
+        // The volume that is being filled stays incomplete: its remaining frames are not shown, or its first ones were not.
+        self.cine.discard_partial();
+        if let Some(session) = &mut self.session {
+            session.pool.end();
+        }
+    }
+
+    pub fn is_frozen(&self) -> bool {
+        self.is_frozen
+    }
+
+    /// The last volumes, as they arrived.
+    pub fn cine(&self) -> &Cine {
+        &self.cine
+    }
+
+    /// Position in the cine loop of the volume on display, 0 for the oldest. None if it is not in the loop.
+    pub fn cine_position(&self) -> Option<usize> {
+        let session = self.session.as_ref()?;
+        let volume = session.replayed_volume().or(session.display.volume())?;
+        self.cine.volumes().iter().position(|kept| kept.volume == volume)
+    }
+
+    /// Shows the volume at this position of the cine loop, 0 for the oldest. A position beyond the last is ignored.
+    pub fn show_cine_volume(&mut self, position: usize) {
+        if let (Some(volume), Some(session)) = (self.cine.volumes().get(position), &mut self.session) {
+            session.start_replay(volume.clone());
+        }
+    }
+
+    /// Continues with another source. Its volumes are numbered on from those before. The display stays until the new source has a
+    /// volume to show.
+    pub fn replace_source(&mut self, feed: Feed) {
+        (self.feed, self.end) = (feed, None);
+        self.cine.discard_partial();
+        // Two volumes with one number could not be told apart in the cine loop.
+        if let Some(newest) = self.newest.take() {
+            self.volume_base = newest.checked_add(1).unwrap_or_else(|| {
+                self.cine.clear();
+                0
+            });
+        }
+        if let Some(session) = &mut self.session {
+            session.pool.restart_numbering();
+        }
+    }
+
+    /// True while a volume of the cine loop is being sent to the device.
+    pub fn is_replaying(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.phase.replay().is_some())
+    }
+
+    /// True while a picture is being drawn.
+    pub fn is_drawing(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.phase.is_drawing())
+    }
+
+    /// True if events of the source are queued.
+    pub fn has_waiting(&self) -> bool {
+        self.feed.waiting() > 0
+    }
+
+    /// True if a step has nothing to do until the source reports an event or a pipeline is compiled.
+    pub fn is_idle(&self) -> bool {
+        let is_busy = self.session.as_ref().is_some_and(Session::is_busy);
+        !is_busy && !self.is_replaying() && self.feed.waiting() == 0
+    }
+
+    /// Dispatches on the device so far, by all its users.
+    pub fn dispatches(&self) -> u64 {
+        self.context.counts.dispatches.load(Ordering::Relaxed)
+    }
+
+    /// When the last picture was begun.
+    pub fn last_begun(&self) -> Option<Instant> {
+        self.session.as_ref().map(|session| session.begun)
+    }
+
+    /// Statistics since the stream was created. Latencies and pass times are those since they were last taken.
+    pub fn statistics(&mut self) -> Result<Statistics, StreamError> {
+        self.statistics.time = self.began.elapsed();
+        self.statistics.lost = self.feed.lost();
+        self.statistics.passes = self.session.as_mut().map_or(Vec::new(), |session| session.renderer.times_so_far());
+        self.statistics.volumes = self.pool().map_or(VolumeCounts::default(), VolumePool::counts);
+        Ok(self.statistics.clone())
+    }
+
+    /// Statistics since the previous call.
+    pub fn take_statistics(&mut self) -> Result<Statistics, StreamError> {
+        let total = self.statistics()?;
+        let since = total.since(&self.reported);
+        self.statistics.latency.reset();
+        self.reported = total;
+        Ok(since)
+    }
+
+    /// Number of volumes that were shown.
+    pub fn volumes_shown(&self) -> u64 {
+        self.pool().map_or(0, |pool| pool.counts().shown)
+    }
+
+    fn pool(&self) -> Option<&VolumePool> {
+        self.session.as_ref().map(|session| &session.pool).or(self.previous_pool.as_ref())
+    }
+
+    /// Geometry and sample type of the frames; none before the first header.
+    pub fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// Number of frames that were taken from the feed.
+    pub fn frames(&self) -> u64 {
+        self.statistics.frames
+    }
+
+    /// Number of frames that could not be recorded, and of other failures of the recording.
+    pub fn unrecorded(&self) -> u64 {
+        self.feed.unrecorded()
+    }
+
+    /// Time that sound needs for a volume, s. None before the first frame, and for Cartesian volumes.
+    pub fn acquisition_time(&self) -> Option<f64> {
+        self.session.as_ref()?.views.first().probe().map(|probe| probe.acquisition_time())
+    }
+
+    /// The scene that is drawn; none before the first frame.
+    pub fn scene(&self) -> Option<&Scene> {
+        self.session.as_ref().map(|session| session.renderer.scene())
+    }
+
+    /// The renderer, to read pictures and volumes from it; none before the first frame.
+    pub fn renderer(&mut self) -> Option<&mut Renderer> {
+        self.session.as_mut().map(|session| &mut session.renderer)
     }
 }

@@ -1,5 +1,5 @@
-//! Which volume image a frame goes into and which one is shown, so that no picture ever shows slices of two volumes where volumes are
-//! whole. Pure.
+//! Assigns volume images: which one a frame goes into, and which one is shown. If volumes are shown whole, no picture ever mixes slices
+//! of two volumes. Pure.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,32 +7,32 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Update {
-    /// A volume when all of its frames have come, whole: volume images take turns.
+    /// A volume becomes visible when all its frames have arrived. Several volume images are used in rotation.
     #[default]
     Whole,
-    /// Each frame at once, into the volume that is shown: its newest slices lie beside older ones.
+    /// Each frame becomes visible at once, in the volume that is shown, next to slices of the previous sweep.
     Rolling,
 }
 
-/// What became of volumes. Each that was heard of is counted once, when it is over.
+/// Counts of volumes. Each volume is counted once, when it is over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VolumeCounts {
-    /// Were shown; rolling: all of their frames came.
+    /// Shown. Rolling: complete.
     pub shown: u64,
-    /// Were whole and gave way to a newer one, or found no free image.
+    /// Complete but replaced by a newer one, or without a free image.
     pub dropped: u64,
-    /// Ended with frames missing.
+    /// Over with frames missing.
     pub incomplete: u64,
-    /// Frames of volumes that were over, and of volumes that were dropped.
+    /// Frames (not volumes) that came for a volume that was over or dropped.
     pub left_out: u64,
 }
 
-/// A volume that may be shown.
+/// A volume that can be shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ready {
     pub image: u32,
     pub volume: u32,
-    /// By slice: whether it was swept backwards.
+    /// By slice: true if it was swept backwards.
     pub backward: Vec<bool>,
 }
 
@@ -40,30 +40,30 @@ pub struct Ready {
 pub struct VolumePool {
     update: Update,
     slices: usize,
-    /// By image and slice: whether what is there was swept backwards.
+    /// By image and slice: true if the frame in it was swept backwards.
     backward: Vec<Vec<bool>>,
     filling: Option<Filling>,
     ready: Option<Ready>,
-    /// What waits to be shown was counted before.
-    is_again: bool,
-    /// The image that a volume is being sent into once more.
-    again: Option<u32>,
+    /// The volume in `ready` was counted before: it is a replay.
+    is_replay: bool,
+    /// The image that a replayed volume is being sent into.
+    replay: Option<u32>,
     shown: Option<u32>,
-    /// The newest volume that is over, whatever became of it.
+    /// The newest volume that is over, complete or not.
     over: Option<u32>,
     counts: VolumeCounts,
 }
 
 struct Filling {
     volume: u32,
-    /// None: there was no free image, and the volume is left out.
+    /// None: there was no free image; the volume is left out.
     image: Option<u32>,
-    there: Vec<bool>,
+    arrived: Vec<bool>,
     missing: usize,
 }
 
 impl VolumePool {
-    /// `images`: volume images that take turns, at least two where volumes are whole; a rolling volume has one.
+    /// `images`: volume images used in rotation; at least two for whole volumes, always one for a rolling one. `slices`: frames a volume.
     pub fn new(update: Update, images: u32, slices: usize) -> VolumePool {
         let images = if update == Update::Whole { images.max(2) } else { 1 };
         VolumePool {
@@ -72,32 +72,32 @@ impl VolumePool {
             backward: vec![vec![false; slices]; images as usize],
             filling: None,
             ready: None,
-            is_again: false,
-            again: None,
+            is_replay: false,
+            replay: None,
             shown: None,
             over: None,
             counts: VolumeCounts::default(),
         }
     }
 
-    /// What the images hold is gone: nothing of it will be shown.
+    /// The contents of all images are discarded.
     pub fn forget(&mut self) {
         self.end();
-        self.counts.dropped += u64::from(self.is_waiting() && !self.is_again);
-        (self.ready, self.shown, self.again) = (None, None, None);
+        self.counts.dropped += u64::from(self.is_waiting() && !self.is_replay);
+        (self.ready, self.shown, self.replay) = (None, None, None);
     }
 
-    /// Whether a whole volume waits to be shown.
+    /// True if a complete volume waits to be shown; never for a rolling one.
     pub fn is_waiting(&self) -> bool {
         self.update == Update::Whole && self.ready.is_some()
     }
 
-    /// The volume that waits to be shown; rolling: the newest that something waits of.
+    /// The volume that waits to be shown. Rolling: the newest one with a slice that was not shown.
     pub fn waiting(&self) -> Option<u32> {
         self.ready.as_ref().map(|ready| ready.volume)
     }
 
-    /// Whether there is anything new to show.
+    /// True if there is anything new to show.
     pub fn has_new(&self) -> bool {
         self.ready.is_some()
     }
@@ -106,59 +106,59 @@ impl VolumePool {
         self.update == Update::Rolling
     }
 
-    /// How many volume images are used.
+    /// Number of volume images.
     pub fn images(&self) -> u32 {
         self.backward.len() as u32
     }
 
-    /// VolumeCounts go on from those before another geometry or device; a volume of then that was not shown will not be.
-    pub fn go_on_from(&mut self, mut before: VolumePool) {
-        before.forget();
-        (self.counts, self.over) = (before.counts, before.over);
+    /// Continues the counts of the pool of another geometry or device. Its volumes that were not shown are dropped.
+    pub fn continue_from(&mut self, mut previous: VolumePool) {
+        previous.forget();
+        (self.counts, self.over) = (previous.counts, previous.over);
     }
 
-    /// Another source, which numbers its volumes anew.
-    pub fn begin_anew(&mut self) {
+    /// Another source begins, which may number its volumes from 0 again.
+    pub fn restart_numbering(&mut self) {
         self.end();
         self.over = None;
     }
 
-    /// An image for a volume that is sent once more, out of turn: none that is shown or being filled. A volume that waits to be shown
-    /// gives way where there is no other. None where all are taken.
+    /// An image for a replayed volume: not the one on display, nor the one being filled. If there is no other, the image of a volume
+    /// that waits to be shown. None if all are in use.
     pub fn spare(&mut self) -> Option<u32> {
         if self.is_rolling() {
             return Some(0);
         }
         let filling = self.filling.as_ref().and_then(|f| f.image);
         let ready = self.ready.as_ref().map(|r| r.image);
-        self.again = (0..self.images()).find(|image| ![self.shown, filling, ready].contains(&Some(*image)));
-        if self.again.is_none()
-            && let Some(gone) = self.ready.take()
+        self.replay = (0..self.images()).find(|image| ![self.shown, filling, ready].contains(&Some(*image)));
+        if self.replay.is_none()
+            && let Some(replaced) = self.ready.take()
         {
-            self.counts.dropped += u64::from(!self.is_again);
-            self.again = Some(gone.image);
+            self.counts.dropped += u64::from(!self.is_replay);
+            self.replay = Some(replaced.image);
         }
-        self.again
+        self.replay
     }
 
-    /// A volume that was sent once more is whole in the image that [`VolumePool::spare`] gave: it is shown next.
+    /// A replayed volume is complete in the image that [`VolumePool::spare`] gave: it is shown next.
     pub fn put(&mut self, image: u32, volume: u32, backward: Vec<bool>) {
         self.backward[image as usize].clone_from(&backward);
-        let before = self.ready.replace(Ready { image, volume, backward });
-        self.counts.dropped += u64::from(!self.is_rolling() && before.is_some() && !self.is_again);
-        (self.again, self.is_again) = (None, true);
+        let replaced = self.ready.replace(Ready { image, volume, backward });
+        self.counts.dropped += u64::from(!self.is_rolling() && replaced.is_some() && !self.is_replay);
+        (self.replay, self.is_replay) = (None, true);
     }
 
     pub fn counts(&self) -> VolumeCounts {
         self.counts
     }
 
-    /// The image that a frame of this volume goes into; none where it is left out. Whether a volume that begins is `stale` already, and
-    /// left out whole, is asked once.
+    /// The image that a frame of this volume goes into; None if the frame is left out. `stale` is called once for a volume that begins:
+    /// true leaves all of it out, because newer ones have arrived.
     pub fn place(&mut self, volume: u32, stale: impl FnOnce() -> bool) -> Option<u32> {
-        let of_now = self.filling.as_ref().map(|f| f.volume);
-        if of_now != Some(volume) {
-            if of_now.max(self.over).is_some_and(|newest| volume <= newest) {
+        let current = self.filling.as_ref().map(|f| f.volume);
+        if current != Some(volume) {
+            if current.max(self.over).is_some_and(|newest| volume <= newest) {
                 self.counts.left_out += 1;
                 return None;
             }
@@ -169,21 +169,21 @@ impl VolumePool {
         image
     }
 
-    /// A newer volume: the one before it is over, whole or not.
+    /// A newer volume begins: the previous one is over, complete or not.
     fn begin(&mut self, volume: u32, stale: bool) {
         self.end();
         let ready = self.ready.as_ref().map(|r| r.image);
-        let taken = |image: &u32| [self.shown, self.again, ready].contains(&Some(*image));
+        let taken = |image: &u32| [self.shown, self.replay, ready].contains(&Some(*image));
         let free = match self.update {
             Update::Whole => (0..self.images()).find(|image| !taken(image)),
             Update::Rolling => Some(0),
         };
         let free = free.filter(|_| !stale);
-        let there = vec![false; self.slices];
-        self.filling = Some(Filling { volume, image: free, there, missing: self.slices });
+        let arrived = vec![false; self.slices];
+        self.filling = Some(Filling { volume, image: free, arrived, missing: self.slices });
     }
 
-    /// No more frames of the volume that is being filled will come.
+    /// The volume that is being filled is over: no more of its frames will come.
     pub fn end(&mut self) {
         let Some(Filling { volume, image, .. }) = self.filling.take() else { return };
         self.over = Some(volume);
@@ -193,33 +193,33 @@ impl VolumePool {
         }
     }
 
-    /// A frame has gone into the image that [`VolumePool::place`] said; true when its volume is whole with it.
+    /// A frame is in the image that [`VolumePool::place`] gave. True if it completes its volume.
     pub fn arrived(&mut self, slice: usize, backward: bool) -> bool {
         let Some(filling) = self.filling.as_mut().filter(|_| slice < self.slices) else { return false };
         let Some(image) = filling.image else { return false };
-        filling.missing -= usize::from(!std::mem::replace(&mut filling.there[slice], true));
+        filling.missing -= usize::from(!std::mem::replace(&mut filling.arrived[slice], true));
         let directions = &mut self.backward[image as usize];
         directions[slice] = backward;
-        let (whole, volume) = (filling.missing == 0, filling.volume);
-        if whole || self.update == Update::Rolling {
-            let before = self.ready.replace(Ready { image, volume, backward: directions.clone() });
-            self.counts.dropped += u64::from(self.update == Update::Whole && before.is_some() && !self.is_again);
-            self.is_again = false;
+        let (is_complete, volume) = (filling.missing == 0, filling.volume);
+        if is_complete || self.update == Update::Rolling {
+            let replaced = self.ready.replace(Ready { image, volume, backward: directions.clone() });
+            self.counts.dropped += u64::from(self.update == Update::Whole && replaced.is_some() && !self.is_replay);
+            self.is_replay = false;
         }
-        if whole {
+        if is_complete {
             self.filling = None;
             self.over = Some(volume);
             self.counts.shown += u64::from(self.update == Update::Rolling);
         }
-        whole
+        is_complete
     }
 
-    /// What to show next, if there is anything new. No picture of what was shown before may be on its way any more: its image is
-    /// free from here on.
+    /// The next volume to show, if there is a new one. The image that was shown before becomes free, so no picture of it may be in
+    /// flight any more.
     pub fn take(&mut self) -> Option<Ready> {
         let ready = self.ready.take()?;
         self.shown = Some(ready.image);
-        self.counts.shown += u64::from(self.update == Update::Whole && !self.is_again);
+        self.counts.shown += u64::from(self.update == Update::Whole && !self.is_replay);
         Some(ready)
     }
 }
@@ -229,65 +229,65 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What a picture would show: the volume that each slice of each image carries.
+    /// A pool, and the volume that each slice of each image holds.
     struct Model {
-        turns: VolumePool,
-        carries: Vec<Vec<u32>>,
-        seen: Vec<u32>,
+        pool: VolumePool,
+        held: Vec<Vec<u32>>,
+        shown: Vec<u32>,
     }
 
     impl Model {
         fn new(update: Update, images: u32) -> Model {
-            let turns = VolumePool::new(update, images, 4);
-            let carries = vec![vec![u32::MAX; 4]; turns.images() as usize];
-            Model { turns, carries, seen: Vec::new() }
+            let pool = VolumePool::new(update, images, 4);
+            let held = vec![vec![u32::MAX; 4]; pool.images() as usize];
+            Model { pool, held, shown: Vec::new() }
         }
 
         fn frame(&mut self, volume: u32, slice: usize) {
-            if let Some(image) = self.turns.place(volume, || false) {
-                self.carries[image as usize][slice] = volume;
-                self.turns.arrived(slice, volume % 2 == 1);
+            if let Some(image) = self.pool.place(volume, || false) {
+                self.held[image as usize][slice] = volume;
+                self.pool.arrived(slice, volume % 2 == 1);
             }
         }
 
-        /// The image stays as it is while it is drawn.
+        /// Begins a picture.
         fn draw(&mut self) -> Option<Ready> {
-            let ready = self.turns.take()?;
-            self.seen.push(ready.volume);
+            let ready = self.pool.take()?;
+            self.shown.push(ready.volume);
             Some(ready)
         }
     }
 
     proptest! {
-        /// Frames of volumes that come in order, some lost, some twice, and pictures that begin at any time and take any time.
+        /// Volumes arrive in order, with some frames lost or repeated; pictures begin at any time and take any time.
         #[test]
         fn a_whole_volume_is_never_mixed_and_each_is_counted_once(
             images in 2u32..=3,
             events in prop::collection::vec((0u32..3, 0usize..4, 0u8..4), 1..120),
         ) {
             let mut model = Model::new(Update::Whole, images);
-            let (mut volume, mut drawing, mut heard) = (0, None::<Ready>, std::collections::BTreeSet::new());
+            let (mut volume, mut drawing, mut begun) = (0, None::<Ready>, std::collections::BTreeSet::new());
             for (step, slice, what) in events {
                 match what {
                     0 => drawing = model.draw().or(drawing),
                     _ => {
                         volume += u32::from(step == 2);
                         let slices = if step == 0 { 0..4 } else { slice..slice + 1 };
-                        heard.insert(volume);
+                        begun.insert(volume);
                         slices.for_each(|slice| model.frame(volume, slice));
                     }
                 }
                 if let Some(drawn) = &drawing {
-                    let image = &model.carries[drawn.image as usize];
+                    let image = &model.held[drawn.image as usize];
                     prop_assert!(image.iter().all(|v| *v == drawn.volume), "{:?} shows {:?}", drawn, image);
                     prop_assert!(drawn.backward.iter().all(|b| *b == (drawn.volume % 2 == 1)));
                 }
             }
-            model.turns.end();
-            let waiting = u64::from(model.turns.ready.is_some());
-            let VolumeCounts { shown, dropped, incomplete, .. } = model.turns.counts();
-            prop_assert_eq!(shown + dropped + incomplete + waiting, heard.len() as u64);
-            prop_assert!(model.seen.windows(2).all(|w| w[0] < w[1]), "{:?}", model.seen);
+            model.pool.end();
+            let waiting = u64::from(model.pool.ready.is_some());
+            let VolumeCounts { shown, dropped, incomplete, .. } = model.pool.counts();
+            prop_assert_eq!(shown + dropped + incomplete + waiting, begun.len() as u64);
+            prop_assert!(model.shown.windows(2).all(|w| w[0] < w[1]), "{:?}", model.shown);
         }
     }
 
@@ -298,20 +298,20 @@ mod tests {
         model.frame(1, 3);
         let ready = model.draw().expect("something new");
         assert_eq!((ready.volume, ready.backward.as_slice()), (1, &[false, false, false, true][..]));
-        assert_eq!(model.carries, [[0, 0, 0, 1]]);
+        assert_eq!(model.held, [[0, 0, 0, 1]]);
         assert_eq!(model.draw(), None, "nothing has come since");
         model.frame(0, 1);
-        assert_eq!(model.carries, [[0, 0, 0, 1]], "a late frame does not put an old slice beside new ones");
-        assert_eq!(model.turns.counts(), VolumeCounts { shown: 1, left_out: 1, ..VolumeCounts::default() });
+        assert_eq!(model.held, [[0, 0, 0, 1]], "a late frame does not put an old slice next to new ones");
+        assert_eq!(model.pool.counts(), VolumeCounts { shown: 1, left_out: 1, ..VolumeCounts::default() });
     }
 
     #[test]
     fn a_volume_that_is_stale_when_it_begins_is_left_out_whole() {
-        let mut turns = VolumePool::new(Update::Whole, 3, 2);
-        assert_eq!(turns.place(0, || true), None);
-        assert_eq!(turns.place(0, || panic!("was asked")), None);
-        assert_eq!(turns.place(1, || false), Some(0));
-        assert_eq!(turns.counts(), VolumeCounts { dropped: 1, left_out: 2, ..VolumeCounts::default() });
+        let mut pool = VolumePool::new(Update::Whole, 3, 2);
+        assert_eq!(pool.place(0, || true), None);
+        assert_eq!(pool.place(0, || panic!("was asked")), None);
+        assert_eq!(pool.place(1, || false), Some(0));
+        assert_eq!(pool.counts(), VolumeCounts { dropped: 1, left_out: 2, ..VolumeCounts::default() });
     }
 
     #[test]
@@ -321,49 +321,49 @@ mod tests {
         model.draw();
         (0..4).for_each(|slice| model.frame(1, slice));
         model.frame(2, 0);
-        // The first picture is done now, but volume 2 has lost a frame already.
+        // An image is free now, but volume 2 has already lost a frame.
         assert_eq!(model.draw().map(|r| r.volume), Some(1));
         (1..4).for_each(|slice| model.frame(2, slice));
         assert_eq!(model.draw(), None);
         (0..4).for_each(|slice| model.frame(3, slice));
         assert_eq!(model.draw().map(|r| r.volume), Some(3));
-        assert_eq!(model.turns.counts(), VolumeCounts { shown: 3, dropped: 1, incomplete: 0, left_out: 4 });
+        assert_eq!(model.pool.counts(), VolumeCounts { shown: 3, dropped: 1, incomplete: 0, left_out: 4 });
     }
 
     #[test]
-    fn a_volume_sent_once_more_takes_an_image_that_nothing_else_uses_and_counts_once() {
-        let mut turns = VolumePool::new(Update::Whole, 3, 2);
-        let fill = |turns: &mut VolumePool, volume: u32| {
-            let image = turns.place(volume, || false);
+    fn a_replayed_volume_takes_an_unused_image_and_is_counted_once() {
+        let mut pool = VolumePool::new(Update::Whole, 3, 2);
+        let fill = |pool: &mut VolumePool, volume: u32| {
+            let image = pool.place(volume, || false);
             (0..2).for_each(|slice| {
-                turns.arrived(slice, false);
+                pool.arrived(slice, false);
             });
             image
         };
-        fill(&mut turns, 0);
-        let shown = turns.take().expect("whole").image;
-        let again = turns.spare().expect("free");
+        fill(&mut pool, 0);
+        let shown = pool.take().expect("whole").image;
+        let again = pool.spare().expect("free");
         assert_ne!(again, shown);
-        // While it is being sent another volume comes: into the third image.
-        let third = turns.place(1, || false).expect("free");
+        // A volume that arrives meanwhile goes into the third image.
+        let third = pool.place(1, || false).expect("free");
         assert!(third != again && third != shown);
-        turns.put(again, 0, vec![true; 2]);
-        assert_eq!(turns.take(), Some(Ready { image: again, volume: 0, backward: vec![true; 2] }));
-        assert_eq!(turns.counts(), VolumeCounts { shown: 1, ..VolumeCounts::default() });
+        pool.put(again, 0, vec![true; 2]);
+        assert_eq!(pool.take(), Some(Ready { image: again, volume: 0, backward: vec![true; 2] }));
+        assert_eq!(pool.counts(), VolumeCounts { shown: 1, ..VolumeCounts::default() });
         (0..2).for_each(|slice| {
-            turns.arrived(slice, false);
+            pool.arrived(slice, false);
         });
-        assert_eq!(turns.take().map(|r| r.volume), Some(1));
-        assert_eq!(turns.counts(), VolumeCounts { shown: 2, ..VolumeCounts::default() });
+        assert_eq!(pool.take().map(|r| r.volume), Some(1));
+        assert_eq!(pool.counts(), VolumeCounts { shown: 2, ..VolumeCounts::default() });
     }
 
     #[test]
-    fn another_source_may_count_from_nought_again() {
-        let mut turns = VolumePool::new(Update::Whole, 3, 1);
-        turns.place(7, || false);
-        turns.arrived(0, false);
-        assert_eq!(turns.place(0, || false), None);
-        turns.begin_anew();
-        assert!(turns.place(0, || false).is_some());
+    fn another_source_may_number_from_zero_again() {
+        let mut pool = VolumePool::new(Update::Whole, 3, 1);
+        pool.place(7, || false);
+        pool.arrived(0, false);
+        assert_eq!(pool.place(0, || false), None);
+        pool.restart_numbering();
+        assert!(pool.place(0, || false).is_some());
     }
 }

@@ -3,10 +3,10 @@
 use super::slots::{Format, Shape};
 use super::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::hoist_uniforms::hoisted;
-use crate::spirv::strip_bindings::without;
-use crate::spirv::tables::as_texels;
-use crate::spirv::texture_to_storage::{ImageFormat, as_storage};
+use crate::spirv::hoist_uniforms::hoist_uniforms;
+use crate::spirv::storage_to_texel_buffer::storage_to_texel_buffer;
+use crate::spirv::strip_bindings::strip_bindings;
+use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures that a shader has and a pass need not: what rays leap by, and quads. Specialization constants say whether they are read.
@@ -19,7 +19,7 @@ const OPTIONAL: [&str; 2] = ["bricks", "quads"];
 pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
     let bound = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
     let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
-    without(words, &absent).map_err(|e| e.to_string())
+    strip_bindings(words, &absent).map_err(|e| e.to_string())
 }
 
 /// A pass's shader as a CPU runs it fastest: its numbers loaded once, what it only fetches texels of as storage images, and its
@@ -44,9 +44,11 @@ pub fn for_cpu(
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
         .collect();
-    let words = hoisted(words).and_then(|words| as_storage(&words, &textures)).map_err(|e| e.to_string())?;
+    let words =
+        hoist_uniforms(words).and_then(|words| texture_to_storage(&words, &textures)).map_err(|e| e.to_string())?;
     let reads = (pass.reads)(scene, args);
-    as_texels(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot))).map_err(|e| e.to_string())
+    storage_to_texel_buffer(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot)))
+        .map_err(|e| e.to_string())
 }
 
 fn image_format(format: Format) -> Option<ImageFormat> {

@@ -4,7 +4,6 @@
 pub mod axis;
 pub mod file;
 pub mod geometry;
-mod geometry_compare;
 pub mod grid;
 pub mod motor;
 pub mod volumes;

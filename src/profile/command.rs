@@ -2,7 +2,7 @@
 
 use crate::args::{InputArgs, Output, check_outputs, open_device};
 use crate::files::{read_text, replace};
-use crate::gpu::Choice;
+use crate::gpu::DeviceChoice;
 use crate::profile as model;
 use crate::profile::measure;
 use crate::profile::{compare, export, trace};
@@ -53,7 +53,7 @@ pub struct Profile {
     compare: Option<Vec<PathBuf>>,
     /// Measure on this device too, alternating with the other, and compare them
     #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
-    against: Option<Choice>,
+    against: Option<DeviceChoice>,
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,

@@ -1,6 +1,6 @@
 //! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
-use crate::gpu::{Context, GpuError, Options, Renderer, pass_runner};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer};
@@ -65,7 +65,7 @@ impl ProfileRun {
     /// The device cannot hold the scene, or fails.
     pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
         let ceilings = if options.ceilings { measure_ceilings(context)? } else { None };
-        let renderer_options = Options { spans: true, ..Options::default() };
+        let renderer_options = RendererOptions { spans: true, ..RendererOptions::default() };
         Ok(ProfileRun {
             context: context.clone(),
             renderer: Renderer::new(context, scene.clone(), &renderer_options)?,
@@ -159,7 +159,7 @@ impl ProfileRun {
             device_ns: if stamped { repeats.iter().map(Repeat::on_device).collect() } else { Vec::new() },
             device,
             ceilings: self.ceilings,
-            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.fetch().words())),
+            sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.texel_access().describe())),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
         (profile, spans.collect())
@@ -322,7 +322,7 @@ fn measure_ceilings(context: &Arc<Context>) -> Result<Option<Ceilings>, GpuError
     let sampled = loops::scene(128, pixels).map_err(broken)?;
     let copied = loops::scene(2, 2048).map_err(broken)?;
     let rate = |pass: &'static Pass, scene: &Scene, count: f64| -> Result<Option<Ceiling>, GpuError> {
-        let rates: Vec<f64> = pass_runner::time(context, scene, pass, CEILING_REPEATS)?
+        let rates: Vec<f64> = pass_runner::time_pass(context, scene, pass, CEILING_REPEATS)?
             .iter()
             .filter(|ns| **ns > 0.0)
             .map(|ns| count / ns * 1e9)

@@ -1,9 +1,9 @@
 //! A sweep as a Cartesian volume file: each voxel takes what lies around its place in the polar frames, trilinear in sample, line and
 //! slice. In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
 
+use super::frame::Frame;
 use super::samples::{SampleType, StoredType};
-use super::{Frame, InputError};
-use crate::files::Unfinished;
+use crate::files::{InputError, Unfinished};
 use crate::probe::{Geometry, Grid, Probe};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,8 +11,8 @@ use std::io::Write;
 use std::path::Path;
 
 /// Most voxels along an edge, and in all: 32 GiB of floats.
-const MOST_ALONG: f64 = 16384.0;
-const MOST_VOXELS: f64 = 8_589_934_592.0;
+const MAX_EDGE: f64 = 16384.0;
+const MAX_VOXELS: f64 = 8_589_934_592.0;
 
 /// Volume files that are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,10 +86,10 @@ pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
     };
     // The outermost voxels lie within a spacing of the bounds; one that is off by rounding is not another.
     let count = (((high - low) / spacing + 1e-9).floor() + 1.0).to_array();
-    if count.iter().any(|n| n.is_nan() || *n > MOST_ALONG) || count.iter().product::<f64>() > MOST_VOXELS {
+    if count.iter().any(|n| n.is_nan() || *n > MAX_EDGE) || count.iter().product::<f64>() > MAX_VOXELS {
         let [x, y, z] = count;
         return Err(format!(
-            "{spacing} mm: makes {x:.0} x {y:.0} x {z:.0} voxels; at most {MOST_ALONG} along an edge and {MOST_VOXELS:.0} in all are written"
+            "{spacing} mm: makes {x:.0} x {y:.0} x {z:.0} voxels; at most {MAX_EDGE} along an edge and {MAX_VOXELS:.0} in all are written"
         ));
     }
     Ok(Grid { size: count.map(|n| n as usize), spacing: [spacing; 3], origin: low.to_array() })

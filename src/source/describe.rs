@@ -1,12 +1,12 @@
 //! Geometry, volumes and times in words: mm, degrees and seconds, for `info` and messages.
 
-use super::error::escaped;
+use crate::files::escaped;
 use crate::probe::{Array, Axis, Grid, Motion, Probe, Volumes};
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Longest path, in characters.
-const LONGEST_PATH: usize = 300;
+const MAX_PATH_CHARACTERS: usize = 300;
 
 /// At most four decimals, without trailing zeros; large and tiny numbers with an exponent.
 pub(super) fn number(value: f64) -> String {
@@ -18,7 +18,7 @@ pub(super) fn number(value: f64) -> String {
 }
 
 pub(super) fn path(path: &Path) -> String {
-    escaped(&path.display().to_string(), LONGEST_PATH)
+    escaped(&path.display().to_string(), MAX_PATH_CHARACTERS)
 }
 
 pub(super) fn volumes(volumes: &Volumes) -> String {

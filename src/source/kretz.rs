@@ -1,9 +1,9 @@
 //! GE Kretz volumes (`.vol`): a magic, then items of {u16 group, u16 element, u32 length, bytes}, little-endian, up to
 //! FFFF,FFFF. Groups 0110 and 0120 hold the patient's identity: their bytes are skipped, never read.
 
-use super::contents::{Contents, Lines, Own, extent};
-use super::pixels::Pixels;
-use super::{InputError, SampleType};
+use super::layout::{Layout, LineOrder, Pixels, StoredGeometry, extent};
+use super::samples::SampleType;
+use crate::files::InputError;
 use crate::probe::file::SLAB;
 use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
 use std::collections::{BTreeMap, HashMap};
@@ -16,9 +16,9 @@ const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
 /// The format does not say; m/s.
 const SOUND_SPEED: f64 = 1540.0;
 /// An angle table of 65536 entries is the longest item that is read whole.
-const LONGEST_TABLE: u64 = 65_536 * 8;
+const MAX_TABLE_BYTES: u64 = 65_536 * 8;
 /// Files have some hundred items; zeros without end are items as well.
-const MOST_ITEMS: usize = 100_000;
+const MAX_ITEMS: usize = 100_000;
 
 type Tag = (u16, u16);
 const SAMPLES: Tag = (0xc000, 1);
@@ -47,7 +47,7 @@ struct Items<'a> {
     four_d: bool,
 }
 
-pub(super) fn read(path: &Path) -> Result<Contents, InputError> {
+pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
     let items = Items::walk(path)?;
     if items.wavelet {
         return Err(InputError::new(
@@ -62,29 +62,29 @@ pub(super) fn read(path: &Path) -> Result<Contents, InputError> {
         let fault = if items.four_d { "missing: a 4D file without a still volume is not read" } else { "are missing" };
         return Err(InputError::new(path, name(VOXELS, "voxels"), fault));
     };
-    let mut facts = Vec::new();
+    let mut remarks = Vec::new();
     if items.four_d {
-        facts.push(("4D".into(), "holds more volumes, which are not read: only the still one is".into()));
+        remarks.push(("4D".into(), "holds more volumes, which are not read: only the still one is".into()));
     }
     let claimed = samples as u64 * lines as u64 * frames as u64;
     if length > claimed {
-        facts.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
+        remarks.push(("more data".into(), format!("{} bytes behind the voxels; not read", length - claimed)));
     }
-    let own = items.geometry(samples, lines, frames)?;
-    let contents = Contents {
+    let geometry = items.geometry(samples, lines, frames)?;
+    let layout = Layout {
         format: "Kretz volume",
         sample: SampleType::U8,
         big_endian: false,
         frame_size: [samples, lines],
         frames,
         pixels: Pixels { path: path.into(), offset, length, compressed: false },
-        lines: Lines::InOrder,
-        own,
+        line_order: LineOrder::InOrder,
+        geometry,
         times: BTreeMap::new(),
-        facts,
+        remarks,
     };
-    contents.check(path, "C000 (size)")?;
-    Ok(contents)
+    layout.check(path, "C000 (size)")?;
+    Ok(layout)
 }
 
 impl<'a> Items<'a> {
@@ -100,7 +100,7 @@ impl<'a> Items<'a> {
         }
         let mut items = Items { path, small: HashMap::new(), voxels: None, wavelet: false, four_d: false };
         let mut at = MAGIC.len() as u64;
-        for _ in 0..MOST_ITEMS {
+        for _ in 0..MAX_ITEMS {
             let mut head = [0; 8];
             if !fill(&mut input, &mut head).map_err(unreadable)? {
                 return Err(InputError::new(path, "items", format!("cut short after {there} bytes, before FFFF,FFFF")));
@@ -125,7 +125,7 @@ impl<'a> Items<'a> {
             }
             let mut unread = length;
             if READ_WHOLE.contains(&tag) && !items.small.contains_key(&tag) {
-                if length > LONGEST_TABLE {
+                if length > MAX_TABLE_BYTES {
                     return Err(InputError::new(
                         path,
                         name(tag, "item"),
@@ -141,7 +141,7 @@ impl<'a> Items<'a> {
             input.seek_relative(unread as i64).map_err(unreadable)?;
             at += length;
         }
-        Err(InputError::new(path, "items", format!("are more than {MOST_ITEMS}, before FFFF,FFFF")))
+        Err(InputError::new(path, "items", format!("are more than {MAX_ITEMS}, before FFFF,FFFF")))
     }
 
     fn fault<T>(&self, tag: Tag, title: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
@@ -188,7 +188,7 @@ impl<'a> Items<'a> {
         if axis.is_valid() { Ok(axis) } else { self.fault(tag, title, "must rise from each to the next") }
     }
 
-    fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<Own, InputError> {
+    fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<StoredGeometry, InputError> {
         let step = self.number(RADIAL_STEP, "radial step")? * 1e3;
         if !(step > 0.0 && step.is_finite()) {
             return self.fault(RADIAL_STEP, "radial step", format!("is {step} mm, must be above 0"));
@@ -196,7 +196,7 @@ impl<'a> Items<'a> {
         let tables = [SWEEP_ANGLES, LINE_ANGLES].map(|tag| self.small.get(&tag).is_some_and(|b| !b.is_empty()));
         if tables == [false, false] {
             let grid = Grid { size: [samples, lines, frames], spacing: [step; 3], origin: [0.0; 3] };
-            return Ok(Own::Pictures(grid, 1));
+            return Ok(StoredGeometry::Pictures(grid, 1));
         }
         let radius = self.number(ARRAY_RADIUS, "array radius")? * step;
         let (motion, slices) = if frames == 1 {
@@ -206,7 +206,7 @@ impl<'a> Items<'a> {
             let axis_depth = -self.number(MINUS_AXIS_DEPTH, "minus array radius less motor radius")? * step;
             (Motion::Fan { wobble_radius: radius - axis_depth }, self.angles(SWEEP_ANGLES, "sweep angles", frames)?)
         };
-        Ok(Own::Sweep(Box::new(Probe {
+        Ok(StoredGeometry::Sweep(Box::new(Probe {
             array: Array::Curved { radius },
             lines: self.angles(LINE_ANGLES, "line angles", lines)?,
             start_depth: 0.0,

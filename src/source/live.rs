@@ -1,8 +1,6 @@
 //! What arrives by itself: the one trait behind every live source, and files played as if they were live.
 
-use super::recorder::Header;
-use super::{Frame, Source};
-use crate::probe::Geometry;
+use super::frame::{Frame, Header, Source};
 use std::time::{Duration, Instant};
 
 /// What a live source says next.
@@ -108,13 +106,13 @@ impl PlaybackSource {
         self.frames += 1;
         let (began, first) = *self.begun.get_or_insert_with(|| (Instant::now(), stamp));
         // A stamp that is no time, or lies before the first, is due at once; so is one that lies in another age.
-        let after = Duration::try_from_secs_f64((stamp - first).clamp(0.0, LONGEST_WAIT)).unwrap_or_default();
+        let after = Duration::try_from_secs_f64((stamp - first).clamp(0.0, MAX_SPAN)).unwrap_or_default();
         Ok(Some((began + after, frame)))
     }
 }
 
 /// Between the first and the last frame of a recording, s: ten days.
-const LONGEST_WAIT: f64 = 864_000.0;
+const MAX_SPAN: f64 = 864_000.0;
 
 impl Live for PlaybackSource {
     fn next(&mut self, patience: Duration) -> Event {
@@ -143,23 +141,5 @@ impl Live for PlaybackSource {
 
     fn can_wait(&self) -> bool {
         self.pace == Playback::Fast
-    }
-}
-
-/// What the frames of a source have in common. A source that is swept one way only says the same for both.
-pub fn header_of<S: Source + ?Sized>(source: &S) -> Header {
-    let forward = source.geometry(0);
-    let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
-    let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };
-    Header { forward, backward, stored: source.stored_type(), range: source.range() }
-}
-
-/// Whether the motor is on its way back in this geometry.
-fn goes_back(geometry: &Geometry) -> bool {
-    let Geometry::Sweep(probe) = geometry else { return false };
-    match &probe.advance {
-        crate::probe::Advance::None => false,
-        crate::probe::Advance::Same(a) => *a < 0.0,
-        crate::probe::Advance::Each(table) => table.iter().any(|a| *a < 0.0),
     }
 }

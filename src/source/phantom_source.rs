@@ -1,9 +1,10 @@
 //! The phantom as a source: frames in order of acquisition, computed a volume at a time or all at once.
 
-use super::live::header_of;
+use super::frame::{Frame, Header, Source};
 use super::phantom::Phantom;
-use super::recorder::Header;
-use super::{Frame, Geometry, InputError, Source, StoredType};
+use super::samples::StoredType;
+use crate::files::InputError;
+use crate::probe::Geometry;
 use std::collections::VecDeque;
 
 pub struct PhantomSource {
@@ -31,7 +32,7 @@ impl CachedPhantom {
     /// Computes all volumes of the phantom: as many bytes as they have samples.
     pub fn new(phantom: Phantom) -> CachedPhantom {
         let volumes = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
-        CachedPhantom { header: header_of(&PhantomSource::new(phantom)), volumes, next: (0, 0) }
+        CachedPhantom { header: PhantomSource::new(phantom).header(), volumes, next: (0, 0) }
     }
 }
 

@@ -1,17 +1,20 @@
 //! A recorded file as a stream of frames in bounded memory: one frame at a time.
 
-use super::contents::{Contents, Lines, Own};
-use super::pixels::PixelStream;
-use super::samples::{self, Replaced};
-use super::{Frame, InputError, SampleType, StoredType, describe};
+use super::frame::{Frame, Source};
+use super::layout::{Layout, LineOrder, PixelStream, StoredGeometry};
+use super::samples::{self, Replaced, SampleType, StoredType};
+use super::{describe, kretz, metaimage, recorder};
+use crate::files::InputError;
+use crate::probe::file::geometry_error;
 use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// A file of recorded frames.
 pub struct Recording {
     path: PathBuf,
-    contents: Contents,
+    layout: Layout,
     place: Place,
     volumes: Volumes,
     probe_file: Option<PathBuf>,
@@ -37,28 +40,27 @@ impl Recording {
     /// Opens a file and finds out its geometry: from the `probe` file given, else from one that lies beside the recording
     /// ([`ProbeFile::find_for`]), else from the recording itself. Unless the range of values is known, they are all read.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
-        let mut contents = super::read_contents(path)?;
-        let probe_file = choose_probe_file(path, probe, &mut contents)?;
-        let (place, volumes) = match (&probe_file, &contents.own) {
+        let mut layout = read_layout(path)?;
+        let probe_file = choose_probe_file(path, probe, &mut layout)?;
+        let (place, volumes) = match (&probe_file, &layout.geometry) {
             (Some(file), _) => {
-                let (probe, volumes) =
-                    file.geometry(contents.frame_size[0], contents.frame_size[1], contents.frames)?;
+                let (probe, volumes) = file.geometry(layout.frame_size[0], layout.frame_size[1], layout.frames)?;
                 (Place::Sweep(Box::new(probe)), volumes)
             }
-            (None, Own::Sweep(probe)) => {
-                probe.check().map_err(|e| InputError::geometry(path, &e))?;
-                (Place::Sweep(probe.clone()), Volumes::forward(contents.frames, 1))
+            (None, StoredGeometry::Sweep(probe)) => {
+                probe.check().map_err(|e| geometry_error(path, &e))?;
+                (Place::Sweep(probe.clone()), Volumes::forward(layout.frames, 1))
             }
-            (None, Own::Pictures(grid, count)) => {
-                grid.check().map_err(|e| InputError::geometry(path, &e))?;
+            (None, StoredGeometry::Pictures(grid, count)) => {
+                grid.check().map_err(|e| geometry_error(path, &e))?;
                 (Place::Cartesian(*grid), Volumes::forward(grid.size[2], *count))
             }
-            (None, Own::Missing(error)) => return Err(error.clone()),
+            (None, StoredGeometry::Missing(error)) => return Err(error.clone()),
         };
-        let proven = !contents.pixels.compressed;
+        let proven = !layout.pixels.compressed;
         let mut recording = Recording {
             path: path.into(),
-            contents,
+            layout,
             place,
             volumes,
             probe_file: probe_file.as_ref().map(|f| f.path().into()),
@@ -80,25 +82,25 @@ impl Recording {
 
     /// "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep" or "Kretz volume".
     pub fn format(&self) -> &'static str {
-        self.contents.format
+        self.layout.format
     }
 
     pub fn sample_type(&self) -> SampleType {
-        self.contents.sample
+        self.layout.sample
     }
 
     pub fn stored_type(&self) -> StoredType {
-        self.contents.sample.stored()
+        self.layout.sample.stored()
     }
 
     /// All frames, also those after the last whole volume.
     pub fn frames_in_file(&self) -> usize {
-        self.contents.frames
+        self.layout.frames
     }
 
     /// The recording, where its samples are, and its probe file.
     pub fn files(&self) -> Vec<PathBuf> {
-        [self.path.clone(), self.contents.pixels.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
+        [self.path.clone(), self.layout.pixels.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
     }
 
     /// Whole volumes.
@@ -157,7 +159,7 @@ impl Recording {
             number: number as u32,
             slice: if backward { self.volumes.frames - 1 - number } else { number },
             backward,
-            time: self.contents.times.get(&index).copied(),
+            time: self.layout.times.get(&index).copied(),
             bytes,
         }))
     }
@@ -181,7 +183,7 @@ impl Recording {
         if target < self.next {
             self.stream = None;
         } else if let Some(mut stream) = self.stream.take() {
-            stream.skip((target - self.next) as u64 * self.contents.frame_bytes()).map_err(|e| self.broken(&e, 0))?;
+            stream.skip((target - self.next) as u64 * self.layout.frame_bytes()).map_err(|e| self.broken(&e, 0))?;
             self.stream = Some(stream);
         }
         self.next = target;
@@ -193,14 +195,14 @@ impl Recording {
         let mut facts: Vec<(String, String)> = Vec::new();
         let mut say = |title: &str, value: String| facts.push((title.into(), value));
         say("format", self.format().into());
-        say("compression", if self.contents.pixels.compressed { "zlib" } else { "none" }.into());
+        say("compression", if self.layout.pixels.compressed { "zlib" } else { "none" }.into());
         say("samples", self.sample_type().to_string());
-        let [first, second] = self.contents.frame_size;
+        let [first, second] = self.layout.frame_size;
         match self.place {
             Place::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
             Place::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
         }
-        say("frames", self.contents.frames.to_string());
+        say("frames", self.layout.frames.to_string());
         say("volumes", describe::volumes(&self.volumes));
         say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
         match &self.place {
@@ -214,8 +216,8 @@ impl Recording {
             let Replaced { not_finite, denormal } = self.replaced;
             facts.push(("replaced samples".into(), format!("{not_finite} not finite, {denormal} denormal")));
         }
-        facts.extend(describe::times(&self.contents.times));
-        facts.extend(self.contents.facts.iter().cloned());
+        facts.extend(describe::times(&self.layout.times));
+        facts.extend(self.layout.remarks.iter().cloned());
         facts
     }
 
@@ -236,10 +238,10 @@ impl Recording {
     }
 
     fn read_frame(&mut self) -> Result<Vec<u8>, InputError> {
-        let (index, size) = (self.next, self.contents.frame_bytes());
+        let (index, size) = (self.next, self.layout.frame_bytes());
         let mut stream = match self.stream.take() {
             Some(stream) => stream,
-            None => self.contents.pixels.open(index as u64 * size).map_err(|e| self.broken(&e, 0))?,
+            None => self.layout.pixels.open(index as u64 * size).map_err(|e| self.broken(&e, 0))?,
         };
         let mut bytes = Vec::with_capacity(if self.proven { size as usize } else { 0 });
         let outcome = stream.fill(size, &mut bytes);
@@ -250,16 +252,16 @@ impl Recording {
         outcome.map_err(|e| self.broken(&e, bytes.len()))?;
         self.proven = true;
         // Only the end of a compressed stream says whether what came before it was whole.
-        if index + 1 == self.contents.frames {
+        if index + 1 == self.layout.frames {
             let more = stream.finish().map_err(|e| self.broken(&e, bytes.len()))?;
             if more > 0 {
                 tracing::warn!(file = %describe::path(&self.path), bytes = more, "more samples than frames; not read");
             }
         }
-        let replaced = samples::store(self.contents.sample, self.contents.big_endian, &mut bytes);
+        let replaced = samples::store(self.layout.sample, self.layout.big_endian, &mut bytes);
         self.count(index, replaced);
-        if matches!((&self.contents.lines, &self.place), (Lines::Reversed, Place::Sweep(_))) {
-            let line = self.contents.frame_size[0] * self.stored_type().bytes();
+        if matches!((&self.layout.line_order, &self.place), (LineOrder::Reversed, Place::Sweep(_))) {
+            let line = self.layout.frame_size[0] * self.stored_type().bytes();
             bytes = bytes.rchunks_exact(line).flatten().copied().collect();
         }
         (self.stream, self.next) = (Some(stream), index + 1);
@@ -279,8 +281,8 @@ impl Recording {
 
     /// What became of reading the samples, `got` bytes into the frame at hand.
     fn broken(&self, error: &io::Error, got: usize) -> InputError {
-        let size = self.contents.frame_bytes();
-        let (got, claimed) = (self.next as u64 * size + got as u64, self.contents.frames as u64 * size);
+        let size = self.layout.frame_bytes();
+        let (got, claimed) = (self.next as u64 * size + got as u64, self.layout.frames as u64 * size);
         let fault = match error.kind() {
             io::ErrorKind::UnexpectedEof if got >= claimed => {
                 "cut short, the end of the compressed stream is missing".into()
@@ -289,28 +291,84 @@ impl Recording {
             io::ErrorKind::InvalidData => format!("{error} after {got} of {claimed} bytes"),
             _ => format!("cannot be read: {error}"),
         };
-        InputError::new(&self.contents.pixels.path, "data", fault)
+        InputError::new(&self.layout.pixels.path, "data", fault)
     }
 }
 
 /// The probe file to go by, read; `None` if there is none or the one beside is for others.
-fn choose_probe_file(
-    path: &Path,
-    given: Option<&Path>,
-    contents: &mut Contents,
-) -> Result<Option<ProbeFile>, InputError> {
+fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
     let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(path));
     let Some(found) = found else { return Ok(None) };
-    if let Lines::Pictures(word) = &contents.lines {
+    if let LineOrder::Pictures(word) = &layout.line_order {
         let for_all = given.is_none() && found.file_name().is_some_and(|n| n == "probe.toml");
         let fault = format!("is {word}: pictures, not scan lines, so {} does not apply", describe::path(&found));
         if !for_all {
             return Err(InputError::new(path, "UltrasoundImageOrientation", fault));
         }
-        contents
-            .facts
+        layout
+            .remarks
             .push(("not used".into(), format!("{}: the frames are pictures, not scan lines", describe::path(&found))));
         return Ok(None);
     }
     ProbeFile::read(&found).map(Some)
+}
+
+/// Chooses the reader: by content, then by the name's ending.
+fn read_layout(path: &Path) -> Result<Layout, InputError> {
+    let unreadable = |e| InputError::unreadable(path, &e);
+    // A pipe or a folder has no end to measure claims against, and opening a pipe may wait for ever.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(InputError::new(path, "file", "is not a regular file"));
+    }
+    let file = File::open(path).map_err(unreadable)?;
+    let mut start = Vec::new();
+    file.take(64).read_to_end(&mut start).map_err(unreadable)?;
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    if start.starts_with(b"KRETZFILE") {
+        kretz::read(path)
+    } else if start.starts_with(b"ObjectType") || start.starts_with(b"NDims") || ["mha", "mhd"].contains(&&*ending) {
+        metaimage::read(path)
+    } else if recorder::Reader::is_one(&start) {
+        Err(InputError::new(path, "file", "holds frames as they arrived, not a recording"))
+    } else {
+        Err(InputError::new(path, "file", "is of no known format; MetaImage (.mha, .mhd) and Kretz (.vol) are read"))
+    }
+}
+
+impl Source for Recording {
+    fn geometry(&self, volume: usize) -> Geometry {
+        self.geometry(volume)
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.stored_type()
+    }
+
+    fn sample_type(&self) -> SampleType {
+        self.sample_type()
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.range()
+    }
+
+    fn volumes(&self) -> usize {
+        self.volumes()
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.frames_per_volume()
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        self.skip_to_volume(volume)
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        self.next_frame()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        self.files()
+    }
 }

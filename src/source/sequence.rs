@@ -1,18 +1,19 @@
 //! Polar frames as a PLUS sequence (.mha), with their geometry in NAME.probe.toml beside it.
 
-use super::{InputError, SampleType, Source};
-use crate::files::Unfinished;
+use super::frame::Source;
+use super::samples::SampleType;
+use crate::files::{InputError, Unfinished};
 use crate::probe::{Geometry, ProbeFile, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
-pub(super) const MOST_FRAMES: usize = 20_000;
-const LONGEST_HEADER: usize = 1 << 20;
+pub(super) const MAX_FRAMES: usize = 20_000;
+const MAX_HEADER_BYTES: usize = 1 << 20;
 
 /// What of a source makes a sequence.
 pub struct Sequence {
-    kept: Vec<Kept>,
+    kept: Vec<CompleteVolume>,
     left_out: usize,
     /// Of a volume.
     frames: usize,
@@ -52,7 +53,7 @@ impl Sequence {
         let times = times.filter_map(|(n, time)| time.map(|t| (n, format!("{t:?}"))));
         let size = [probe.samples, probe.lines.len(), frames * kept.len()];
         let header = header(size, source.stored_type().into(), "", times);
-        if header.len() > LONGEST_HEADER {
+        if header.len() > MAX_HEADER_BYTES {
             return Err(fault(
                 "time stamps",
                 format!("make a header of {} bytes, at most 1 MiB is read", header.len()),
@@ -95,7 +96,7 @@ impl Sequence {
 }
 
 /// A volume that is whole.
-struct Kept {
+struct CompleteVolume {
     /// From 0, in order.
     place: usize,
     /// What its frames say.
@@ -105,14 +106,14 @@ struct Kept {
 }
 
 /// The volumes that make a sequence, and how many do not.
-fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<Kept>, usize), InputError> {
-    let mut whole: Vec<Kept> = Vec::new();
+fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<CompleteVolume>, usize), InputError> {
+    let mut whole: Vec<CompleteVolume> = Vec::new();
     for place in 0..source.volumes() {
         // Where all of a volume is damaged, the next one is read in its stead, and once more in its own place.
         let next = volume(source, place)?.filter(|v| whole.last().is_none_or(|before| before.number != v.number));
         whole.extend(next);
-        if whole.len() * source.frames_per_volume() > MOST_FRAMES {
-            let fault = format!("make more than {MOST_FRAMES} frames, which a file does not hold");
+        if whole.len() * source.frames_per_volume() > MAX_FRAMES {
+            let fault = format!("make more than {MAX_FRAMES} frames, which a file does not hold");
             return Err(InputError::new(path, "volumes", fault));
         }
     }
@@ -125,13 +126,13 @@ fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<Kept>, usize), In
 }
 
 /// A volume if all of its frames are there, in order.
-fn volume(source: &mut dyn Source, place: usize) -> Result<Option<Kept>, InputError> {
+fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume>, InputError> {
     source.skip_to_volume(place)?;
     let count = source.frames_per_volume();
-    let mut kept: Option<Kept> = None;
+    let mut kept: Option<CompleteVolume> = None;
     for n in 0..count {
         let Some(frame) = source.next_frame()? else { return Ok(None) };
-        let volume = kept.get_or_insert_with(|| Kept {
+        let volume = kept.get_or_insert_with(|| CompleteVolume {
             place,
             number: frame.volume,
             backward: frame.backward,

@@ -1,111 +1,110 @@
-//! Numbers of a pass, loaded once where a module reads them again and again. A GPU keeps them in registers that all lanes share. llvmpipe
-//! gathers them lane by lane, some 25 instructions for each scalar, wherever a shader names them: eight of them made up half
-//! the time of a sample along a ray. As in [`super::stored`] the words are rewritten when the pipeline is made.
+//! Hoists the loads of uniform numbers to the start of a shader. A GPU keeps uniforms in registers that all lanes share.
+//! llvmpipe gathers them lane by lane, about 25 instructions for each scalar, wherever a shader names them: eight of them
+//! took half the time of a sample along a ray. As in [`super::texture_to_storage`], the words are rewritten when the pipeline
+//! is made.
 
-use super::texture_to_storage::instruction;
-use super::{Instruction, SpirvError, error, instructions};
+use super::module::{
+    BOUND, HEADER_WORDS, Instruction, MAX_BOUND, SpirvError, decode, encode, error, op, storage_class,
+};
 use std::collections::{HashMap, HashSet};
-
-/// Storage class of uniform blocks.
-const UNIFORM: u32 = 2;
 
 /// A member of a uniform block, or a component of one, that is loaded.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Member {
-    /// The numbers of its type and of the pointer's.
-    is: u32,
-    pointer: u32,
-    /// The block's variable, and the constants that lead to the member.
+    value_type: u32,
+    pointer_type: u32,
+    /// The variable of the block, and the constants that index the member.
     path: Vec<u32>,
 }
 
-/// The module with every number of its uniform blocks loaded at its beginning, and nowhere else. What it computes is the same.
-/// A module of several functions stays as it is.
+/// The module with every member of its uniform blocks loaded once, at the start. It computes the same values. A module with
+/// several functions is returned unchanged.
 ///
 /// # Errors
 /// A module that breaks the format.
-pub fn hoisted(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
-    let whole = instructions(words)?;
-    let found = Found::of(&whole);
-    if found.functions != 1 || found.members.is_empty() {
+pub fn hoist_uniforms(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let loads = UniformLoads::find(&instructions);
+    if loads.functions != 1 || loads.members.is_empty() {
         return Ok(words.to_vec());
     }
-    let mut bound = words[3];
-    if bound > 0x3f_ffff - 2 * found.members.len() as u32 {
-        return error("no numbers are left for values");
+    let mut bound = words[BOUND];
+    if bound > MAX_BOUND - 2 * loads.members.len() as u32 {
+        return error("no identifiers are left for new values");
     }
-    let values: HashMap<&Member, u32> = found.members.iter().zip((bound + 1..).step_by(2)).collect();
-    let mut out = words[..5].to_vec();
+    let values: HashMap<&Member, u32> = loads.members.iter().zip((bound + 1..).step_by(2)).collect();
+    let mut out = words[..HEADER_WORDS].to_vec();
     let mut is_loaded = false;
     let mut in_function = false;
-    for i in &whole {
+    for i in &instructions {
         let a = i.operands;
-        // Behind the function's first label and its variables.
-        let is_head = !in_function || matches!(i.opcode, 8 | 59 | 248 | 317);
+        // The loads go after the function's first label and its variables.
+        let is_head = !in_function || matches!(i.opcode, op::LINE | op::VARIABLE | op::LABEL | op::NO_LINE);
         if in_function && !is_head && !is_loaded {
             is_loaded = true;
-            for member in &found.members {
-                let chain = [&[member.pointer, bound][..], &member.path].concat();
-                out.extend(instruction(65, &chain));
-                out.extend(instruction(61, &[member.is, bound + 1, bound]));
+            for member in &loads.members {
+                let chain = [&[member.pointer_type, bound][..], &member.path].concat();
+                out.extend(encode(op::ACCESS_CHAIN, &chain));
+                out.extend(encode(op::LOAD, &[member.value_type, bound + 1, bound]));
                 bound += 2;
             }
         }
-        in_function |= i.opcode == 248;
-        match found.load(i).and_then(|member| values.get(&member)) {
-            // OpCopyObject
-            Some(value) => out.extend(instruction(83, &[a[0], a[1], *value])),
-            None => out.extend(instruction(i.opcode, a)),
+        in_function |= i.opcode == op::LABEL;
+        match loads.member(i).and_then(|member| values.get(&member)) {
+            Some(value) => out.extend(encode(op::COPY_OBJECT, &[a[0], a[1], *value])),
+            None => out.extend(encode(i.opcode, a)),
         }
     }
-    out[3] = bound;
+    out[BOUND] = bound;
     Ok(out)
 }
 
 #[derive(Default)]
-struct Found {
+struct UniformLoads {
     functions: usize,
     /// By pointer: its type, and where it points.
     chains: HashMap<u32, (u32, Vec<u32>)>,
-    /// In the order in which they are first loaded.
+    /// In the order of their first load.
     members: Vec<Member>,
 }
 
-impl Found {
-    fn of(whole: &[Instruction]) -> Found {
-        let mut found = Found::default();
-        let (mut constants, mut blocks, mut known) = (HashSet::new(), HashSet::new(), HashSet::new());
-        for i in whole {
+impl UniformLoads {
+    fn find(instructions: &[Instruction]) -> UniformLoads {
+        let mut loads = UniformLoads::default();
+        let (mut constants, mut blocks, mut found) = (HashSet::new(), HashSet::new(), HashSet::new());
+        for i in instructions {
             match (i.opcode, i.operands) {
-                (43, [_, id, ..]) => drop(constants.insert(*id)),
-                (59, [_, id, UNIFORM, ..]) => drop(blocks.insert(*id)),
-                (54, _) => found.functions += 1,
-                (65 | 66, [pointer, id, path @ ..])
+                (op::CONSTANT, [_, id, ..]) => drop(constants.insert(*id)),
+                (op::VARIABLE, [_, id, storage_class::UNIFORM, ..]) => drop(blocks.insert(*id)),
+                (op::FUNCTION, _) => loads.functions += 1,
+                (op::ACCESS_CHAIN | op::IN_BOUNDS_ACCESS_CHAIN, [pointer, id, path @ ..])
                     if path.split_first().is_some_and(|(base, indices)| {
                         blocks.contains(base) && indices.iter().all(|index| constants.contains(index))
                     }) =>
                 {
-                    found.chains.insert(*id, (*pointer, path.to_vec()));
+                    loads.chains.insert(*id, (*pointer, path.to_vec()));
                 }
-                (61, _) => {
-                    if let Some(member) = found.load(i)
-                        && known.insert(member.clone())
+                (op::LOAD, _) => {
+                    if let Some(member) = loads.member(i)
+                        && found.insert(member.clone())
                     {
-                        found.members.push(member);
+                        loads.members.push(member);
                     }
                 }
                 _ => {}
             }
         }
-        found
+        loads
     }
 
-    /// The member that an instruction loads. Loads that say how memory is accessed are left alone.
-    fn load(&self, i: &Instruction) -> Option<Member> {
+    /// The member that an instruction loads. Loads with memory access operands are left alone.
+    fn member(&self, i: &Instruction) -> Option<Member> {
         match (i.opcode, i.operands) {
-            (61, [is, _, from]) => {
-                self.chains.get(from).map(|(pointer, path)| Member { is: *is, pointer: *pointer, path: path.clone() })
-            }
+            (op::LOAD, [value_type, _, from]) => self.chains.get(from).map(|(pointer_type, path)| Member {
+                value_type: *value_type,
+                pointer_type: *pointer_type,
+                path: path.clone(),
+            }),
             _ => None,
         }
     }
@@ -114,45 +113,50 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spirv::{EMBEDDED, embedded, reflect, words};
+    use crate::spirv::module::{EMBEDDED, embedded, words};
+    use crate::spirv::reflect::reflect;
 
-    /// Loads of uniform blocks: before the first branch, and behind it.
-    fn loads(words: &[u32]) -> (usize, usize) {
-        let whole = instructions(words).unwrap();
-        let found = Found::of(&whole);
-        let first = whole.iter().position(|i| matches!(i.opcode, 249..=254)).unwrap();
-        let count = |part: &[Instruction]| part.iter().filter(|i| found.load(i).is_some()).count();
-        (count(&whole[..first]), count(&whole[first..]))
+    /// The first and the last of the branch and return instructions.
+    const BRANCH: u32 = 249;
+    const RETURN_VALUE: u32 = 254;
+
+    /// Loads of uniform blocks before the first branch and after it.
+    fn count_loads(words: &[u32]) -> (usize, usize) {
+        let instructions = decode(words).unwrap();
+        let loads = UniformLoads::find(&instructions);
+        let first = instructions.iter().position(|i| (BRANCH..=RETURN_VALUE).contains(&i.opcode)).unwrap();
+        let count = |part: &[Instruction]| part.iter().filter(|i| loads.member(i).is_some()).count();
+        (count(&instructions[..first]), count(&instructions[first..]))
     }
 
     #[test]
-    fn every_number_of_every_shader_is_loaded_once_and_nothing_else_changes() {
+    fn every_uniform_of_every_shader_is_loaded_once_and_nothing_else_changes() {
         for (name, bytes) in EMBEDDED {
             let before = words(bytes);
-            let after = hoisted(&before).unwrap();
+            let after = hoist_uniforms(&before).unwrap();
             assert_eq!(reflect(&before).unwrap(), reflect(&after).unwrap(), "{name}");
-            let members = Found::of(&instructions(&before).unwrap()).members.len();
-            assert_eq!(loads(&after), (members, 0), "{name}");
-            let (old, new) = (instructions(&before).unwrap(), instructions(&after).unwrap());
+            let members = UniformLoads::find(&decode(&before).unwrap()).members.len();
+            assert_eq!(count_loads(&after), (members, 0), "{name}");
+            let (old, new) = (decode(&before).unwrap(), decode(&after).unwrap());
             assert_eq!(new.len(), old.len() + 2 * members, "{name}");
-            let kept = |i: &&Instruction| !matches!(i.opcode, 61 | 65 | 83);
+            let kept = |i: &&Instruction| !matches!(i.opcode, op::LOAD | op::ACCESS_CHAIN | op::COPY_OBJECT);
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }
-        let (early, late) = loads(&words(embedded("raycast/projection.even").unwrap()));
-        assert!(early + late > 40, "rays have that many numbers");
+        let (early, late) = count_loads(&words(embedded("raycast/projection.even").unwrap()));
+        assert!(early + late > 40, "ray casting has that many uniform numbers");
     }
 
     #[test]
-    fn a_broken_module_is_an_error() {
-        let whole = words(embedded("raycast/volume.uneven").unwrap());
-        for cut in 1..whole.len() {
-            let _ = hoisted(&whole[..cut]);
+    fn a_malformed_module_is_an_error() {
+        let intact = words(embedded("raycast/volume.uneven").unwrap());
+        for cut in 1..intact.len() {
+            let _ = hoist_uniforms(&intact[..cut]);
         }
-        for at in 3..whole.len() {
-            let mut bent = whole.clone();
-            bent[at] ^= 0x0003_0001;
-            let _ = hoisted(&bent);
+        for at in 3..intact.len() {
+            let mut corrupted = intact.clone();
+            corrupted[at] ^= 0x0003_0001;
+            let _ = hoist_uniforms(&corrupted);
         }
     }
 }

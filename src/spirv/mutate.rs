@@ -1,9 +1,8 @@
-//! Modules that compute something slightly else, as a driver's compiler that errs would make them: for faults that are planted on
-//! purpose.
+//! Fault injection into shaders: modules that compute slightly different values, as the output of a faulty driver compiler
+//! would.
 
-use super::texture_to_storage::instruction;
-use super::{Instruction, SpirvError, error, instructions};
-use std::collections::{HashMap, HashSet};
+use super::module::{BOUND, HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, text};
+use std::collections::HashSet;
 
 /// Instructions of GLSL.std.450.
 pub const FMIN: u32 = 37;
@@ -13,129 +12,124 @@ pub const FMAX: u32 = 40;
 ///
 /// # Errors
 /// A module that breaks the format or has no such instruction.
-pub fn replaced(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
-    let whole = instructions(words)?;
-    let is_it = |i: &Instruction| i.opcode == 12 && i.operands.get(3) == Some(&from);
-    let Some(last) = whole.iter().rposition(is_it) else { return error("no such instruction") };
-    let mut out = words[..5].to_vec();
-    for (n, i) in whole.iter().enumerate() {
+pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let matches = |i: &Instruction| i.opcode == op::EXT_INST && i.operands.get(3) == Some(&from);
+    let Some(last) = instructions.iter().rposition(matches) else { return error("no such instruction") };
+    let mut out = words[..HEADER_WORDS].to_vec();
+    for (n, i) in instructions.iter().enumerate() {
         let mut operands = i.operands.to_vec();
         if n == last {
             operands[3] = to;
         }
-        out.extend(instruction(i.opcode, &operands));
+        out.extend(encode(i.opcode, &operands));
     }
     Ok(out)
 }
 
-/// The module with `amount` added to every texel that is written to the image of that name.
+/// The module with `amount` added to every texel that it writes to the image of that name.
 ///
 /// # Errors
-/// A module that breaks the format or writes no such image.
-pub fn added(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec<u32>, SpirvError> {
-    let whole = instructions(words)?;
+/// A module that breaks the format or does not write to such an image.
+pub fn add_to_writes(words: &[u32], image: &str, amount: [f32; 4]) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
     let mut images = HashSet::new();
     let (mut float, mut vector) = (None, None);
     let mut vectors = HashSet::new();
-    for i in &whole {
+    for i in &instructions {
         match (i.opcode, i.operands) {
-            (5, [id, name @ ..]) if super::text(name) == image => drop(images.insert(*id)),
-            (22, [id, 32, ..]) => float = Some(*id),
-            (23, [id, of, 4]) if Some(*of) == float => vector = Some(*id),
-            // OpLoad
-            (61, [_, id, from, ..]) if images.contains(from) => drop(images.insert(*id)),
+            (op::NAME, [id, name @ ..]) if text(name) == image => drop(images.insert(*id)),
+            (op::TYPE_FLOAT, [id, 32, ..]) => float = Some(*id),
+            (op::TYPE_VECTOR, [id, of, 4]) if Some(*of) == float => vector = Some(*id),
+            (op::LOAD, [_, id, from, ..]) if images.contains(from) => drop(images.insert(*id)),
             (_, [of, id, ..]) if Some(*of) == vector => drop(vectors.insert(*id)),
             _ => {}
         }
     }
     let (Some(float), Some(vector)) = (float, vector) else { return error("no vectors of four floats") };
-    let mut bound = words[3];
+    let mut bound = words[BOUND];
     let mut next = || {
         bound += 1;
         bound - 1
     };
-    let (parts, whole_amount) = ([next(), next(), next(), next()], next());
-    let mut out = words[..5].to_vec();
+    let (components, offset) = ([next(), next(), next(), next()], next());
+    let mut out = words[..HEADER_WORDS].to_vec();
     let (mut is_declared, mut writes) = (false, 0);
-    for i in &whole {
-        if i.opcode == 54 && !is_declared {
+    for i in &instructions {
+        if i.opcode == op::FUNCTION && !is_declared {
             is_declared = true;
-            for (id, part) in parts.iter().zip(amount) {
-                out.extend(instruction(43, &[float, *id, part.to_bits()]));
+            for (id, component) in components.iter().zip(amount) {
+                out.extend(encode(op::CONSTANT, &[float, *id, component.to_bits()]));
             }
-            out.extend(instruction(44, &[&[vector, whole_amount][..], &parts].concat()));
+            out.extend(encode(op::CONSTANT_COMPOSITE, &[&[vector, offset][..], &components].concat()));
         }
         match (i.opcode, i.operands) {
-            // OpImageWrite
-            (99, [to, at, texel, rest @ ..]) if images.contains(to) && vectors.contains(texel) => {
+            (op::IMAGE_WRITE, [to, at, texel, rest @ ..]) if images.contains(to) && vectors.contains(texel) => {
                 let sum = next();
-                out.extend(instruction(129, &[vector, sum, *texel, whole_amount]));
-                out.extend(instruction(99, &[&[*to, *at, sum][..], rest].concat()));
+                out.extend(encode(op::F_ADD, &[vector, sum, *texel, offset]));
+                out.extend(encode(op::IMAGE_WRITE, &[&[*to, *at, sum][..], rest].concat()));
                 writes += 1;
             }
-            _ => out.extend(instruction(i.opcode, i.operands)),
+            _ => out.extend(encode(i.opcode, i.operands)),
         }
     }
-    out[3] = bound;
-    if writes == 0 { error(format!("nothing is written to '{image}'")) } else { Ok(out) }
+    out[BOUND] = bound;
+    if writes == 0 { error(format!("the module does not write to '{image}'")) } else { Ok(out) }
 }
 
 /// The module with every sum, difference, product and quotient of floats rounded to half precision.
 ///
 /// # Errors
-/// A module that breaks the format.
-pub fn in_halves(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
-    let whole = instructions(words)?;
-    let mut bound = words[3];
-    let mut out = words[..5].to_vec();
-    let mut seen = HashMap::new();
-    for i in &whole {
+/// A module that breaks the format or computes nothing with floats.
+pub fn round_to_half(words: &[u32]) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let mut bound = words[BOUND];
+    let mut out = words[..HEADER_WORDS].to_vec();
+    for i in &instructions {
         match (i.opcode, i.operands) {
-            // OpFAdd, OpFSub, OpFMul, OpFDiv, OpVectorTimesScalar
-            (129 | 131 | 133 | 136 | 142, [of, id, a, b]) => {
-                out.extend(instruction(i.opcode, &[*of, bound, *a, *b]));
-                // OpQuantizeToF16
-                out.extend(instruction(116, &[*of, *id, bound]));
-                seen.insert(*id, bound);
+            (op::F_ADD | op::F_SUB | op::F_MUL | op::F_DIV | op::VECTOR_TIMES_SCALAR, [of, id, a, b]) => {
+                out.extend(encode(i.opcode, &[*of, bound, *a, *b]));
+                out.extend(encode(op::QUANTIZE_TO_F16, &[*of, *id, bound]));
                 bound += 1;
             }
-            _ => out.extend(instruction(i.opcode, i.operands)),
+            _ => out.extend(encode(i.opcode, i.operands)),
         }
     }
-    out[3] = bound;
-    if seen.is_empty() { error("nothing is computed with floats") } else { Ok(out) }
+    out[BOUND] = bound;
+    if bound == words[BOUND] { error("the module computes nothing with floats") } else { Ok(out) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spirv::{EMBEDDED, embedded, reflect, words};
+    use crate::spirv::module::{EMBEDDED, embedded, words};
+    use crate::spirv::reflect::reflect;
 
     #[test]
-    fn a_bent_module_declares_what_it_declared() {
+    fn a_mutated_module_declares_the_same_interface() {
         for (name, bytes) in EMBEDDED {
             let before = words(bytes);
-            if let Ok(after) = in_halves(&before) {
+            if let Ok(after) = round_to_half(&before) {
                 assert_eq!(reflect(&before).unwrap(), reflect(&after).unwrap(), "{name}");
             }
         }
         let tone = words(embedded("postprocess/tone.plain").unwrap());
-        let after = added(&tone, "screen", [0.1, 0.1, 0.1, 0.0]).unwrap();
+        let after = add_to_writes(&tone, "screen", [0.1, 0.1, 0.1, 0.0]).unwrap();
         assert_eq!(reflect(&tone).unwrap(), reflect(&after).unwrap());
-        assert_eq!(instructions(&after).unwrap().len(), instructions(&tone).unwrap().len() + 6);
-        assert!(added(&tone, "nowhere", [0.0; 4]).is_err());
+        assert_eq!(decode(&after).unwrap().len(), decode(&tone).unwrap().len() + 6);
+        assert!(add_to_writes(&tone, "nowhere", [0.0; 4]).is_err());
         let median = words(embedded("filter/median.slice").unwrap());
-        let after = replaced(&median, FMAX, FMIN).unwrap();
+        let after = replace_last(&median, FMAX, FMIN).unwrap();
         assert_eq!(after.iter().zip(&median).filter(|(a, b)| a != b).count(), 1);
     }
 
     #[test]
-    fn a_broken_module_is_an_error() {
-        let whole = words(embedded("postprocess/tone.plain").unwrap());
-        for cut in 0..whole.len() {
-            let _ = added(&whole[..cut], "screen", [0.0; 4]);
-            let _ = in_halves(&whole[..cut]);
-            let _ = replaced(&whole[..cut], FMAX, FMIN);
+    fn a_malformed_module_is_an_error() {
+        let intact = words(embedded("postprocess/tone.plain").unwrap());
+        for cut in 0..intact.len() {
+            let _ = add_to_writes(&intact[..cut], "screen", [0.0; 4]);
+            let _ = round_to_half(&intact[..cut]);
+            let _ = replace_last(&intact[..cut], FMAX, FMIN);
         }
     }
 }

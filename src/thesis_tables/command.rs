@@ -1,7 +1,7 @@
 //! `echolume report tables`.
 
 use crate::args::{Output, check_outputs, open_device};
-use crate::gpu::Choice;
+use crate::gpu::DeviceChoice;
 use crate::picture::Grey;
 use crate::picture::replace;
 use crate::terminal::{Failure, failed, input, say};
@@ -38,7 +38,7 @@ pub struct ThesisTables {
     quick: bool,
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
-    device: Option<Choice>,
+    device: Option<DeviceChoice>,
 }
 
 impl ThesisTables {

@@ -1,7 +1,7 @@
 //! Tables 7-9 of the thesis (5.5): how far the windows of the enhanced sigma filter grow on a picture, as the share of pixels whose
 //! window grew by +0, +2, +4 ... pixels.
 
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Grey;
 use crate::probe::{Geometry, Grid};
@@ -120,7 +120,7 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -
     for (sigma, windows, settings) in rows {
         let scene = scene_of(grey, settings)?;
         let renderer: &mut Renderer = match &mut renderer {
-            None => renderer.insert(Renderer::new(context, scene, &Options::default())?),
+            None => renderer.insert(Renderer::new(context, scene, &RendererOptions::default())?),
             Some(there) => {
                 there.change(scene)?;
                 there

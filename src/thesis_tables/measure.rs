@@ -68,7 +68,7 @@ fn measure(
     let mut renderers = Vec::new();
     for row in &table.rows {
         let scene = scene(&row.conditions).map_err(|e| broken(&e))?;
-        renderers.push(Renderer::new(context, scene, &gpu::Options::default())?);
+        renderers.push(Renderer::new(context, scene, &gpu::RendererOptions::default())?);
     }
     for n in 0..options.warm_up + options.repeats {
         for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {

@@ -1,62 +1,62 @@
-//! What a sonographer may ask for, however: by hand on the picture, a key, or a panel.
+//! The commands of a user. Gestures on the picture, keys and panels give them.
 
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, TransferName};
 
-/// One wish.
+/// One command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     Mode(Mode),
     Layout(Layout),
-    /// What a drag on the picture does from here on.
+    /// Selects what a drag on the picture does.
     Tool(Tool),
-    /// Turns the view, deg: towards +lateral, towards +elevation.
-    Turn([f64; 2]),
-    /// Turns the picture clockwise, deg.
+    /// Rotates the camera, degrees: azimuth (towards +lateral), elevation (towards +elevation).
+    Rotate([f64; 2]),
+    /// Rotates the picture clockwise, degrees.
     Roll(f64),
-    /// Times this close; above 1 is closer.
+    /// Multiplies the zoom; above 1 is closer.
     Zoom(f64),
-    /// Moves what is seen, shares of the picture's height: right, down.
+    /// Moves what is shown, as fractions of the picture's height: right, down.
     Pan([f64; 2]),
-    /// Moves the light as if it hung on a dome over the surface, shares of the picture's height: right, down.
-    Light([f64; 2]),
-    /// Moves a face of the region, mm outwards.
-    Face(Face, f64),
-    /// Cuts away what is nearer to the viewer: mm further into the volume; less than nothing takes the plane back.
-    Clip(f64),
-    /// The plane that is shown alone, stepped, and moved.
+    /// Moves the light over a dome above the surface, as fractions of the picture's height: right, down.
+    MoveLight([f64; 2]),
+    /// Moves a face of the region outwards, mm.
+    MoveFace(Face, f64),
+    /// Moves the viewer's clip plane further into the volume, mm; negative values pull it back.
+    MoveClip(f64),
+    /// Selects the plane that is shown alone, stepped and moved.
     Plane(PlaneName),
-    /// Moves that plane along its normal, mm.
-    PlaneBy(f64),
-    /// The place where the three planes meet: lateral, depth, elevation, mm.
-    Meet([f64; 3]),
-    /// Turns the planes, deg: azimuth, tilt.
-    PlaneTurn([f64; 2]),
-    /// A slider, by its place in [`super::sliders::SLIDERS`], to a value.
-    Slide(usize, f64),
-    /// The same by so many of its steps.
-    Nudge(usize, i32),
+    /// Moves the selected plane along its normal, mm.
+    StepPlane(f64),
+    /// Moves the point where the three planes cross: lateral, depth, elevation, mm.
+    MoveCrossing([f64; 3]),
+    /// Rotates the planes, degrees: azimuth, tilt.
+    RotatePlanes([f64; 2]),
+    /// Sets a slider, by its index in [`super::sliders::SLIDERS`], to a value.
+    SetSlider(usize, f64),
+    /// Moves a slider by a number of its steps.
+    StepSlider(usize, i32),
     Transfer(TransferName),
     ColourMap(ColourMap),
     Shadow(bool),
-    /// Everything as it was at the start, but for what is frozen.
+    /// Restores all settings of the start. A frozen picture stays frozen.
     Reset,
-    /// Stops and goes on.
+    /// Freezes or unfreezes the live picture.
     Freeze,
-    /// So many volumes back (less than 0) or forth; freezes.
-    Cine(i32),
-    /// The volume that was kept at this place, 0 the oldest; freezes.
-    CineAt(usize),
-    /// Plays what is kept over and over.
-    CinePlay,
+    /// Steps so many volumes back (negative) or forward, and freezes.
+    StepCine(i32),
+    /// Shows the volume at this index of the cine loop (0 is the oldest), and freezes.
+    SeekCine(usize),
+    /// Plays the cine loop repeatedly, or stops it.
+    PlayCine,
     SavePicture,
-    /// The volumes that are kept, as a recording.
+    /// Saves the volumes of the cine loop as a recording.
     SaveLoop,
-    Help,
-    /// The times of every pass.
-    Hud,
-    /// Sliders and buttons.
-    Panels,
-    FullScreen,
+    ToggleHelp,
+    /// Shows or hides the times of the passes.
+    ToggleTimes,
+    /// Shows or hides sliders and buttons.
+    TogglePanels,
+    ToggleFullScreen,
     Exit,
 }
 
@@ -64,13 +64,13 @@ pub enum Command {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tool {
     #[default]
-    Turn,
+    Rotate,
     Light,
-    /// The faces of the region.
+    /// Moves the faces of the region.
     Region,
-    /// A plane across the view that cuts away what is nearer.
+    /// Moves a clip plane that faces the viewer.
     Clip,
-    /// The planes of sections.
+    /// Moves the planes of sections.
     Plane,
 }
 
@@ -79,6 +79,6 @@ pub enum Tool {
 pub struct Face {
     /// 0 lateral, 1 depth, 2 elevation.
     pub axis: usize,
-    /// The one at the higher end.
+    /// The face at the higher end of the axis.
     pub high: bool,
 }

@@ -1,4 +1,4 @@
-//! Settings that commands change. Whatever is asked, what is left can be drawn of the volume that is shown.
+//! The settings of the view, and how commands change them. After any command the settings can be drawn with the current volume.
 
 use super::command::{Command, Tool};
 use super::sliders::SLIDERS;
@@ -7,30 +7,31 @@ use crate::scene::planes::MAX_TILES;
 use crate::scene::{Camera, Cube, Inset, Layout, MAX_PICTURE, Mode, Planes, Scene, Settings, Shadow, Tilt, Transfer};
 use std::borrow::Cow;
 
-/// What became of a command.
+/// The effect of a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
-    /// All is as it was.
+pub(super) enum Change {
+    /// Nothing changed.
     Nothing,
-    /// What a drag does.
+    /// The tool of drags changed.
     Tool,
     Settings,
-    /// Not a matter of settings: for who asked.
-    Screen(Command),
+    /// The command does not concern settings: the caller executes it.
+    Caller(Command),
 }
 
+/// The settings of the view and the tool of drags.
 #[derive(Clone, Debug)]
 pub struct Controls {
     settings: Settings,
     start: Settings,
     tool: Tool,
-    /// The last mode that was no mode of planes: a 4-up picture goes back to it.
+    /// The last mode that renders the volume: a 4-up picture returns to it.
     rendered: Mode,
 }
 
 impl Controls {
-    /// Settings that can be drawn, as at the start.
-    pub fn new(settings: Settings) -> Controls {
+    /// `settings`: the start, which [`Command::Reset`] restores.
+    pub(super) fn new(settings: Settings) -> Controls {
         let rendered = if settings.mode.is_flat() { Mode::default() } else { settings.mode };
         Controls { start: settings.clone(), settings, tool: Tool::default(), rendered }
     }
@@ -43,27 +44,26 @@ impl Controls {
         self.tool
     }
 
-    /// Everything as at the start, but the picture's size.
-    pub fn reset(&mut self) {
+    /// Restores the settings of the start, except for the size of the picture.
+    pub(super) fn reset(&mut self) {
         let picture = self.settings.picture.clone();
         let mut again = Controls::new(self.start.clone());
         again.settings.picture = picture;
-        // A reset of a reset knows the same start.
         again.start = std::mem::take(&mut self.start);
         *self = again;
     }
 
-    /// Width and height of the picture, pixels. Below 64 no sheet of tiles would have a pixel for each: a smaller window shows a
-    /// picture made smaller.
-    pub fn resize(&mut self, size: [u32; 2]) {
+    /// Sets width and height of the picture, pixels. The minimum is 64, so that a sheet of tiles has a pixel for each tile; a smaller
+    /// window shows the picture scaled down.
+    pub(super) fn resize(&mut self, size: [u32; 2]) {
         let rays = self.settings.ray.rays.max(self.start.ray.rays);
-        let most = MAX_PICTURE / rays.clamp(1, 4);
-        self.settings.picture.size = size.map(|edge| edge.clamp(MAX_TILES, most));
+        let max = MAX_PICTURE / rays.clamp(1, 4);
+        self.settings.picture.size = size.map(|edge| edge.clamp(MAX_TILES, max));
     }
 
-    /// Does what is asked. `scene` is what is shown, of these settings or earlier ones. Without it nothing is shown, and nothing but
-    /// the tool and the start can be asked for.
-    pub fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
+    /// Applies a command. `scene` is the one on the screen, which may be of earlier settings. Without it only the tool, the reset and
+    /// the commands for the caller have an effect.
+    pub(super) fn apply(&mut self, command: &Command, scene: Option<&Scene>) -> Change {
         match command {
             Command::Tool(tool) => {
                 let changed = *tool != self.tool;
@@ -75,21 +75,21 @@ impl Controls {
                 return Change::Settings;
             }
             Command::Freeze
-            | Command::Cine(_)
-            | Command::CineAt(_)
-            | Command::CinePlay
+            | Command::StepCine(_)
+            | Command::SeekCine(_)
+            | Command::PlayCine
             | Command::SavePicture
             | Command::SaveLoop
-            | Command::Help
-            | Command::Hud
-            | Command::Panels
-            | Command::FullScreen
-            | Command::Exit => return Change::Screen(*command),
+            | Command::ToggleHelp
+            | Command::ToggleTimes
+            | Command::TogglePanels
+            | Command::ToggleFullScreen
+            | Command::Exit => return Change::Caller(*command),
             _ => {}
         }
-        // What is shown lags behind where several commands come between two pictures: each goes on from the one before.
+        // The scene lags behind if several commands come between two pictures: each one builds on the settings of the one before.
         let Some(now) = scene.and_then(|scene| self.current(scene)) else { return Change::Nothing };
-        match self.asked(command, &now).and_then(|settings| drawable(&now, settings)) {
+        match self.changed(command, &now).and_then(|settings| drawable(&now, settings)) {
             Some(settings) if settings != self.settings => {
                 if !settings.mode.is_flat() {
                     self.rendered = settings.mode;
@@ -101,7 +101,7 @@ impl Controls {
         }
     }
 
-    /// What is shown once these settings are.
+    /// The scene of the current settings.
     fn current<'a>(&self, scene: &'a Scene) -> Option<Cow<'a, Scene>> {
         if scene.settings == self.settings {
             return Some(Cow::Borrowed(scene));
@@ -109,82 +109,86 @@ impl Controls {
         Scene::new(scene.geometry.clone(), scene.input, self.settings.clone()).ok().map(Cow::Owned)
     }
 
-    /// The settings that a command asks for; nothing where it makes no sense.
-    fn asked(&self, command: &Command, now: &Scene) -> Option<Settings> {
+    /// The settings after a command; none if it has no effect in this scene.
+    fn changed(&self, command: &Command, now: &Scene) -> Option<Settings> {
         let finite = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
         let mut new = self.settings.clone();
         match *command {
-            Command::Mode(mode) => self.show(&mut new, mode),
+            Command::Mode(mode) => self.set_mode(&mut new, mode),
             Command::Layout(layout) => {
                 new.layout = layout;
                 if layout == Layout::Four && new.mode.is_flat() {
                     new.mode = self.rendered;
                 }
             }
-            Command::Turn(by) if finite(&by) && !now.is_flat() => {
-                new.camera = view::turn(now, by);
-                return view::held(now, new);
+            Command::Rotate(by) if finite(&by) && !now.is_flat() => {
+                new.camera = view::rotate(now, by);
+                return view::keep_scale(now, new);
             }
             Command::Roll(by) if finite(&[by]) && now.is_flat() => {
-                new.planes.roll = view::wrapped(new.planes.roll + by)
+                new.planes.roll = view::wrap_degrees(new.planes.roll + by)
             }
             Command::Roll(by) if finite(&[by]) => {
-                new.camera.roll = view::wrapped(new.camera.roll + by);
-                return view::held(now, new);
+                new.camera.roll = view::wrap_degrees(new.camera.roll + by);
+                return view::keep_scale(now, new);
             }
-            Command::Zoom(times) if finite(&[times]) && times > 0.0 => {
+            Command::Zoom(factor) if finite(&[factor]) && factor > 0.0 => {
                 let zoom = if now.is_flat() { &mut new.planes.zoom } else { &mut new.camera.zoom };
-                *zoom = view::zoomed(*zoom, times);
+                *zoom = view::scale_zoom(*zoom, factor);
             }
             Command::Pan(by) if finite(&by) && !now.is_flat() => {
                 new.camera = Camera { target: Some(view::pan(now, by)), ..new.camera };
             }
-            Command::Light(by) if finite(&by) && !now.is_flat() => view::light(&mut new, by),
-            Command::Face(face, by) if finite(&[by]) && face.axis < 3 => {
-                return view::held(now, view::move_face(now, face, by));
+            Command::MoveLight(by) if finite(&by) && !now.is_flat() => view::move_light(&mut new, by),
+            Command::MoveFace(face, by) if finite(&[by]) && face.axis < 3 => {
+                return view::keep_scale(now, view::move_face(now, face, by));
             }
-            Command::Clip(by) if finite(&[by]) && !now.is_flat() => {
-                new.clip = view::clip(now, self.start.clip.len(), by)?
+            Command::MoveClip(by) if finite(&[by]) && !now.is_flat() => {
+                new.clip = view::move_clip(now, self.start.clip.len(), by)?
             }
             Command::Plane(name) => {
                 new.planes.plane = name;
                 if !now.cuts_planes() {
-                    self.show(&mut new, Mode::Plane);
+                    self.set_mode(&mut new, Mode::Plane);
                 }
             }
-            // What no picture shows would be a surprise later.
-            Command::PlaneBy(_) | Command::Meet(_) | Command::PlaneTurn(_) if !now.cuts_planes() => return None,
-            Command::PlaneBy(by) if finite(&[by]) => {
-                new.planes.position = Some(view::stepped(now, new.planes.plane, by));
+            // Without a visible plane the change would surprise the user later.
+            Command::StepPlane(_) | Command::MoveCrossing(_) | Command::RotatePlanes(_) if !now.cuts_planes() => {
+                return None;
             }
-            Command::Meet(place) if finite(&place) => new.planes.position = Some(view::meeting(now, place)),
-            Command::PlaneTurn(by) if finite(&by) => {
-                new.planes.azimuth = view::wrapped(new.planes.azimuth + by[0]);
-                new.planes.tilt = view::wrapped(new.planes.tilt + by[1]);
+            Command::StepPlane(by) if finite(&[by]) => {
+                new.planes.position = Some(view::step_plane(now, new.planes.plane, by));
             }
-            Command::Slide(place, value) => slide(&mut new, now, place, value)?,
-            Command::Nudge(place, steps) => {
-                let slider = SLIDERS.get(place)?;
+            Command::MoveCrossing(point) if finite(&point) => {
+                new.planes.position = Some(view::clamp_crossing(now, point))
+            }
+            Command::RotatePlanes(by) if finite(&by) => {
+                new.planes.azimuth = view::wrap_degrees(new.planes.azimuth + by[0]);
+                new.planes.tilt = view::wrap_degrees(new.planes.tilt + by[1]);
+            }
+            Command::SetSlider(index, value) => set_slider(&mut new, now, index, value)?,
+            Command::StepSlider(index, steps) => {
+                let slider = SLIDERS.get(index)?;
                 let value = slider.get(&new) + f64::from(steps) * slider.step;
-                slide(&mut new, now, place, value)?;
+                set_slider(&mut new, now, index, value)?;
             }
             Command::Transfer(name) => new.volume.transfer = Transfer::Named(name),
             Command::ColourMap(map) => new.post.colour_map = map,
-            Command::Shadow(on) => new.light.shadow = self.shadow(on),
+            Command::Shadow(on) => new.light.shadow = self.switch_shadow(on),
             _ => return None,
         }
         Some(new)
     }
 
-    fn show(&self, settings: &mut Settings, mode: Mode) {
+    fn set_mode(&self, settings: &mut Settings, mode: Mode) {
         settings.mode = mode;
         if mode.is_flat() {
             settings.layout = Layout::Single;
         }
     }
 
-    /// A shadow that is taken away keeps its edge and reach; only its strength goes, and comes back as it was at the start.
-    fn shadow(&self, on: bool) -> Option<Shadow> {
+    /// Switches the shadow. Off sets its strength to 0 and keeps its other values; on restores the strength of the start.
+    fn switch_shadow(&self, on: bool) -> Option<Shadow> {
         let (now, start) = (self.settings.light.shadow, self.start.light.shadow);
         let strength = match now {
             Some(shadow) if on && shadow.strength > 0.0 => shadow.strength,
@@ -196,28 +200,29 @@ impl Controls {
     }
 }
 
-fn slide(settings: &mut Settings, now: &Scene, place: usize, value: f64) -> Option<()> {
-    let slider = SLIDERS.get(place).filter(|s| s.applies(settings) && !value.is_nan())?;
+fn set_slider(settings: &mut Settings, now: &Scene, index: usize, value: f64) -> Option<()> {
+    let slider = SLIDERS.get(index).filter(|s| s.applies(settings) && !value.is_nan())?;
     let [low, high] = slider.range_in(now);
     slider.set(settings, value.clamp(low, high));
     Some(())
 }
 
-/// Settings if they can be drawn. What the shown mode alone asks for and this region has no room for is given up: it was set while
-/// another mode or region was shown, and a key that shows the mode must not be dead for it.
+/// The settings if they can be drawn. If the mode or the layout changed, values that only the new mode uses and that do not fit the
+/// region are reset: they were set for another mode or region, and must not block the key that selects the mode.
 fn drawable(now: &Scene, settings: Settings) -> Option<Settings> {
-    let is_drawn = |s: &Settings| Scene::new(now.geometry.clone(), now.input, s.clone()).is_ok();
-    if is_drawn(&settings) {
+    let can_draw = |s: &Settings| Scene::new(now.geometry.clone(), now.input, s.clone()).is_ok();
+    if can_draw(&settings) {
         return Some(settings);
     }
     if settings.mode == now.settings.mode && settings.layout == now.settings.layout {
         return None;
     }
-    let (mut given_up, usual) = (settings, Planes::default());
-    given_up.surface.start_depth = None;
-    given_up.volume.start_depth = None;
-    given_up.projection.start_depth = None;
-    given_up.cube = Cube { inset: Inset::default(), tilt: Tilt::default(), ..given_up.cube };
-    given_up.planes = Planes { columns: usual.columns, rows: usual.rows, thickness: 0.0, ..given_up.planes };
-    is_drawn(&given_up).then_some(given_up)
+    let (mut relaxed, default_planes) = (settings, Planes::default());
+    relaxed.surface.start_depth = None;
+    relaxed.volume.start_depth = None;
+    relaxed.projection.start_depth = None;
+    relaxed.cube = Cube { inset: Inset::default(), tilt: Tilt::default(), ..relaxed.cube };
+    relaxed.planes =
+        Planes { columns: default_planes.columns, rows: default_planes.rows, thickness: 0.0, ..relaxed.planes };
+    can_draw(&relaxed).then_some(relaxed)
 }

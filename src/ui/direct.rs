@@ -1,148 +1,154 @@
-//! The console on a monitor that nothing else uses, with input straight from the kernel: for a cart without a windowing system.
+//! The console directly on a monitor (VK_KHR_display), with input from the kernel: for a cart without a windowing system.
 
 use super::console::Console;
-use super::devices::{Devices, Told};
+use super::devices::{DeviceMessage, Devices};
 use super::input::Input;
-use super::recovery::{self, Due, Gone, Place, Recovery};
-use super::window::Make;
-use crate::gpu::window::{PresentMode, Screen, Target, display};
+use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
+use super::window::MakeConsole;
+use crate::gpu::window::{MonitorChoice, PresentMode, Screen, Target, monitor_size};
 use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// So long the pointer is seen after the mouse was moved.
-const SEEN: Duration = Duration::from_secs(3);
+/// How long the cursor is visible after the mouse moved.
+const CURSOR_TIME: Duration = Duration::from_secs(3);
 
-pub struct Shape {
-    /// Which monitor, and how.
-    pub wanted: display::Wanted,
-    pub pace: PresentMode,
-    /// Nobody else gets what keys and mice say, such as the text console behind.
+/// How to show the console on a monitor.
+pub struct DirectOptions {
+    /// The monitor and its mode.
+    pub monitor: MonitorChoice,
+    pub present_mode: PresentMode,
+    /// Grabs the input devices, so that no other program gets their events, such as the text console behind.
     pub grab: bool,
-    /// End after so long.
+    /// Ends after this time.
     pub time: Option<Duration>,
 }
 
-/// Takes a monitor and runs until someone leaves; the console as it was then, and the context that it ended with.
+/// Takes a monitor and runs until the user leaves. Returns the console and its last context.
 ///
 /// # Errors
-/// No device with such a monitor, or another program holds it; a device or a monitor that is lost again and again.
-pub fn run(device: &ContextOptions, shape: Shape, mut make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
-    let place = Place { device, target: Target::Monitor(shape.wanted.clone()), pace: shape.pace };
-    let context = Context::showing(device, &place.target)?;
-    let size = display::size(&context, &shape.wanted)?;
-    let screen = Screen::new(&context, place.target.clone(), size, shape.pace)?;
-    let devices = Devices::listen(size, shape.grab)
-        .map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
-    // How far away the monitor is nobody knows: letters are as large as on a desk.
+/// No device has such a monitor, or another program uses it; the device or the monitor is lost repeatedly.
+pub fn run(
+    device: &ContextOptions,
+    shape: DirectOptions,
+    mut make: Box<MakeConsole>,
+) -> Result<(Console, Arc<Context>), GpuError> {
+    let output = Output { device, target: Target::Monitor(shape.monitor.clone()), present_mode: shape.present_mode };
+    let context = Context::for_presentation(device, &output.target)?;
+    let size = monitor_size(&context, &shape.monitor)?;
+    let screen = Screen::new(&context, output.target.clone(), size, shape.present_mode)?;
+    let devices =
+        Devices::open(size, shape.grab).map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
+    // The distance of the monitor is unknown: text has the size for a desk.
     let mut console = make(&context, size, 1.0, devices.wake());
     console.set_screen(Some(screen));
-    let (mending, arrow, has_shown) = (Recovery::default(), Arrow::default(), false);
+    let (recovery, cursor, has_presented) = (Recovery::default(), CursorTimer::default(), false);
     let ends = shape.time.map(|time| Instant::now() + time);
-    let wanted = shape.wanted;
-    let mut running = Running { place, wanted, context, console, make, devices, size, mending, arrow, has_shown, ends };
-    running.run()?;
-    // The devices go first: keys are the text console's again.
-    let Running { console, context, .. } = running;
+    let monitor = shape.monitor;
+    let mut direct_loop =
+        DirectLoop { output, monitor, context, console, make, devices, size, recovery, cursor, has_presented, ends };
+    direct_loop.run()?;
+    // Drop the devices first, so that the text console gets the keys again.
+    let DirectLoop { console, context, .. } = direct_loop;
     Ok((console, context))
 }
 
-struct Running<'a> {
-    place: Place<'a>,
-    wanted: display::Wanted,
+struct DirectLoop<'a> {
+    output: Output<'a>,
+    monitor: MonitorChoice,
     devices: Devices,
-    // The console before its context: it holds what shows on the monitor.
+    // The console is dropped before its context: it holds the screen.
     console: Console,
-    make: Box<Make<'a>>,
+    make: Box<MakeConsole<'a>>,
     context: Arc<Context>,
-    /// Of the monitor, pixels.
+    /// Size of the monitor, pixels.
     size: [u32; 2],
-    mending: Recovery,
-    arrow: Arrow,
-    /// It has worked once.
-    has_shown: bool,
+    recovery: Recovery,
+    cursor: CursorTimer,
+    /// At least one frame was presented.
+    has_presented: bool,
     ends: Option<Instant>,
 }
 
-/// What comes after a turn.
-enum Then {
+/// When the loop updates again.
+enum NextUpdate {
     Exit,
-    /// Another, when something comes or it is that time.
+    /// At an event, or at this time.
     Wait(Option<Instant>),
 }
 
-impl Running<'_> {
+impl DirectLoop<'_> {
     fn run(&mut self) -> Result<(), GpuError> {
         loop {
             let now = Instant::now();
-            let Then::Wait(until) = self.turn(now)? else { return Ok(()) };
+            let NextUpdate::Wait(until) = self.update(now)? else { return Ok(()) };
             if self.ends.is_some_and(|end| now >= end) {
                 return Ok(());
             }
-            let until = [until, self.ends, self.arrow.goes(now)].into_iter().flatten().min();
-            for told in self.devices.wait(until) {
-                match told {
-                    Told::Input(input) => {
-                        self.arrow.input(&input, Instant::now());
+            let until = [until, self.ends, self.cursor.hides_at(now)].into_iter().flatten().min();
+            for message in self.devices.wait(until) {
+                match message {
+                    DeviceMessage::Input(input) => {
+                        self.cursor.input(&input, Instant::now());
                         self.console.input(&input);
                     }
-                    Told::Note(text) => self.console.say(&text, true),
-                    Told::Woken => {}
+                    DeviceMessage::Warning(text) => self.console.notify(&text, true),
+                    DeviceMessage::Woken => {}
                 }
             }
-            self.console.point(self.arrow.seen(Instant::now()));
+            self.console.set_pointer(self.cursor.position(Instant::now()));
         }
     }
 
-    fn turn(&mut self, now: Instant) -> Result<Then, GpuError> {
-        let mended = match self.mending.due(now) {
-            Due::Nothing => Ok(()),
-            Due::At(at) => return Ok(Then::Wait(Some(at))),
-            Due::Now(gone) => self.mend(gone),
+    fn update(&mut self, now: Instant) -> Result<NextUpdate, GpuError> {
+        let restored = match self.recovery.poll(now) {
+            RecoveryStep::Idle => Ok(()),
+            RecoveryStep::WaitUntil(at) => return Ok(NextUpdate::Wait(Some(at))),
+            RecoveryStep::Restore(lost) => self.restore(lost),
         };
-        match mended.and_then(|()| self.console.tick(now).map_err(recovery::gone)) {
-            Ok(next) if next.exit => Ok(Then::Exit),
+        match restored.and_then(|()| self.console.update(now).map_err(recovery::lost_by)) {
+            Ok(next) if next.exit => Ok(NextUpdate::Exit),
             Ok(next) => {
-                if next.renews {
+                if next.restart {
                     let console = (self.make)(&self.context, self.size, 1.0, self.devices.wake());
                     let before = std::mem::replace(&mut self.console, console);
                     self.console.set_screen(before.into_screen());
                 }
-                self.follow();
-                Ok(Then::Wait(next.at))
+                self.after_update();
+                Ok(NextUpdate::Wait(next.wake_at))
             }
-            // Drivers list monitors that they cannot take.
-            Err((Gone::Screen, fault)) if !self.has_shown => {
+            // Drivers list monitors that they cannot use.
+            Err((Lost::Screen, fault)) if !self.has_presented => {
                 Err(GpuError::Window(format!("{fault}; does a desktop hold the monitor?")))
             }
-            Err((gone, fault)) => {
+            Err((lost, fault)) => {
                 tracing::warn!("{fault}; trying again");
-                if self.mending.fault(gone, now) { Ok(Then::Wait(Some(now))) } else { Err(fault) }
+                if self.recovery.lost(lost, now) { Ok(NextUpdate::Wait(Some(now))) } else { Err(fault) }
             }
         }
     }
 
-    /// Has again what is gone: another monitor may be there by now, or the same one in another mode.
-    fn mend(&mut self, gone: Gone) -> Result<(), (Gone, GpuError)> {
-        let wanted = &self.wanted;
-        let size = |context: &Context| display::size(context, wanted);
-        let size = self.place.mend(&mut self.console, &mut self.context, &size, gone)?;
-        self.fit(size);
+    /// Restores what is lost. By then the monitor may be another one, or in another mode.
+    fn restore(&mut self, lost: Lost) -> Result<(), (Lost, GpuError)> {
+        let monitor = &self.monitor;
+        let size = |context: &Context| monitor_size(context, monitor);
+        let size = self.output.restore(&mut self.console, &mut self.context, &size, lost)?;
+        self.resize(size);
         Ok(())
     }
 
-    fn follow(&mut self) {
+    fn after_update(&mut self) {
         let Some(screen) = self.console.screen() else { return };
-        self.mending.shown(screen.shown());
-        self.has_shown |= screen.shown() > 0;
-        // The surface has the last word, once there is one.
+        self.recovery.presented(screen.shown());
+        self.has_presented |= screen.shown() > 0;
+        // Once there is a surface, its size applies.
         let size = screen.size();
         if !size.contains(&0) {
-            self.fit(size);
+            self.resize(size);
         }
     }
 
-    fn fit(&mut self, size: [u32; 2]) {
+    fn resize(&mut self, size: [u32; 2]) {
         if size != self.size {
             self.size = size;
             self.console.resize(size);
@@ -151,13 +157,13 @@ impl Running<'_> {
     }
 }
 
-/// Where the pointer is to be seen: while a mouse moves it, not while fingers point for themselves.
+/// Shows the cursor while a mouse moves it, and hides it while the user touches the screen.
 #[derive(Clone, Copy, Debug, Default)]
-struct Arrow {
+struct CursorTimer {
     moved: Option<(Instant, [f64; 2])>,
 }
 
-impl Arrow {
+impl CursorTimer {
     fn input(&mut self, input: &Input, now: Instant) {
         match *input {
             Input::Moved(at) => self.moved = Some((now, at)),
@@ -166,13 +172,13 @@ impl Arrow {
         }
     }
 
-    fn seen(&self, now: Instant) -> Option<[f64; 2]> {
-        self.moved.filter(|(when, _)| now < *when + SEEN).map(|(_, at)| at)
+    fn position(&self, now: Instant) -> Option<[f64; 2]> {
+        self.moved.filter(|(when, _)| now < *when + CURSOR_TIME).map(|(_, at)| at)
     }
 
-    /// When it is no longer seen.
-    fn goes(&self, now: Instant) -> Option<Instant> {
-        self.moved.map(|(when, _)| when + SEEN).filter(|at| *at > now)
+    /// When the cursor disappears.
+    fn hides_at(&self, now: Instant) -> Option<Instant> {
+        self.moved.map(|(when, _)| when + CURSOR_TIME).filter(|at| *at > now)
     }
 }
 
@@ -182,16 +188,16 @@ mod tests {
     use crate::ui::input::Phase;
 
     #[test]
-    fn the_pointer_is_seen_for_a_while_and_hidden_by_a_finger() {
-        let (mut arrow, now) = (Arrow::default(), Instant::now());
-        assert_eq!((arrow.seen(now), arrow.goes(now)), (None, None));
-        arrow.input(&Input::Moved([3.0, 4.0]), now);
-        arrow.input(&Input::Scroll(1.0), now + SEEN);
-        let late = now + SEEN - Duration::from_millis(1);
-        assert_eq!((arrow.seen(late), arrow.goes(late)), (Some([3.0, 4.0]), Some(now + SEEN)));
-        assert_eq!((arrow.seen(now + SEEN), arrow.goes(now + SEEN)), (None, None));
-        arrow.input(&Input::Moved([5.0, 6.0]), now);
-        arrow.input(&Input::Touch { finger: 1, phase: Phase::Down, at: [0.0, 0.0] }, now);
-        assert_eq!(arrow.seen(now), None);
+    fn the_cursor_is_visible_for_a_while_and_hidden_by_a_finger() {
+        let (mut cursor, now) = (CursorTimer::default(), Instant::now());
+        assert_eq!((cursor.position(now), cursor.hides_at(now)), (None, None));
+        cursor.input(&Input::Moved([3.0, 4.0]), now);
+        cursor.input(&Input::Scroll(1.0), now + CURSOR_TIME);
+        let late = now + CURSOR_TIME - Duration::from_millis(1);
+        assert_eq!((cursor.position(late), cursor.hides_at(late)), (Some([3.0, 4.0]), Some(now + CURSOR_TIME)));
+        assert_eq!((cursor.position(now + CURSOR_TIME), cursor.hides_at(now + CURSOR_TIME)), (None, None));
+        cursor.input(&Input::Moved([5.0, 6.0]), now);
+        cursor.input(&Input::Touch { finger: 1, phase: Phase::Down, at: [0.0, 0.0] }, now);
+        assert_eq!(cursor.position(now), None);
     }
 }

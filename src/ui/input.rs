@@ -1,52 +1,53 @@
-//! What hands do, whatever told of it: a window, or input devices where there is none. Places are in pixels from the upper left corner.
+//! User input, from a window or from input devices. Positions are in pixels from the upper left corner.
 
 pub use crate::kiosk::chord::{Key, Modifiers};
 
-/// Something that was done by hand.
+/// One input event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
-    /// The pointer is here now.
+    /// New position of the pointer.
     Moved([f64; 2]),
     Button {
         button: Button,
         pressed: bool,
     },
-    /// Notches of the wheel, away from the user positive.
+    /// Notches of the wheel; positive is away from the user.
     Scroll(f64),
-    /// A key went down (again and again while it is held) or up.
+    /// A key went down (repeatedly while it is held) or up.
     Key {
         key: Key,
         pressed: bool,
     },
-    /// Which of them are held from here on.
+    /// The modifiers that are held from now on.
     Modifiers(Modifiers),
     Touch {
         finger: u64,
         phase: Phase,
         at: [f64; 2],
     },
-    /// The pointer left, or another window is typed into: nothing is held any more.
-    Left,
+    /// The pointer left, or the window lost the focus: nothing is held any more.
+    FocusLost,
 }
 
-/// No window is as wide, pixels: drivers that say so are not believed.
-pub const FAR: f64 = 1e6;
-/// Notches of the wheel at once.
-pub const MOST_NOTCHES: f64 = 20.0;
+/// Largest coordinate that is accepted, pixels. No window is this large; some drivers report such values.
+pub(super) const MAX_COORDINATE: f64 = 1e6;
+/// Largest number of wheel notches in one event.
+pub(super) const MAX_NOTCHES: f64 = 20.0;
 
 impl Input {
-    /// The same with numbers that a window and a wheel may have; nothing where there is no such place.
-    pub fn believed(self) -> Option<Input> {
-        let is_near = |at: [f64; 2]| at.iter().all(|n| n.abs() <= FAR);
+    /// The event with its numbers limited to what a window and a wheel can produce. None if the position is out of range or not a number.
+    pub(super) fn sanitized(self) -> Option<Input> {
+        let is_near = |at: [f64; 2]| at.iter().all(|n| n.abs() <= MAX_COORDINATE);
         match self {
             Input::Moved(at) | Input::Touch { at, .. } if !is_near(at) => None,
             Input::Scroll(notches) if notches.is_nan() => None,
-            Input::Scroll(notches) => Some(Input::Scroll(notches.clamp(-MOST_NOTCHES, MOST_NOTCHES))),
+            Input::Scroll(notches) => Some(Input::Scroll(notches.clamp(-MAX_NOTCHES, MAX_NOTCHES))),
             other => Some(other),
         }
     }
 }
 
+/// A mouse button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
     Left,
@@ -54,11 +55,12 @@ pub enum Button {
     Middle,
 }
 
+/// The phase of a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     Down,
     Moved,
     Up,
-    /// The finger is taken for something else, such as a palm.
-    Gone,
+    /// The touch turned out to be something else, such as a palm.
+    Cancelled,
 }

@@ -1,40 +1,47 @@
-//! The dials that a moving view turns, from full quality down: those that a report of errors measured, or where there is none those that
-//! were found to cost least for what they save.
+//! The quality ladder of a moving view: changes of the settings from full quality down. They come from a measured error report, or are
+//! the built-in ones, which were found to cost the least error for the time that they save.
 
 use crate::error_report::{Measure, Report, choose};
 use crate::scene::load::Layers;
 use crate::scene::{Settings, Transfer};
 
-/// Most rungs of a ladder that was measured.
-const MOST: usize = 6;
+/// Largest number of rungs of a measured ladder.
+const MAX_RUNGS: usize = 6;
 
-/// One setting of the dials.
+/// One rung of the ladder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rung {
-    /// For the display.
-    pub words: String,
-    /// Its time as a share of that of full quality.
-    pub share: f64,
-    dials: Dials,
+    /// Description for the display of times.
+    pub(super) label: String,
+    /// Time of a picture as a fraction of that at full quality.
+    pub(super) time_share: f64,
+    change: Change,
 }
 
+/// How a rung changes the settings.
 #[derive(Clone, Debug, PartialEq)]
-enum Dials {
-    Full,
-    Built { half: bool, step: f64, narrow: bool, bare: bool },
+enum Change {
+    None,
+    BuiltIn {
+        half_rays: bool,
+        step_factor: f64,
+        small_filters: bool,
+        no_filters: bool,
+    },
+    /// Assignments as of `--set`, from an error report.
     Measured(Vec<String>),
 }
 
-/// Without a report. Shares are a first guess, from the phantom's face on two cores (there the last rung takes a tenth): a view finds its
-/// own from there on.
+/// The built-in ladder. The time shares are a first estimate, from the phantom's face on two cores (where the last rung takes a tenth);
+/// the frame budget corrects them with measurements.
 pub fn built_in() -> Vec<Rung> {
-    let rung = |words: &str, share, half, step, narrow, bare| Rung {
-        words: words.into(),
-        share,
-        dials: Dials::Built { half, step, narrow, bare },
+    let rung = |label: &str, time_share, half_rays, step_factor, small_filters, no_filters| Rung {
+        label: label.into(),
+        time_share,
+        change: Change::BuiltIn { half_rays, step_factor, small_filters, no_filters },
     };
     vec![
-        Rung { words: "full quality".into(), share: 1.0, dials: Dials::Full },
+        Rung { label: "full quality".into(), time_share: 1.0, change: Change::None },
         rung("half the rays each way", 0.3, true, 1.0, false, false),
         rung("half the rays, steps x 1.5", 0.22, true, 1.5, false, false),
         rung("half the rays, steps x 2, small filters", 0.14, true, 2.0, true, false),
@@ -42,68 +49,68 @@ pub fn built_in() -> Vec<Rung> {
     ]
 }
 
-/// From a report of errors: the front of its combinations, from full quality to the fastest.
+/// The ladder of an error report: the Pareto front of its combinations, from full quality to the fastest.
 ///
 /// # Errors
-/// One line: nothing in it was timed.
+/// One line: the report has no times.
 pub fn measured(report: &Report) -> Result<Vec<Rung>, String> {
     let (front, slowest) = choose::front(report, Measure::Rmse)?;
-    let full = Rung { words: "full quality".into(), share: 1.0, dials: Dials::Full };
-    // Only what saves a quarter over the rung before is worth a rung.
+    let full = Rung { label: "full quality".into(), time_share: 1.0, change: Change::None };
+    // A rung must save at least a quarter of the time of the one before.
     let mut rungs = vec![full];
     for choice in front.iter().rev() {
-        let (share, before) = (choice.time / slowest, rungs.last().map_or(1.0, |r| r.share));
-        if share <= 0.75 * before {
-            let words = choice.turned.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
-            rungs.push(Rung { words: words.join(", "), share, dials: Dials::Measured(choice.set.clone()) });
+        let (time_share, before) = (choice.time / slowest, rungs.last().map_or(1.0, |r| r.time_share));
+        if time_share <= 0.75 * before {
+            let label = choice.turned.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
+            rungs.push(Rung { label: label.join(", "), time_share, change: Change::Measured(choice.set.clone()) });
         }
     }
-    // The fastest stays where there are too many.
-    while rungs.len() > MOST {
+    // If there are too many, the fastest one stays.
+    while rungs.len() > MAX_RUNGS {
         rungs.remove(rungs.len() - 2);
     }
     Ok(rungs)
 }
 
 impl Rung {
-    /// The settings with the dials turned so; unchanged where they do not go together. `voxel`: edge of a slice pixel, mm, which a
-    /// step has unless it is set.
-    pub fn apply(&self, settings: &Settings, voxel: f64) -> Settings {
-        let mut turned = settings.clone();
-        match &self.dials {
-            Dials::Full => return turned,
-            Dials::Built { half, step, narrow, bare } => {
-                if *half {
-                    turned = turned.moving();
+    /// The settings on this rung; unchanged if a measured change does not fit them. `voxel`: edge of a slice pixel, mm, which is the step
+    /// unless one is set.
+    pub(super) fn apply(&self, settings: &Settings, voxel: f64) -> Settings {
+        let mut changed = settings.clone();
+        match &self.change {
+            Change::None => return changed,
+            Change::BuiltIn { half_rays, step_factor, small_filters, no_filters } => {
+                if *half_rays {
+                    changed = changed.moving();
                 }
-                // A jump in the transfer function shows every step that is left out.
+                // With a steep transfer function a longer step is visible as rings.
                 let steep = matches!(&settings.volume.transfer, Transfer::Points(p) if p.len() > 8);
-                if *step > 1.0 && !steep {
-                    turned.ray.step = Some(settings.ray.step.unwrap_or(voxel) * step);
+                if *step_factor > 1.0 && !steep {
+                    changed.ray.step = Some(settings.ray.step.unwrap_or(voxel) * step_factor);
                 }
-                if *narrow {
-                    turned.distance = turned.distance.halved();
-                    turned.light.occlusion = None;
+                if *small_filters {
+                    changed.distance = changed.distance.halved();
+                    changed.light.occlusion = None;
                 }
-                if *bare {
-                    turned.light.shadow = None;
-                    turned.distance = Default::default();
-                    (turned.post.sigma, turned.post.enhanced_sigma, turned.post.perona_malik) = (None, None, None);
+                if *no_filters {
+                    changed.light.shadow = None;
+                    changed.distance = Default::default();
+                    (changed.post.sigma, changed.post.enhanced_sigma, changed.post.perona_malik) = (None, None, None);
                 }
             }
-            Dials::Measured(set) => {
-                let with = || -> Option<Settings> {
+            Change::Measured(set) => {
+                let apply = || -> Option<Settings> {
                     let mut layers = Layers::of(settings)?;
                     set.iter().try_for_each(|assignment| layers.set(assignment)).ok()?;
                     layers.finish().ok()
                 };
-                turned = with().unwrap_or(turned);
+                changed = apply().unwrap_or(changed);
             }
         }
-        // What stage 1 makes stays: frames would have to come again.
-        turned.slices = settings.slices.clone();
-        turned.conditioning = settings.conditioning.clone();
-        turned
+        // Stage 1 stays the same: a change would need all frames again.
+        changed.slices = settings.slices.clone();
+        changed.conditioning = settings.conditioning.clone();
+        changed
     }
 }
 
@@ -112,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_rung_leaves_stage_1_as_it_is_and_is_faster_than_the_one_before() {
+    fn every_rung_keeps_stage_1_and_is_faster_than_the_one_before() {
         for (preset, _) in crate::scene::load::PRESETS {
             let mut layers = Layers::default();
             layers.preset(preset).expect("preset");
@@ -120,15 +127,15 @@ mod tests {
             let rungs = built_in();
             assert_eq!(rungs[0].apply(&settings, 0.3), settings);
             for pair in rungs.windows(2) {
-                assert!(pair[1].share < pair[0].share);
-                let turned = pair[1].apply(&settings, 0.3);
-                assert!(turned.ray.half && turned.slices == settings.slices, "{preset}: {}", pair[1].words);
+                assert!(pair[1].time_share < pair[0].time_share);
+                let changed = pair[1].apply(&settings, 0.3);
+                assert!(changed.ray.half && changed.slices == settings.slices, "{preset}: {}", pair[1].label);
             }
         }
     }
 
     #[test]
-    fn settings_survive_the_way_through_layers() {
+    fn settings_survive_the_conversion_to_layers() {
         for (preset, _) in crate::scene::load::PRESETS {
             let mut layers = Layers::default();
             layers.preset(preset).expect("preset");

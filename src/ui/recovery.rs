@@ -1,4 +1,4 @@
-//! What is done where a screen or a device is gone: at once again, then twice a second, and not for ever.
+//! Recovery from a lost screen or device: the first attempt at once, the next ones twice a second, with a limit.
 
 use super::console::{Console, ConsoleError};
 use crate::gpu::window::{PresentMode, Screen, Target};
@@ -6,108 +6,109 @@ use crate::gpu::{Context, ContextOptions, GpuError};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Between two attempts.
-const AGAIN: Duration = Duration::from_millis(500);
-/// Attempts in a row before it is given up.
-const MOST: u32 = 20;
-/// What has been shown so often holds.
-const HOLDS: u64 = 60;
+/// Time between two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_millis(500);
+/// Attempts in a row before recovery gives up.
+const MAX_ATTEMPTS: u32 = 20;
+/// A screen that presented so often counts as recovered.
+const STABLE_FRAMES: u64 = 60;
 
-/// What has to be had anew.
+/// What was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gone {
+pub(super) enum Lost {
     Screen,
-    /// And the screen with it.
+    /// The device, and the screen with it.
     Device,
 }
 
-/// What there is to do about it.
+/// What recovery does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Due {
-    /// Nothing is gone.
-    Nothing,
-    /// To try then.
-    At(Instant),
-    Now(Gone),
+pub(super) enum RecoveryStep {
+    /// Nothing is lost.
+    Idle,
+    /// Wait until this time.
+    WaitUntil(Instant),
+    /// Restore it now.
+    Restore(Lost),
 }
 
-/// Since when things fail, and when they are tried again.
+/// Counts faults and schedules attempts.
 #[derive(Clone, Debug, Default)]
-pub struct Recovery {
-    again: Option<(Instant, Gone)>,
+pub(super) struct Recovery {
+    next_attempt: Option<(Instant, Lost)>,
     faults: u32,
 }
 
 impl Recovery {
-    /// Notes that something is gone; false where it is given up.
-    pub fn fault(&mut self, gone: Gone, now: Instant) -> bool {
+    /// Records that something is lost and schedules an attempt. False if the limit is reached.
+    pub(super) fn lost(&mut self, lost: Lost, now: Instant) -> bool {
         self.faults += 1;
-        let wait = if self.faults == 1 { Duration::ZERO } else { AGAIN };
-        self.again = Some((now + wait, gone));
-        self.faults <= MOST
+        let wait = if self.faults == 1 { Duration::ZERO } else { RETRY_INTERVAL };
+        self.next_attempt = Some((now + wait, lost));
+        self.faults <= MAX_ATTEMPTS
     }
 
-    /// What is said to be due now is taken for done: another [`Recovery::fault`] says that it was not.
-    pub fn due(&mut self, now: Instant) -> Due {
-        match self.again {
-            None => Due::Nothing,
-            Some((at, _)) if now < at => Due::At(at),
-            Some((_, gone)) => {
-                self.again = None;
-                Due::Now(gone)
+    /// What to do now. A [`RecoveryStep::Restore`] is returned once: it counts as successful unless [`Recovery::lost`] follows.
+    pub(super) fn poll(&mut self, now: Instant) -> RecoveryStep {
+        match self.next_attempt {
+            None => RecoveryStep::Idle,
+            Some((at, _)) if now < at => RecoveryStep::WaitUntil(at),
+            Some((_, lost)) => {
+                self.next_attempt = None;
+                RecoveryStep::Restore(lost)
             }
         }
     }
 
-    /// `shown`: how often something was shown since the screen was made.
-    pub fn shown(&mut self, shown: u64) {
-        if shown > HOLDS {
+    /// `count`: how often the current screen presented. Resets the count of faults once it is stable.
+    pub(super) fn presented(&mut self, count: u64) {
+        if count > STABLE_FRAMES {
             self.faults = 0;
         }
     }
 }
 
-/// What a tick's error says is gone, and why.
-pub fn gone(error: ConsoleError) -> (Gone, GpuError) {
+/// What an error of the console means is lost, and its cause.
+pub(super) fn lost_by(error: ConsoleError) -> (Lost, GpuError) {
     match error {
-        ConsoleError::DeviceLost(fault) => (Gone::Device, fault),
-        ConsoleError::Screen(fault) => (Gone::Screen, fault),
+        ConsoleError::DeviceLost(fault) => (Lost::Device, fault),
+        ConsoleError::Screen(fault) => (Lost::Screen, fault),
     }
 }
 
-/// What a console is shown on.
-pub struct Place<'a> {
-    pub device: &'a ContextOptions,
-    pub target: Target,
-    pub pace: PresentMode,
+/// Where a console is shown.
+pub(super) struct Output<'a> {
+    pub(super) device: &'a ContextOptions,
+    pub(super) target: Target,
+    pub(super) present_mode: PresentMode,
 }
 
-impl Place<'_> {
-    /// A screen there once more, on a device opened anew where that was lost. `size`: of the window, pixels, which comes back.
+impl Output<'_> {
+    /// Creates the screen again, on a newly opened device if that was lost. `size` gives the size of the window, pixels, which is returned.
     ///
     /// # Errors
-    /// What is gone still, and why.
-    pub fn mend(
+    /// What is still lost, and why.
+    pub(super) fn restore(
         &self,
         console: &mut Console,
         context: &mut Arc<Context>,
         size: &dyn Fn(&Context) -> Result<[u32; 2], GpuError>,
-        gone: Gone,
-    ) -> Result<[u32; 2], (Gone, GpuError)> {
-        // A device may be lost while no more than its screen is had again.
-        let still = |fault: GpuError| (if fault.is_device_lost() { Gone::Device } else { gone }, fault);
-        // The old one goes first: a window has one surface at a time.
+        lost: Lost,
+    ) -> Result<[u32; 2], (Lost, GpuError)> {
+        // The device may be lost while only the screen is restored.
+        let still = |fault: GpuError| (if fault.is_device_lost() { Lost::Device } else { lost }, fault);
+        // Drop the old one first: a window has one surface at a time.
         console.set_screen(None);
-        if gone == Gone::Device {
-            *context = Context::showing(self.device, &self.target).map_err(still)?;
+        if lost == Lost::Device {
+            *context = Context::for_presentation(self.device, &self.target).map_err(still)?;
         }
         let size = size(context).map_err(still)?;
-        let screen = Screen::new(context, self.target.clone(), size, self.pace).map_err(still)?;
-        match gone {
-            Gone::Device => {
-                console.revive(context, Some(screen)).unwrap_or_else(|e| console.say(&e.to_string(), true));
+        let screen = Screen::new(context, self.target.clone(), size, self.present_mode).map_err(still)?;
+        match lost {
+            Lost::Device => {
+                console.revive(context, Some(screen)).unwrap_or_else(|e| console.notify(&e.to_string(), true));
             }
-            Gone::Screen => console.set_screen(Some(screen)),
+            Lost::Screen => console.set_screen(Some(screen)),
         }
         Ok(size)
     }
@@ -118,25 +119,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_attempt_is_made_at_once_and_the_next_ones_half_a_second_apart() {
-        let (mut mending, now) = (Recovery::default(), Instant::now());
-        assert_eq!(mending.due(now), Due::Nothing);
-        assert!(mending.fault(Gone::Screen, now));
-        assert_eq!(mending.due(now), Due::Now(Gone::Screen));
-        assert_eq!(mending.due(now), Due::Nothing, "it is done");
-        assert!(mending.fault(Gone::Device, now));
-        assert_eq!(mending.due(now), Due::At(now + AGAIN));
-        assert_eq!(mending.due(now + AGAIN), Due::Now(Gone::Device));
+    fn the_first_attempt_is_immediate_and_the_next_ones_are_half_a_second_apart() {
+        let (mut recovery, now) = (Recovery::default(), Instant::now());
+        assert_eq!(recovery.poll(now), RecoveryStep::Idle);
+        assert!(recovery.lost(Lost::Screen, now));
+        assert_eq!(recovery.poll(now), RecoveryStep::Restore(Lost::Screen));
+        assert_eq!(recovery.poll(now), RecoveryStep::Idle, "it counts as done");
+        assert!(recovery.lost(Lost::Device, now));
+        assert_eq!(recovery.poll(now), RecoveryStep::WaitUntil(now + RETRY_INTERVAL));
+        assert_eq!(recovery.poll(now + RETRY_INTERVAL), RecoveryStep::Restore(Lost::Device));
     }
 
     #[test]
-    fn twenty_in_a_row_are_enough_and_what_was_shown_for_a_while_begins_anew() {
-        let (mut mending, now) = (Recovery::default(), Instant::now());
-        assert!((0..MOST).all(|_| mending.fault(Gone::Device, now)));
-        mending.shown(HOLDS);
-        assert!(!mending.clone().fault(Gone::Device, now), "a moment is no while");
-        mending.shown(HOLDS + 1);
-        assert!((0..MOST).all(|_| mending.fault(Gone::Screen, now)));
-        assert!(!mending.fault(Gone::Screen, now));
+    fn recovery_gives_up_after_20_attempts_and_a_stable_screen_resets_the_count() {
+        let (mut recovery, now) = (Recovery::default(), Instant::now());
+        assert!((0..MAX_ATTEMPTS).all(|_| recovery.lost(Lost::Device, now)));
+        recovery.presented(STABLE_FRAMES);
+        assert!(!recovery.clone().lost(Lost::Device, now), "not stable yet");
+        recovery.presented(STABLE_FRAMES + 1);
+        assert!((0..MAX_ATTEMPTS).all(|_| recovery.lost(Lost::Screen, now)));
+        assert!(!recovery.lost(Lost::Screen, now));
     }
 }

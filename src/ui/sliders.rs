@@ -1,12 +1,12 @@
-//! The sliders of a scanner: one table of what they are called, what they may be set to, and what of the settings they are.
+//! The sliders of the view: one table with their names, ranges and the settings that they change.
 
 use crate::scene::{
     Bilateral, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin, Smooth, Transfer,
 };
 
-/// Where a slider stands in a panel.
+/// A group of sliders in the panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub(super) enum Group {
     Image,
     Surface,
     Volume,
@@ -17,8 +17,8 @@ pub enum Group {
 }
 
 impl Group {
-    /// In the order in which they are shown, with their names.
-    pub const ALL: [(Group, &'static str); 7] = [
+    /// All groups with their names, in display order.
+    pub(super) const ALL: [(Group, &'static str); 7] = [
         (Group::Image, "Image"),
         (Group::Surface, "Surface"),
         (Group::Volume, "Volume"),
@@ -31,44 +31,45 @@ impl Group {
 
 use Group::{Filters, Image, Light, Planes, Quality, Surface, Volume};
 
+/// A slider and the setting that it changes.
 pub struct Slider {
-    pub name: &'static str,
-    /// Of its value; empty where it has none.
-    pub unit: &'static str,
-    pub group: Group,
-    /// What it may be set to with any volume; [`Slider::range_in`] knows one volume.
-    pub range: [f64; 2],
-    /// What a key or a notch moves it by.
-    pub step: f64,
-    /// Stage 1 runs anew: slices are filtered otherwise, or others are seen (unless `slices.everything` made them all).
-    pub reruns_frames: bool,
+    pub(super) name: &'static str,
+    /// Unit of its value; may be empty.
+    pub(super) unit: &'static str,
+    pub(super) group: Group,
+    /// Its range for any volume; [`Slider::range_in`] gives the range for one scene.
+    pub(super) range: [f64; 2],
+    /// How far a key moves it.
+    pub(super) step: f64,
+    /// Stage 1 runs again: slices are filtered differently, or other slices become visible (unless `slices.everything` processed them all).
+    pub(super) reruns_frames: bool,
     applies: fn(&Settings) -> bool,
     get: fn(&Settings) -> f64,
     write: fn(&mut Settings, f64),
-    within: fn(&Scene) -> [f64; 2],
+    limits: fn(&Scene) -> [f64; 2],
 }
 
 impl Slider {
-    /// Whether the picture depends on it.
-    pub fn applies(&self, settings: &Settings) -> bool {
+    /// True if the picture depends on it.
+    pub(super) fn applies(&self, settings: &Settings) -> bool {
         (self.applies)(settings)
     }
 
-    /// May lie outside of the range where a scene file asked for more than a slider gives.
-    pub fn get(&self, settings: &Settings) -> f64 {
+    /// Its value; outside of the range if a scene file set it so.
+    pub(super) fn get(&self, settings: &Settings) -> f64 {
         (self.get)(settings)
     }
 
-    /// Takes the nearest value in range; what is no number changes nothing.
-    pub fn set(&self, settings: &mut Settings, value: f64) {
+    /// Sets the nearest value in the range. NaN changes nothing.
+    pub(super) fn set(&self, settings: &mut Settings, value: f64) {
         if !value.is_nan() {
             (self.write)(settings, value.clamp(self.range[0], self.range[1]));
         }
     }
 
-    /// What it may be set to with this volume: never empty.
-    pub fn range_in(&self, scene: &Scene) -> [f64; 2] {
-        let [low, high] = (self.within)(scene);
+    /// The range for this scene; never empty.
+    pub(super) fn range_in(&self, scene: &Scene) -> [f64; 2] {
+        let [low, high] = (self.limits)(scene);
         let low = self.range[0].max(low).min(self.range[1]);
         [low, self.range[1].min(high).max(low)]
     }
@@ -83,8 +84,8 @@ impl Slider {
         self
     }
 
-    const fn within(mut self, within: fn(&Scene) -> [f64; 2]) -> Slider {
-        self.within = within;
+    const fn within(mut self, limits: fn(&Scene) -> [f64; 2]) -> Slider {
+        self.limits = limits;
         self
     }
 
@@ -95,7 +96,7 @@ impl Slider {
 }
 
 const fn slider(name: &'static str, unit: &'static str, group: Group, range: [f64; 2], step: f64) -> Slider {
-    let within: fn(&Scene) -> [f64; 2] = |_| [f64::NEG_INFINITY, f64::INFINITY];
+    let limits: fn(&Scene) -> [f64; 2] = |_| [f64::NEG_INFINITY, f64::INFINITY];
     Slider {
         name,
         unit,
@@ -106,17 +107,17 @@ const fn slider(name: &'static str, unit: &'static str, group: Group, range: [f6
         applies: |_| false,
         get: |_| 0.0,
         write: |_, _| {},
-        within,
+        limits,
     }
 }
 
-/// Places in [`SLIDERS`] that keys and gestures know.
-pub const GAIN: usize = 0;
-pub const THRESHOLD: usize = 3;
-pub const PLANES_ZOOM: usize = 7;
+/// Indices in [`SLIDERS`] that keys and gestures use.
+pub(super) const GAIN: usize = 0;
+pub(super) const THRESHOLD: usize = 3;
+pub(super) const PLANES_ZOOM: usize = 7;
 
-/// All sliders. Those of windows, thresholds and start depths are the shown mode's; a mixed picture has them for its surface, and
-/// once more for its veil.
+/// All sliders. Those of windows, thresholds and start depths change the values of the current mode. A mixed picture has them for its
+/// surface, and again for its volume layer.
 pub const SLIDERS: &[Slider] = &[
     slider("Gain", "", Image, [-1.0, 1.0], 0.02).of(always, |s| s.post.brightness, |s, v| s.post.brightness = v),
     slider("Contrast", "", Image, [0.0, 3.0], 0.05).of(always, |s| s.post.contrast, |s, v| s.post.contrast = v),
@@ -124,25 +125,37 @@ pub const SLIDERS: &[Slider] = &[
     slider("Threshold", "", Image, [0.0, 1.0], 0.005).of(has_threshold, threshold, set_threshold),
     slider("Window low", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[0], |s, v| set_low(window_mut(s), v)),
     slider("Window high", "", Image, [0.0, 1.0], 0.01).of(always, |s| window(s)[1], |s, v| set_high(window_mut(s), v)),
-    slider("Start depth", "mm", Image, [0.0, 400.0], 1.0).within(depths).reruns().of(
-        |s| start(s).is_some(),
-        |s| start(s).flatten().unwrap_or(0.0),
-        set_start,
+    slider("Start depth", "mm", Image, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
+        |s| start_depth(s).is_some(),
+        |s| start_depth(s).flatten().unwrap_or(0.0),
+        set_start_depth,
     ),
-    slider("Planes zoom", "", Planes, [0.2, 20.0], 0.1).of(cuts, |s| s.planes.zoom, |s, v| s.planes.zoom = v),
-    slider("Slab", "mm", Planes, [0.0, 40.0], 0.5).of(cuts, |s| s.planes.thickness, |s, v| s.planes.thickness = v),
+    slider("Planes zoom", "", Planes, [0.2, 20.0], 0.1).of(shows_planes, |s| s.planes.zoom, |s, v| s.planes.zoom = v),
+    slider("Slab", "mm", Planes, [0.0, 40.0], 0.5).of(
+        shows_planes,
+        |s| s.planes.thickness,
+        |s, v| s.planes.thickness = v,
+    ),
     slider("Spacing", "mm", Planes, [0.0, 40.0], 0.5).of(
         |s| s.mode == Mode::Tomography,
         |s| s.planes.spacing.unwrap_or(0.0),
         |s, v| s.planes.spacing = above(v, 0.1),
     ),
     slider("Planes azimuth", "°", Planes, [-180.0, 180.0], 5.0).of(
-        cuts,
+        shows_planes,
         |s| s.planes.azimuth,
         |s, v| s.planes.azimuth = v,
     ),
-    slider("Planes tilt", "°", Planes, [-180.0, 180.0], 5.0).of(cuts, |s| s.planes.tilt, |s, v| s.planes.tilt = v),
-    slider("Planes roll", "°", Planes, [-180.0, 180.0], 5.0).of(cuts, |s| s.planes.roll, |s, v| s.planes.roll = v),
+    slider("Planes tilt", "°", Planes, [-180.0, 180.0], 5.0).of(
+        shows_planes,
+        |s| s.planes.tilt,
+        |s, v| s.planes.tilt = v,
+    ),
+    slider("Planes roll", "°", Planes, [-180.0, 180.0], 5.0).of(
+        shows_planes,
+        |s| s.planes.roll,
+        |s, v| s.planes.roll = v,
+    ),
     slider("Planes window low", "", Planes, [0.0, 1.0], 0.01).of(
         is_four,
         |s| s.planes.window[0],
@@ -154,29 +167,27 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| set_high(&mut s.planes.window, v),
     ),
     slider("Cut left", "mm", Planes, [0.0, 400.0], 1.0)
-        .within(|c| inset(c, 0, c.settings.cube.inset.right))
+        .within(|c| inset_limits(c, 0, c.settings.cube.inset.right))
         .reruns()
         .of(is_cube, |s| s.cube.inset.left, |s, v| s.cube.inset.left = v),
     slider("Cut right", "mm", Planes, [0.0, 400.0], 1.0)
-        .within(|c| inset(c, 0, c.settings.cube.inset.left))
+        .within(|c| inset_limits(c, 0, c.settings.cube.inset.left))
         .reruns()
         .of(is_cube, |s| s.cube.inset.right, |s, v| s.cube.inset.right = v),
-    slider("Cut near", "mm", Planes, [0.0, 400.0], 1.0).within(|c| inset(c, 1, c.settings.cube.inset.far)).reruns().of(
-        is_cube,
-        |s| s.cube.inset.near,
-        |s, v| s.cube.inset.near = v,
-    ),
-    slider("Cut far", "mm", Planes, [0.0, 400.0], 1.0).within(|c| inset(c, 1, c.settings.cube.inset.near)).reruns().of(
-        is_cube,
-        |s| s.cube.inset.far,
-        |s, v| s.cube.inset.far = v,
-    ),
+    slider("Cut near", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset_limits(c, 1, c.settings.cube.inset.far))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.near, |s, v| s.cube.inset.near = v),
+    slider("Cut far", "mm", Planes, [0.0, 400.0], 1.0)
+        .within(|c| inset_limits(c, 1, c.settings.cube.inset.near))
+        .reruns()
+        .of(is_cube, |s| s.cube.inset.far, |s, v| s.cube.inset.far = v),
     slider("Cut bottom", "mm", Planes, [0.0, 400.0], 1.0)
-        .within(|c| inset(c, 2, c.settings.cube.inset.top))
+        .within(|c| inset_limits(c, 2, c.settings.cube.inset.top))
         .reruns()
         .of(is_cube, |s| s.cube.inset.bottom, |s, v| s.cube.inset.bottom = v),
     slider("Cut top", "mm", Planes, [0.0, 400.0], 1.0)
-        .within(|c| inset(c, 2, c.settings.cube.inset.bottom))
+        .within(|c| inset_limits(c, 2, c.settings.cube.inset.bottom))
         .reruns()
         .of(is_cube, |s| s.cube.inset.top, |s, v| s.cube.inset.top = v),
     slider("Face shading", "", Planes, [0.0, 1.0], 0.05).of(is_cube, |s| s.cube.shading, |s, v| s.cube.shading = v),
@@ -202,45 +213,45 @@ pub const SLIDERS: &[Slider] = &[
         |s| s.volume.window[1],
         |s, v| set_high(&mut s.volume.window, v),
     ),
-    slider("Veil start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depths).reruns().of(
+    slider("Veil start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
         is_mixed,
         |s| s.volume.start_depth.unwrap_or(0.0),
         |s, v| s.volume.start_depth = above(v, 1e-9),
     ),
     slider("Surface median", "px", Surface, [0.0, 31.0], 2.0).of(
-        lit,
+        is_lit,
         |s| f64::from(s.distance.median),
         |s, v| s.distance.median = odd(v),
     ),
     slider("Surface smoothing", "px", Surface, [0.0, 10.0], 0.5).of(
-        lit,
+        is_lit,
         |s| s.distance.bilateral.map_or(0.0, |b| b.pixels),
         set_bilateral,
     ),
     slider("Surface edge", "mm", Surface, [0.1, 20.0], 0.2).of(
-        |s| lit(s) && s.distance.bilateral.is_some(),
+        |s| is_lit(s) && s.distance.bilateral.is_some(),
         |s| s.distance.bilateral.map_or(0.1, |b| b.distance),
         set_edge,
     ),
-    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.ambient, |s, v| s.light.ambient = v),
-    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
-    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(lit, |s| s.light.specular, |s, v| s.light.specular = v),
+    slider("Ambient", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.ambient, |s, v| s.light.ambient = v),
+    slider("Diffuse", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.diffuse, |s, v| s.light.diffuse = v),
+    slider("Specular", "", Light, [0.0, 2.0], 0.02).of(is_lit, |s| s.light.specular, |s, v| s.light.specular = v),
     slider("Shadow", "", Light, [0.0, 1.0], 0.05).of(
-        lit,
+        is_lit,
         |s| s.light.shadow.map_or(0.0, |l| l.strength),
-        |s, v| s.light.shadow = kept(s.light.shadow, v, |l: &mut Shadow| &mut l.strength),
+        |s, v| s.light.shadow = with_strength(s.light.shadow, v, |l: &mut Shadow| &mut l.strength),
     ),
     slider("Occlusion", "", Light, [0.0, 4.0], 0.1).of(
-        lit,
+        is_lit,
         |s| s.light.occlusion.map_or(0.0, |l| l.strength),
-        |s, v| s.light.occlusion = kept(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength),
+        |s, v| s.light.occlusion = with_strength(s.light.occlusion, v, |l: &mut Occlusion| &mut l.strength),
     ),
     slider("Translucency", "", Light, [0.0, 1.0], 0.05).of(
-        lit,
+        is_lit,
         |s| s.light.skin.map_or(0.0, |l| l.translucency),
-        |s, v| s.light.skin = kept(s.light.skin, v, |l: &mut Skin| &mut l.translucency),
+        |s, v| s.light.skin = with_strength(s.light.skin, v, |l: &mut Skin| &mut l.translucency),
     ),
-    slider("Smoothing", "mm", Filters, [0.0, 3.0], 0.1).within(smoothings).reruns().of(
+    slider("Smoothing", "mm", Filters, [0.0, 3.0], 0.1).within(smoothing_limits).reruns().of(
         always,
         smoothing,
         set_smoothing,
@@ -261,17 +272,17 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.post.sigma = sigma(s.post.sigma, v),
     ),
     slider("Step", "mm", Quality, [0.0, 2.0], 0.05).of(
-        casts,
+        renders_rays,
         |s| s.ray.step.unwrap_or(0.0),
         |s, v| s.ray.step = above(v, 0.05),
     ),
     slider("Field of view", "°", Quality, [0.0, 90.0], 5.0).of(
-        casts,
+        renders_rays,
         |s| s.camera.field_of_view,
         |s, v| s.camera.field_of_view = above(v, 1.0).unwrap_or(0.0),
     ),
     slider("Rays a pixel", "", Quality, [1.0, 4.0], 1.0).of(
-        |s| casts(s) && !s.ray.half,
+        |s| renders_rays(s) && !s.ray.half,
         |s| f64::from(s.ray.rays),
         |s, v| s.ray.rays = if s.ray.half { 1 } else { v.round() as u32 },
     ),
@@ -281,11 +292,11 @@ fn always(_: &Settings) -> bool {
     true
 }
 
-fn casts(s: &Settings) -> bool {
+fn renders_rays(s: &Settings) -> bool {
     !s.mode.is_flat()
 }
 
-fn cuts(s: &Settings) -> bool {
+fn shows_planes(s: &Settings) -> bool {
     s.mode.is_flat() || is_four(s)
 }
 
@@ -305,28 +316,28 @@ fn is_first_hit(s: &Settings) -> bool {
     s.mode == Mode::Volume && s.volume.shading == Shading::FirstHit
 }
 
-fn lit(s: &Settings) -> bool {
+fn is_lit(s: &Settings) -> bool {
     matches!(s.mode, Mode::Surface | Mode::Mixed) || is_first_hit(s)
 }
 
-/// A filter or a step that is off below its least value.
+/// A value that is off below its minimum.
 fn above(value: f64, least: f64) -> Option<f64> {
     (value >= least).then_some(value)
 }
 
-/// The odd window that is nearest; 0 is none.
+/// The nearest odd window size; 0 is off.
 fn odd(value: f64) -> u32 {
     if value < 2.0 { 0 } else { 2 * ((value - 1.0) / 2.0).round() as u32 + 1 }
 }
 
-/// The same look with another strength. It stays where its strength is 0, which no pass runs for: its other numbers are kept.
-fn kept<T: Copy + Default>(look: Option<T>, value: f64, part: fn(&mut T) -> &mut f64) -> Option<T> {
-    if look.is_none() && value == 0.0 {
+/// An effect with another strength. It stays set at strength 0, for which no pass runs, so that its other values are kept.
+fn with_strength<T: Copy + Default>(effect: Option<T>, value: f64, strength: fn(&mut T) -> &mut f64) -> Option<T> {
+    if effect.is_none() && value == 0.0 {
         return None;
     }
-    let mut look = look.unwrap_or_default();
-    *part(&mut look) = value;
-    Some(look)
+    let mut effect = effect.unwrap_or_default();
+    *strength(&mut effect) = value;
+    Some(effect)
 }
 
 fn sigma(filter: Option<Sigma>, value: f64) -> Option<Sigma> {
@@ -353,18 +364,18 @@ fn window_mut(s: &mut Settings) -> &mut [f64; 2] {
     }
 }
 
-/// One grey level of 8 bits, rounded up: a narrower window shows nothing but black and white.
-const NARROWEST: f64 = 0.005;
+/// Minimum width of a window: one grey level of 8 bits, rounded up. A narrower window shows only black and white.
+const MIN_WINDOW: f64 = 0.005;
 
 fn set_low(window: &mut [f64; 2], value: f64) {
-    let low = value.min(window[1] - NARROWEST);
+    let low = value.min(window[1] - MIN_WINDOW);
     if low < window[1] {
         window[0] = low;
     }
 }
 
 fn set_high(window: &mut [f64; 2], value: f64) {
-    let high = value.max(window[0] + NARROWEST);
+    let high = value.max(window[0] + MIN_WINDOW);
     if window[0] < high {
         window[1] = high;
     }
@@ -381,13 +392,13 @@ fn threshold(s: &Settings) -> f64 {
 fn set_threshold(s: &mut Settings, value: f64) {
     match s.mode {
         Mode::Volume => s.volume.threshold = value,
-        // A detector that fires at nothing finds its surface where the ray begins.
+        // At a threshold of 0 the detector finds its surface at the start of the ray.
         _ => s.surface.threshold = value.max(0.005),
     }
 }
 
-/// That of the mode, if it has one.
-fn start(s: &Settings) -> Option<Option<f64>> {
+/// The start depth of the mode, if it has one.
+fn start_depth(s: &Settings) -> Option<Option<f64>> {
     match s.mode {
         Mode::Surface | Mode::Mixed => Some(s.surface.start_depth),
         Mode::Volume => Some(s.volume.start_depth),
@@ -396,7 +407,7 @@ fn start(s: &Settings) -> Option<Option<f64>> {
     }
 }
 
-fn set_start(s: &mut Settings, value: f64) {
+fn set_start_depth(s: &mut Settings, value: f64) {
     let value = above(value, 1e-9);
     match s.mode {
         Mode::Surface | Mode::Mixed => s.surface.start_depth = value,
@@ -406,17 +417,17 @@ fn set_start(s: &mut Settings, value: f64) {
     }
 }
 
-/// Depths below the face that leave 1 mm of the region.
-fn depths(scene: &Scene) -> [f64; 2] {
+/// The range of start depths that leaves 1 mm of the region.
+fn depth_limits(scene: &Scene) -> [f64; 2] {
     [f64::NEG_INFINITY, super::view::below_face(scene, scene.high).y - 1.0]
 }
 
-/// What a face can be pushed in along an axis and leave 2 mm between it and the one across.
-fn inset(scene: &Scene, axis: usize, across: f64) -> [f64; 2] {
+/// The range of a face's inset along an axis that leaves 2 mm to the opposite face, whose inset is `across`.
+fn inset_limits(scene: &Scene, axis: usize, across: f64) -> [f64; 2] {
     [0.0, (scene.high - scene.low)[axis] - across - 2.0]
 }
 
-/// The largest opacity of the points. Named functions have theirs.
+/// The largest opacity of the points of a transfer function; 0 for a named one.
 fn opacity(s: &Settings) -> f64 {
     match &s.volume.transfer {
         Transfer::Points(points) => points.iter().map(|p| p.opacity).fold(0.0, f64::max),
@@ -452,7 +463,7 @@ fn smoothing(s: &Settings) -> f64 {
     s.slices.smooth.map_or(0.0, |f| f.lateral.max(f.depth))
 }
 
-/// Keeps the proportions of a Gaussian that was there; a new one is round in the plane and joins neighbouring slices.
+/// Scales an existing Gaussian in proportion. A new one is isotropic in the slice and includes the neighbouring slices.
 fn set_smoothing(s: &mut Settings, value: f64) {
     let Some(wide) = above(value, 1e-3) else { return s.slices.smooth = None };
     let (filter, was) = (s.slices.smooth.unwrap_or_default(), smoothing(s));
@@ -465,7 +476,7 @@ fn set_smoothing(s: &mut Settings, value: f64) {
     });
 }
 
-/// What a Gaussian may be on slices of this pitch, mm.
-fn smoothings(scene: &Scene) -> [f64; 2] {
+/// The range of a Gaussian on slices of this pitch, mm.
+fn smoothing_limits(scene: &Scene) -> [f64; 2] {
     [0.0, MAX_DEVIATION * scene.grid.pitch[0].min(scene.grid.pitch[1])]
 }

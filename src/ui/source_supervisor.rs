@@ -1,4 +1,4 @@
-//! The source of the view: opened on a thread, since a network may take its time, and opened again when it ends, for as long as it takes.
+//! Supervises the source of the view: opens it in a background thread, because a network may be slow, and opens it again when it ends.
 
 use crate::gpu::Wake;
 use crate::live::Feed;
@@ -8,75 +8,81 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::{Duration, Instant};
 
-/// Opens a source, or says in one line why not.
-pub type Open = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Sync>;
+/// Opens a source, or returns the reason in one line.
+pub type OpenSource = Arc<dyn Fn() -> Result<Box<dyn Live>, String> + Send + Sync>;
 
-/// What there is to see of it.
+/// The state of the source.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Condition {
+pub(super) enum SourceState {
     Opening,
     Open,
     /// It ended or could not be opened, and will be tried again.
-    Waiting(String),
-    /// It ended, and why if that was not to be expected.
-    Over(Option<String>),
+    Retrying(String),
+    /// It ended for good, with the reason if that was unexpected.
+    Ended(Option<String>),
 }
 
-pub struct SourceSupervisor {
-    open: Open,
-    /// Between two attempts; none: there is one.
+/// Keeps a source open.
+pub(super) struct SourceSupervisor {
+    open: OpenSource,
+    /// Time between two attempts. None: there is only one attempt.
     retry: Option<Duration>,
     record: Option<PathBuf>,
     wake: Wake,
-    condition: Condition,
+    state: SourceState,
     opening: Option<Receiver<Result<Box<dyn Live>, String>>>,
-    next: Option<Instant>,
+    next_attempt: Option<Instant>,
 }
 
 impl SourceSupervisor {
-    /// `retry`: how long to wait before it is opened again; none ends with the source. `record`: as of [`Feed::new`].
-    pub fn new(open: Open, retry: Option<Duration>, record: Option<PathBuf>, wake: Wake) -> SourceSupervisor {
+    /// `retry`: how long to wait before the source is opened again; none: never. `record`: a file for all frames that arrive.
+    pub(super) fn new(
+        open: OpenSource,
+        retry: Option<Duration>,
+        record: Option<PathBuf>,
+        wake: Wake,
+    ) -> SourceSupervisor {
         SourceSupervisor {
             open,
             retry,
             record,
             wake,
-            condition: Condition::Opening,
+            state: SourceState::Opening,
             opening: None,
-            next: Some(Instant::now()),
+            next_attempt: Some(Instant::now()),
         }
     }
 
-    pub fn condition(&self) -> &Condition {
-        &self.condition
+    pub(super) fn state(&self) -> &SourceState {
+        &self.state
     }
 
-    /// When it has to be looked at again, whatever else happens.
-    pub fn wakes_at(&self) -> Option<Instant> {
-        self.next
+    /// When [`SourceSupervisor::poll`] has to be called without an event.
+    pub(super) fn wakes_at(&self) -> Option<Instant> {
+        self.next_attempt
     }
 
-    /// The source, when it has been opened since this was asked last.
-    pub fn poll(&mut self, now: Instant) -> Option<Feed> {
-        if self.next.is_some_and(|next| now >= next) {
-            self.next = None;
-            self.begin(now);
+    /// The source, if it was opened since the last call.
+    pub(super) fn poll(&mut self, now: Instant) -> Option<Feed> {
+        if self.next_attempt.is_some_and(|at| now >= at) {
+            self.next_attempt = None;
+            self.start_opening(now);
         }
         let opened = match self.opening.as_ref()?.try_recv() {
             Ok(opened) => opened,
             Err(TryRecvError::Empty) => return None,
-            Err(TryRecvError::Disconnected) => Err("opening the source broke down".into()),
+            Err(TryRecvError::Disconnected) => Err("the thread that opens the source panicked".into()),
         };
         self.opening = None;
         let feed = opened.and_then(|source| {
-            // Every source has a file of its own: none is written over.
-            let record = self.record.as_deref().map(unused);
+            // Each source gets its own file: none is overwritten.
+            let record = self.record.as_deref().map(unused_name);
             Feed::waking(source, record.as_deref(), Some(self.wake.clone()))
                 .map_err(|e| format!("a thread for the source cannot be started: {e}"))
         });
         match feed {
             Ok(feed) => {
-                self.condition = Condition::Open;
+                self.state = SourceState::Open;
                 Some(feed)
             }
             Err(why) => {
@@ -86,38 +92,38 @@ impl SourceSupervisor {
         }
     }
 
-    /// The source has nothing more to say, and why if that was not to be expected.
-    pub fn ended(&mut self, why: Option<String>, now: Instant) {
+    /// Records the end of the source, with the reason if it was unexpected.
+    pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
         match self.retry {
             Some(retry) => {
-                self.next = Some(now + retry);
-                self.condition = Condition::Waiting(why.unwrap_or("the source ended".into()));
+                self.next_attempt = Some(now + retry);
+                self.state = SourceState::Retrying(why.unwrap_or("the source ended".into()));
             }
-            None => self.condition = Condition::Over(why),
+            None => self.state = SourceState::Ended(why),
         }
     }
 
-    fn begin(&mut self, now: Instant) {
-        let (tell, opening) = channel();
+    fn start_opening(&mut self, now: Instant) {
+        let (sender, opening) = channel();
         let (open, wake) = (self.open.clone(), self.wake.clone());
         let work = move || {
-            // Whoever asked may have gone.
-            let _ = tell.send(open());
+            // The receiver may be gone.
+            let _ = sender.send(open());
             wake();
         };
         match std::thread::Builder::new().name("opening".into()).spawn(work) {
             Ok(_) => self.opening = Some(opening),
             Err(e) => self.ended(Some(format!("a thread cannot be started: {e}")), now),
         }
-        // Why it waited stays to be read until something comes.
-        if !matches!(self.condition, Condition::Waiting(_)) {
-            self.condition = Condition::Opening;
+        // The reason stays visible until the source is open.
+        if !matches!(self.state, SourceState::Retrying(_)) {
+            self.state = SourceState::Opening;
         }
     }
 }
 
-/// A name that nothing has: NAME.frames, NAME-2.frames ...
-fn unused(file: &Path) -> PathBuf {
+/// A file name that does not exist yet: NAME.frames, NAME-2.frames ...
+fn unused_name(file: &Path) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let name = |n: u32| match n {
         1 => file.to_path_buf(),
@@ -145,13 +151,13 @@ mod tests {
         }
     }
 
-    fn poll(supply: &mut SourceSupervisor, ahead: Duration) -> bool {
+    fn poll(supervisor: &mut SourceSupervisor, ahead: Duration) -> bool {
         let begun = Instant::now();
         loop {
-            if supply.poll(Instant::now() + ahead).is_some() {
+            if supervisor.poll(Instant::now() + ahead).is_some() {
                 return true;
             }
-            if supply.opening.is_none() || begun.elapsed() > Duration::from_secs(20) {
+            if supervisor.opening.is_none() || begun.elapsed() > Duration::from_secs(20) {
                 return false;
             }
             std::thread::sleep(Duration::from_millis(1));
@@ -159,41 +165,41 @@ mod tests {
     }
 
     #[test]
-    fn a_source_that_is_missing_is_tried_again_until_it_is_there() {
+    fn a_missing_source_is_retried_until_it_opens() {
         let tries = Arc::new(AtomicU32::new(0));
         let counted = tries.clone();
-        let open: Open = Arc::new(move || match counted.fetch_add(1, Ordering::Relaxed) {
+        let open: OpenSource = Arc::new(move || match counted.fetch_add(1, Ordering::Relaxed) {
             0 | 1 => Err("no probe".into()),
             _ => Ok(Box::new(Silent)),
         });
-        let mut supply = SourceSupervisor::new(open, Some(Duration::from_secs(5)), None, Arc::new(|| ()));
-        assert!(!poll(&mut supply, Duration::ZERO));
-        assert_eq!(supply.condition(), &Condition::Waiting("no probe".into()));
-        // Not before its time.
-        assert!(!poll(&mut supply, Duration::ZERO));
+        let mut supervisor = SourceSupervisor::new(open, Some(Duration::from_secs(5)), None, Arc::new(|| ()));
+        assert!(!poll(&mut supervisor, Duration::ZERO));
+        assert_eq!(supervisor.state(), &SourceState::Retrying("no probe".into()));
+        // Not before the interval has passed.
+        assert!(!poll(&mut supervisor, Duration::ZERO));
         assert_eq!(tries.load(Ordering::Relaxed), 1);
-        assert!(!poll(&mut supply, Duration::from_secs(6)));
-        assert!(poll(&mut supply, Duration::from_secs(12)));
-        assert_eq!(supply.condition(), &Condition::Open);
-        supply.ended(None, Instant::now());
-        assert_eq!(supply.condition(), &Condition::Waiting("the source ended".into()));
-        assert!(poll(&mut supply, Duration::from_secs(6)));
+        assert!(!poll(&mut supervisor, Duration::from_secs(6)));
+        assert!(poll(&mut supervisor, Duration::from_secs(12)));
+        assert_eq!(supervisor.state(), &SourceState::Open);
+        supervisor.ended(None, Instant::now());
+        assert_eq!(supervisor.state(), &SourceState::Retrying("the source ended".into()));
+        assert!(poll(&mut supervisor, Duration::from_secs(6)));
     }
 
     #[test]
-    fn without_a_retry_the_end_is_the_end() {
-        let mut supply = SourceSupervisor::new(Arc::new(|| Ok(Box::new(Silent))), None, None, Arc::new(|| ()));
-        assert!(poll(&mut supply, Duration::ZERO));
-        supply.ended(Some("cut".into()), Instant::now());
-        assert_eq!(supply.condition(), &Condition::Over(Some("cut".into())));
-        assert!(!poll(&mut supply, Duration::from_secs(100)) && supply.wakes_at().is_none());
+    fn without_a_retry_the_end_is_final() {
+        let mut supervisor = SourceSupervisor::new(Arc::new(|| Ok(Box::new(Silent))), None, None, Arc::new(|| ()));
+        assert!(poll(&mut supervisor, Duration::ZERO));
+        supervisor.ended(Some("cut".into()), Instant::now());
+        assert_eq!(supervisor.state(), &SourceState::Ended(Some("cut".into())));
+        assert!(!poll(&mut supervisor, Duration::from_secs(100)) && supervisor.wakes_at().is_none());
     }
 
     #[test]
-    fn an_opener_that_panics_is_a_fault() {
-        let mut supply =
-            SourceSupervisor::new(Arc::new(|| panic!("planted")), Some(Duration::from_secs(1)), None, Arc::new(|| ()));
-        assert!(!poll(&mut supply, Duration::ZERO));
-        assert!(matches!(supply.condition(), Condition::Waiting(_)));
+    fn a_panic_while_opening_is_a_fault() {
+        let mut supervisor =
+            SourceSupervisor::new(Arc::new(|| panic!("injected")), Some(Duration::from_secs(1)), None, Arc::new(|| ()));
+        assert!(!poll(&mut supervisor, Duration::ZERO));
+        assert!(matches!(supervisor.state(), SourceState::Retrying(_)));
     }
 }

@@ -1,8 +1,8 @@
-//! The console in a window, or over all of a monitor.
+//! The console in a window of the desktop, which may be full-screen.
 
-use super::console::{Console, Next};
+use super::console::{Console, LoopRequest};
 use super::input::{Button, Input, Key, Modifiers, Phase};
-use super::recovery::{self, Due, Gone, Place, Recovery};
+use super::recovery::{self, Lost, Output, Recovery, RecoveryStep};
 use crate::gpu::window::{PresentMode, Screen, Target};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
 use std::sync::Arc;
@@ -12,65 +12,70 @@ use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, TouchPhase, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
-use winit::keyboard::{Key as Printed, NamedKey};
+use winit::keyboard::{Key as LogicalKey, NamedKey};
 use winit::monitor::MonitorHandle;
 use winit::platform::modifier_supplement::KeyEventExtModifierSupplement;
 use winit::window::{Fullscreen, Window, WindowId};
 
-pub struct Shape {
-    /// Of the window, pixels.
+/// How to open the window.
+pub struct WindowOptions {
+    /// Size of the window, pixels.
     pub size: [u32; 2],
     pub full_screen: bool,
-    /// A part of the name of the monitor to fill; the one that the window is on unless given.
+    /// Part of the name of the monitor for full screen. None: the monitor of the window.
     pub monitor: Option<String>,
-    pub pace: PresentMode,
-    /// Closing the window does not end it.
-    pub stays: bool,
-    /// End after so long.
+    pub present_mode: PresentMode,
+    /// Opens the window again when it is closed.
+    pub stays_open: bool,
+    /// Ends after this time.
     pub time: Option<Duration>,
 }
 
-/// Makes the console when the window is there, and another whenever one asks for it: the context that shows on it is given, and how many
-/// pixels a point has.
-pub type Make<'a> = dyn FnMut(&Arc<Context>, [u32; 2], f32, Wake) -> Console + 'a;
+/// Creates the console when the window is open, and again whenever the console asks to be replaced. Arguments: the context, the size of
+/// the window in pixels, its pixels per point, and the function that wakes the event loop.
+pub type MakeConsole<'a> = dyn FnMut(&Arc<Context>, [u32; 2], f32, Wake) -> Console + 'a;
 
-/// Opens a window and runs until someone leaves; the console as it was then, and the context that it ended with.
+/// Opens a window and runs until the user leaves. Returns the console and its last context.
 ///
 /// # Errors
-/// No windowing system, no device that shows on it, a device that is lost again and again.
-pub fn run(device: &ContextOptions, shape: Shape, make: Box<Make>) -> Result<(Console, Arc<Context>), GpuError> {
+/// There is no windowing system, or no device that can present on it, or the device is lost repeatedly.
+pub fn run(
+    device: &ContextOptions,
+    options: WindowOptions,
+    make: Box<MakeConsole>,
+) -> Result<(Console, Arc<Context>), GpuError> {
     let no_window = |e: &dyn std::fmt::Display| {
         let fault = e.to_string();
-        // winit puts its own source file in front.
+        // winit prefixes the message with its source file.
         let fault = fault.rsplit(": ").next().unwrap_or(&fault).trim_end_matches('.');
         GpuError::Window(format!(
             "{fault}; is there a desktop? (DISPLAY and WAYLAND_DISPLAY say where; --direct needs none)"
         ))
     };
     let events = EventLoop::<()>::with_user_event().build().map_err(|e| no_window(&e))?;
-    let (proxy, is_woken) = (events.create_proxy(), Arc::new(AtomicBool::new(false)));
-    let flag = is_woken.clone();
+    let (proxy, wake_pending) = (events.create_proxy(), Arc::new(AtomicBool::new(false)));
+    let flag = wake_pending.clone();
     let wake: Wake = Arc::new(move || {
-        // One is as good as many, and a source may say thousands of things a second.
+        // One event is enough; a source may wake thousands of times a second.
         if !flag.swap(true, Ordering::Relaxed) {
             let _ = proxy.send_event(());
         }
     });
-    let mut running = Running {
+    let mut window_loop = WindowLoop {
         device,
-        shape,
+        options,
         make,
         wake,
-        is_woken,
+        wake_pending,
         window: None,
         context: None,
         console: None,
         failed: None,
-        mending: Recovery::default(),
+        recovery: Recovery::default(),
         ends: None,
     };
-    events.run_app(&mut running).map_err(|e| no_window(&e))?;
-    let Running { failed, console, context, .. } = running;
+    events.run_app(&mut window_loop).map_err(|e| no_window(&e))?;
+    let WindowLoop { failed, console, context, .. } = window_loop;
     match (failed, console, context) {
         (Some(error), ..) => Err(error),
         (None, Some(console), Some(context)) => Ok((console, context)),
@@ -78,40 +83,40 @@ pub fn run(device: &ContextOptions, shape: Shape, make: Box<Make>) -> Result<(Co
     }
 }
 
-struct Running<'a> {
+struct WindowLoop<'a> {
     device: &'a ContextOptions,
-    shape: Shape,
-    make: Box<Make<'a>>,
+    options: WindowOptions,
+    make: Box<MakeConsole<'a>>,
     wake: Wake,
-    is_woken: Arc<AtomicBool>,
-    // The console first: it holds what shows on the window.
+    wake_pending: Arc<AtomicBool>,
+    // The console is dropped first: it holds the surface of the window.
     console: Option<Console>,
     context: Option<Arc<Context>>,
     window: Option<Arc<Window>>,
     failed: Option<GpuError>,
-    mending: Recovery,
+    recovery: Recovery,
     ends: Option<Instant>,
 }
 
-impl Running<'_> {
+impl WindowLoop<'_> {
     fn open(&mut self, events: &ActiveEventLoop) -> Result<(), GpuError> {
         if self.window.is_some() {
             return Ok(());
         }
         let window = self.new_window(events)?;
-        let context = Context::showing(self.device, &Target::Window(window.clone()))?;
+        let context = Context::for_presentation(self.device, &Target::Window(window.clone()))?;
         let size = size_of(&window);
-        let screen = Screen::new(&context, Target::Window(window.clone()), size, self.shape.pace)?;
+        let screen = Screen::new(&context, Target::Window(window.clone()), size, self.options.present_mode)?;
         let mut console = (self.make)(&context, size, window.scale_factor() as f32, self.wake.clone());
         console.set_screen(Some(screen));
-        self.ends = self.shape.time.map(|time| Instant::now() + time);
+        self.ends = self.options.time.map(|time| Instant::now() + time);
         (self.window, self.context, self.console) = (Some(window), Some(context), Some(console));
         Ok(())
     }
 
     fn new_window(&self, events: &ActiveEventLoop) -> Result<Arc<Window>, GpuError> {
-        let [width, height] = self.shape.size;
-        let full = self.shape.full_screen.then(|| Fullscreen::Borderless(self.monitor(events)));
+        let [width, height] = self.options.size;
+        let full = self.options.full_screen.then(|| Fullscreen::Borderless(self.monitor(events)));
         let attributes = Window::default_attributes()
             .with_title("Echolume")
             .with_inner_size(PhysicalSize::new(width, height))
@@ -120,41 +125,45 @@ impl Running<'_> {
     }
 
     fn monitor(&self, events: &ActiveEventLoop) -> Option<MonitorHandle> {
-        let part = self.shape.monitor.as_ref()?.to_lowercase();
+        let part = self.options.monitor.as_ref()?.to_lowercase();
         events.available_monitors().find(|m| m.name().is_some_and(|name| name.to_lowercase().contains(&part)))
     }
 
-    /// Has again what is gone: the window too.
-    fn mend(&mut self, events: &ActiveEventLoop, gone: Gone) -> Result<(), (Gone, GpuError)> {
+    /// Restores what is lost, including the window.
+    fn restore(&mut self, events: &ActiveEventLoop, lost: Lost) -> Result<(), (Lost, GpuError)> {
         if self.window.is_none() {
-            self.window = Some(self.new_window(events).map_err(|fault| (gone, fault))?);
+            self.window = Some(self.new_window(events).map_err(|fault| (lost, fault))?);
         }
         let (Some(window), Some(console), Some(context)) = (&self.window, &mut self.console, &mut self.context) else {
             return Ok(());
         };
-        let place = Place { device: self.device, target: Target::Window(window.clone()), pace: self.shape.pace };
-        place.mend(console, context, &|_| Ok(size_of(window)), gone).map(drop)
+        let output = Output {
+            device: self.device,
+            target: Target::Window(window.clone()),
+            present_mode: self.options.present_mode,
+        };
+        output.restore(console, context, &|_| Ok(size_of(window)), lost).map(drop)
     }
 
-    fn turn(&mut self, events: &ActiveEventLoop) {
+    fn update(&mut self, events: &ActiveEventLoop) {
         let now = Instant::now();
-        self.is_woken.store(false, Ordering::Relaxed);
-        let mended = match self.mending.due(now) {
-            Due::Nothing => Ok(()),
-            Due::At(at) => return events.set_control_flow(ControlFlow::WaitUntil(at)),
-            Due::Now(gone) => self.mend(events, gone),
+        self.wake_pending.store(false, Ordering::Relaxed);
+        let restored = match self.recovery.poll(now) {
+            RecoveryStep::Idle => Ok(()),
+            RecoveryStep::WaitUntil(at) => return events.set_control_flow(ControlFlow::WaitUntil(at)),
+            RecoveryStep::Restore(lost) => self.restore(events, lost),
         };
         let Some(console) = &mut self.console else { return };
-        match mended.and_then(|()| console.tick(now).map_err(recovery::gone)) {
-            Ok(next) => self.follow(events, next, now),
-            Err((gone, fault)) => self.try_again(events, now, gone, fault),
+        match restored.and_then(|()| console.update(now).map_err(recovery::lost_by)) {
+            Ok(next) => self.after_update(events, next, now),
+            Err((lost, fault)) => self.schedule_recovery(events, now, lost, fault),
         }
     }
 
-    fn try_again(&mut self, events: &ActiveEventLoop, now: Instant, gone: Gone, fault: GpuError) {
+    fn schedule_recovery(&mut self, events: &ActiveEventLoop, now: Instant, lost: Lost, fault: GpuError) {
         tracing::warn!("{fault}; trying again");
-        if self.mending.fault(gone, now) {
-            // The next turn says when.
+        if self.recovery.lost(lost, now) {
+            // The next update decides when to try.
             events.set_control_flow(ControlFlow::Poll);
         } else {
             self.failed = Some(fault);
@@ -162,12 +171,12 @@ impl Running<'_> {
         }
     }
 
-    fn follow(&mut self, events: &ActiveEventLoop, next: Next, now: Instant) {
+    fn after_update(&mut self, events: &ActiveEventLoop, next: LoopRequest, now: Instant) {
         if next.exit || self.ends.is_some_and(|end| now >= end) {
             events.exit();
             return;
         }
-        if let (true, Some(window), Some(context)) = (next.renews, &self.window, &self.context) {
+        if let (true, Some(window), Some(context)) = (next.restart, &self.window, &self.context) {
             let screen = self.console.take().and_then(Console::into_screen);
             let factor = window.scale_factor() as f32;
             let mut console = (self.make)(context, size_of(window), factor, self.wake.clone());
@@ -175,13 +184,13 @@ impl Running<'_> {
             self.console = Some(console);
         }
         if let Some(screen) = self.console.as_ref().and_then(Console::screen) {
-            self.mending.shown(screen.shown());
+            self.recovery.presented(screen.shown());
         }
-        if let (true, Some(window)) = (next.toggles_full_screen, &self.window) {
+        if let (true, Some(window)) = (next.toggle_full_screen, &self.window) {
             let full = window.fullscreen().is_none().then(|| Fullscreen::Borderless(self.monitor(events)));
             window.set_fullscreen(full);
         }
-        let at = next.at.into_iter().chain(self.ends).min();
+        let at = next.wake_at.into_iter().chain(self.ends).min();
         events.set_control_flow(at.map_or(ControlFlow::Wait, |at| match at <= now {
             true => ControlFlow::Poll,
             false => ControlFlow::WaitUntil(at),
@@ -194,7 +203,7 @@ fn size_of(window: &Window) -> [u32; 2] {
     [size.width, size.height]
 }
 
-impl ApplicationHandler<()> for Running<'_> {
+impl ApplicationHandler<()> for WindowLoop<'_> {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if let Err(error) = self.open(events) {
             self.failed = Some(error);
@@ -205,15 +214,15 @@ impl ApplicationHandler<()> for Running<'_> {
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(console) = &mut self.console else { return };
         match &event {
-            WindowEvent::Destroyed if self.shape.stays => {
+            WindowEvent::Destroyed if self.options.stays_open => {
                 console.set_screen(None);
                 self.window = None;
-                self.mending.fault(Gone::Screen, Instant::now());
+                self.recovery.lost(Lost::Screen, Instant::now());
             }
             WindowEvent::Destroyed => events.exit(),
-            WindowEvent::CloseRequested if !self.shape.stays => events.exit(),
+            WindowEvent::CloseRequested if !self.options.stays_open => events.exit(),
             WindowEvent::Resized(size) => console.resize([size.width, size.height]),
-            WindowEvent::RedrawRequested | WindowEvent::Occluded(false) => console.expose(),
+            WindowEvent::RedrawRequested | WindowEvent::Occluded(false) => console.redraw(),
             _ => {}
         }
         if let Some(input) = input(&event) {
@@ -224,16 +233,16 @@ impl ApplicationHandler<()> for Running<'_> {
     fn user_event(&mut self, _: &ActiveEventLoop, _: ()) {}
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
-        self.turn(events);
+        self.update(events);
     }
 }
 
-/// A window's event as what hands did; none of what is not done by hand.
+/// Converts an event of the window to an input; none if it is not one.
 fn input(event: &WindowEvent) -> Option<Input> {
     let pressed = |state: &ElementState| *state == ElementState::Pressed;
     Some(match event {
         WindowEvent::CursorMoved { position, .. } => Input::Moved([position.x, position.y]),
-        WindowEvent::CursorLeft { .. } | WindowEvent::Focused(false) => Input::Left,
+        WindowEvent::CursorLeft { .. } | WindowEvent::Focused(false) => Input::FocusLost,
         WindowEvent::MouseInput { state, button, .. } => {
             let button = match button {
                 MouseButton::Left => Button::Left,
@@ -245,7 +254,7 @@ fn input(event: &WindowEvent) -> Option<Input> {
         }
         WindowEvent::MouseWheel { delta, .. } => Input::Scroll(match delta {
             MouseScrollDelta::LineDelta(_, lines) => f64::from(*lines),
-            // As far as most wheels go in a notch.
+            // Most wheels report 40 pixels per notch.
             MouseScrollDelta::PixelDelta(pixels) => pixels.y / 40.0,
         }),
         WindowEvent::ModifiersChanged(held) => {
@@ -260,7 +269,7 @@ fn input(event: &WindowEvent) -> Option<Input> {
                 TouchPhase::Started => Phase::Down,
                 TouchPhase::Moved => Phase::Moved,
                 TouchPhase::Ended => Phase::Up,
-                TouchPhase::Cancelled => Phase::Gone,
+                TouchPhase::Cancelled => Phase::Cancelled,
             };
             Input::Touch { finger: touch.id, phase, at: [touch.location.x, touch.location.y] }
         }
@@ -268,13 +277,13 @@ fn input(event: &WindowEvent) -> Option<Input> {
     })
 }
 
-fn key(printed: &Printed) -> Option<Key> {
-    Some(match printed {
-        Printed::Character(text) => match text.chars().next()? {
+fn key(logical: &LogicalKey) -> Option<Key> {
+    Some(match logical {
+        LogicalKey::Character(text) => match text.chars().next()? {
             ' ' => Key::Space,
             c => Key::Char(c.to_lowercase().next()?),
         },
-        Printed::Named(named) => match named {
+        LogicalKey::Named(named) => match named {
             NamedKey::Escape => Key::Escape,
             NamedKey::Enter => Key::Enter,
             NamedKey::Tab => Key::Tab,

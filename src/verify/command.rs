@@ -3,7 +3,7 @@
 use crate::args::check_outputs;
 use crate::files::signals::Held;
 use crate::files::{read_text, replace};
-use crate::gpu::{Choice, Context, ContextOptions, GpuError};
+use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::terminal::{Failure, failed, input, say};
 use crate::verify::report::baseline::{self, Compared, compare};
 use crate::verify::report::{Level, Outcome, Run, Verdict, html, json, junit, words};
@@ -28,7 +28,7 @@ const LONGEST: u64 = 256 << 20;
 pub struct Verify {
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
-    device: Option<Choice>,
+    device: Option<DeviceChoice>,
     /// Run every pass, mode and path once (the default)
     #[arg(long, conflicts_with = "full")]
     quick: bool,
@@ -58,7 +58,7 @@ pub struct Verify {
     self_test: bool,
     /// Render every mode on this device too, and compare the pictures
     #[arg(long, value_name = "N|NAME")]
-    against: Option<Choice>,
+    against: Option<DeviceChoice>,
     /// Run only checks whose group or name contains this; may be repeated
     #[arg(long, value_name = "PART")]
     only: Vec<String>,
@@ -76,7 +76,7 @@ pub struct Verify {
 impl Verify {
     pub fn run(&self) -> Result<(), Failure> {
         if self.digest {
-            let device = self.device.clone().unwrap_or(Choice::Best);
+            let device = self.device.clone().unwrap_or(DeviceChoice::Best);
             let context = context(&ContextOptions { device, validation: false })?;
             say!("{}", verify::repeats::digest(&context).map_err(failed)?.trim_end());
             return Ok(());
@@ -152,7 +152,7 @@ impl Verify {
 
     /// Opens the device, with validation if its layer is installed.
     fn bench(&self, level: Level) -> Result<Bench, Failure> {
-        let device = self.device.clone().unwrap_or(Choice::Best);
+        let device = self.device.clone().unwrap_or(DeviceChoice::Best);
         let with = |validation| Bench::new(&ContextOptions { device: device.clone(), validation }, level);
         match with(!self.no_validation) {
             Err(GpuError::NoValidation) => with(false),

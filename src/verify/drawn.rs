@@ -1,14 +1,19 @@
 //! Whole pictures: frames in, and what every stage made of them.
 
 use super::built_in;
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::scene::Scene;
 use std::sync::Arc;
 
 /// A renderer with a volume's frames sent: values as the frame's texture yields them, one array a slice, in geometric order.
-pub fn sent(context: &Arc<Context>, scene: &Scene, frames: &[Texels], options: &Options) -> Result<Renderer, GpuError> {
+pub fn sent(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Texels],
+    options: &RendererOptions,
+) -> Result<Renderer, GpuError> {
     let mut renderer = Renderer::new(context, scene.clone(), options)?;
     send(&mut renderer, frames, 0)?;
     Ok(renderer)
@@ -25,12 +30,12 @@ pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<()
 
 /// One picture, with a renderer of its own.
 pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Picture, GpuError> {
-    sent(context, scene, frames, &Options::default())?.picture()
+    sent(context, scene, frames, &RendererOptions::default())?.picture()
 }
 
 /// What a slot holds after a picture.
 pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot) -> Result<Texels, GpuError> {
-    let mut renderer = sent(context, scene, frames, &Options::default())?;
+    let mut renderer = sent(context, scene, frames, &RendererOptions::default())?;
     renderer.picture()?;
     let missing = || GpuError::Broken(format!("no pass writes '{}'", slot.name()));
     renderer.read(slot)?.ok_or_else(missing)
@@ -48,7 +53,7 @@ pub struct Drawn {
 /// Every mode, one after the other in one renderer: one volume image, one queue, frames in order, everything waited for.
 pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
     let mut renderer: Option<Renderer> = None;
-    let options = Options { queues: Some(1), ..Options::default() };
+    let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
     let draw = |asked: built_in::Asked| {
         let scene = asked.make().map_err(GpuError::Broken)?;
         let frames = built_in::wall(&scene, 0);

@@ -5,12 +5,12 @@ use super::built_in::{BYTES, scene, wall, wobbler};
 use super::isolated_context::IsolatedContext;
 use super::repeats::same;
 use super::{Bench, Check, Found, drawn};
-use crate::gpu::faults::{Failure, Seam};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::faults::{InjectedFailure, InjectionPoint};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::Geometry;
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
 use crate::verify::report::{Figure, Level, Unit};
 use std::sync::Arc;
@@ -63,8 +63,8 @@ fn every_allocation(bench: &mut Bench) -> Result<Found, GpuError> {
     let before = context.allocated();
     let mut refused = 0;
     for after in 0..1000 {
-        context.faults.inject(Seam::Allocate, after, Failure::OutOfDeviceMemory.result());
-        let made = Renderer::new(context, sound.scene.clone(), &Options::default());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
+        let made = Renderer::new(context, sound.scene.clone(), &RendererOptions::default());
         context.faults.forget();
         match made {
             Ok(_) => break,
@@ -94,9 +94,9 @@ fn a_change(bench: &mut Bench) -> Result<Found, GpuError> {
     let step = if bench.level == Level::Quick { 4 } else { 1 };
     let mut refused = 0;
     for after in (0..1000).step_by(step) {
-        let mut renderer = drawn::sent(context, &small.scene, &small.frames, &Options::default())?;
+        let mut renderer = drawn::sent(context, &small.scene, &small.frames, &RendererOptions::default())?;
         renderer.picture()?;
-        context.faults.inject(Seam::Allocate, after, Failure::OutOfDeviceMemory.result());
+        context.faults.inject(InjectionPoint::Allocate, after, InjectedFailure::OutOfDeviceMemory.result());
         let changed = renderer.change(larger.scene.clone());
         context.faults.forget();
         let is_refused = changed.is_err();
@@ -127,7 +127,7 @@ fn a_change(bench: &mut Bench) -> Result<Found, GpuError> {
 fn submissions(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
     let mut all = 0;
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let aside = IsolatedContext::of_queues(bench, queues)?;
         let sound = sound(&aside.context, SMALL)?;
         let mut after = 0;
@@ -152,9 +152,9 @@ fn failed_once(
     after: u32,
 ) -> Result<bool, GpuError> {
     let format = Slot::Frames.format(&sound.scene);
-    let options = Options { queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, sound.scene.clone(), &options)?;
-    context.faults.inject(Seam::Submit, after, Failure::OutOfHostMemory.result());
+    context.faults.inject(InjectionPoint::Submit, after, InjectedFailure::OutOfHostMemory.result());
     let mut failed = 0;
     for (k, frame) in sound.frames.iter().enumerate() {
         let bytes = frame.encode(format);
@@ -183,11 +183,11 @@ fn lost(bench: &mut Bench) -> Result<Found, GpuError> {
     let sound = sound(context, SMALL)?;
     let before = context.allocated();
     for (what, seam, after, failure) in [
-        ("a device lost at a submission", Seam::Submit, 0, Failure::DeviceLost),
-        ("a device lost at a wait", Seam::Wait, 1, Failure::DeviceLost),
-        ("a device that does not come back", Seam::Wait, 1, Failure::TimeOut),
+        ("a device lost at a submission", InjectionPoint::Submit, 0, InjectedFailure::DeviceLost),
+        ("a device lost at a wait", InjectionPoint::Wait, 1, InjectedFailure::DeviceLost),
+        ("a device that does not come back", InjectionPoint::Wait, 1, InjectedFailure::TimeOut),
     ] {
-        let mut renderer = drawn::sent(context, &sound.scene, &sound.frames, &Options::default())?;
+        let mut renderer = drawn::sent(context, &sound.scene, &sound.frames, &RendererOptions::default())?;
         renderer.picture()?;
         renderer.show(0)?;
         context.faults.inject(seam, after, failure.result());
@@ -198,7 +198,7 @@ fn lost(bench: &mut Bench) -> Result<Found, GpuError> {
             Err(error) => {
                 let text = error.to_string();
                 let as_it_is = match failure {
-                    Failure::TimeOut => matches!(error, GpuError::TimedOut { .. }),
+                    InjectedFailure::TimeOut => matches!(error, GpuError::TimedOut { .. }),
                     _ => error.is_device_lost(),
                 };
                 found.expect(as_it_is && text.contains("picture"), || format!("{what}: the error says: {text}"));
@@ -224,7 +224,7 @@ fn frames(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, aside) = (Found::default(), IsolatedContext::new(bench)?);
     let context = &aside.context;
     let sound = sound(context, SMALL)?;
-    let mut renderer = drawn::sent(context, &sound.scene, &sound.frames, &Options::default())?;
+    let mut renderer = drawn::sent(context, &sound.scene, &sound.frames, &RendererOptions::default())?;
     let (whole, slices) = (renderer.frame_bytes(), sound.scene.slices());
     let frame = vec![255; whole];
     let line = whole / sound.scene.frame_size()[1] as usize;

@@ -5,7 +5,7 @@ use super::built_in::{BYTES, scene, wall, wobbler};
 use super::failing::count;
 use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Found, drawn, modes, shown};
-use crate::gpu::{Context, Fetch, GpuError, Options, formats};
+use crate::gpu::{Context, GpuError, RendererOptions, TexelAccess, formats};
 use crate::passes::slots::Format;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
@@ -33,25 +33,26 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// What there is and what is missing, as notes; what some scene cannot do without, as faults.
 fn uses(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, context) = (Found::default(), &bench.context);
-    for of in formats::abilities(context) {
-        let [columns, rows, edge] = of.largest;
-        let missing = if of.cannot.is_empty() { String::new() } else { format!("; not {}", of.cannot.join(", ")) };
-        let can = of.can.join(", ");
+    for of in formats::format_support(context) {
+        let [columns, rows, edge] = of.max_extent;
+        let missing =
+            if of.unsupported.is_empty() { String::new() } else { format!("; not {}", of.unsupported.join(", ")) };
+        let can = of.supported.join(", ");
         found.notes.push(format!("{}: {can}{missing}; {columns}x{rows}, {edge}^3", of.format));
     }
-    let fetch = Fetch::of(&context.candidate);
-    found.notes.push(format!("{}; automatic sampling: {}", fetch.words(), fetch.sampling().words()));
+    let fetch = TexelAccess::for_device(&context.candidate);
+    found.notes.push(format!("{}; automatic sampling: {}", fetch.describe(), fetch.sampling().words()));
     found.notes.push(format!(
         "{} queues; time stamps of {} bits, {} ns a tick",
         context.queue_count(),
         context.candidate.valid_bits(),
         context.limits.timestamp_period
     ));
-    found.notes.extend(context.candidate.without.iter().map(|what| format!("without {what}")));
+    found.notes.extend(context.candidate.missing_optional.iter().map(|what| format!("without {what}")));
     let scenes = bench.scenes();
     let mut refused = Vec::new();
     for (name, scene) in scenes.iter() {
-        let scene = formats::suited(context, fetch, scene.clone());
+        let scene = formats::adapt_scene(context, fetch, scene.clone());
         let fits = formats::check(context, &Plan::new(&scene), &scene);
         refused.extend(fits.err().map(|error| format!("'{name}': {error}")));
     }
@@ -128,9 +129,9 @@ fn volume(bench: &mut Bench, format: &str, allowed: [f64; 2]) -> Result<Found, G
         let expected = reference(&exact, &frames);
         for sampling in ["hardware", "exact", "quads"] {
             let scene = small(mode, format, &format!("sampling = '{sampling}'"))?;
-            for fetch in [Fetch::Textures, Fetch::Storage] {
-                let what = format!("{mode} in {format}, {sampling}, {}", fetch.words());
-                let options = Options { fetch: Some(fetch), ..Options::default() };
+            for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
+                let what = format!("{mode} in {format}, {sampling}, {}", fetch.describe());
+                let options = RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
                 match drawn::sent(&bench.context, &scene, &frames, &options) {
                     Ok(mut renderer) => largest.add(&mut found, &what, &expected, &renderer.picture()?, allowed),
                     // It was asked for, so nothing else is taken instead.
@@ -148,28 +149,38 @@ fn volume(bench: &mut Bench, format: &str, allowed: [f64; 2]) -> Result<Found, G
 struct Lack {
     name: &'static str,
     change: fn(&mut Context),
-    options: Options,
+    options: RendererOptions,
     sampling: Option<Sampling>,
 }
 
 fn lacks() -> Vec<Lack> {
-    let plain = Options::default;
-    let reading = |fetch| Options { fetch: Some(fetch), ..Options::default() };
+    let plain = RendererOptions::default;
+    let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
     let of = |name, change, options, sampling| Lack { name, change, options, sampling };
     vec![
-        of("no filter", formats::deny_filters, reading(Fetch::Textures), Some(Sampling::Exact)),
+        of("no filter", formats::disable_linear_filter, reading(TexelAccess::Textures), Some(Sampling::Exact)),
         // The largest allocation holds the volume, and not four times as much.
-        of("no room for quads", |c| c.candidate.max_bytes = 80 << 10, reading(Fetch::Storage), Some(Sampling::Exact)),
-        of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(Fetch::Storage), None),
-        of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(Fetch::Storage), None),
-        of("texels by texelFetch", |_| (), reading(Fetch::Textures), None),
-        of("texels by imageLoad", |_| (), reading(Fetch::Storage), None),
+        of(
+            "no room for quads",
+            |c| c.candidate.max_bytes = 80 << 10,
+            reading(TexelAccess::Storage),
+            Some(Sampling::Exact),
+        ),
+        of("no tables as texels", |c| c.limits.max_texel_buffer_elements = 0, reading(TexelAccess::Storage), None),
+        of("small tables as texels", |c| c.limits.max_texel_buffer_elements = 300, reading(TexelAccess::Storage), None),
+        of("texels by texelFetch", |_| (), reading(TexelAccess::Textures), None),
+        of("texels by imageLoad", |_| (), reading(TexelAccess::Storage), None),
         of("no pushed descriptors", |c| c.push_descriptor = None, plain(), None),
-        of("one queue", |_| (), Options { queues: Some(1), ..plain() }, None),
+        of("one queue", |_| (), RendererOptions { queues: Some(1), ..plain() }, None),
         of("parameters 4096 bytes apart", |c| c.limits.min_uniform_buffer_offset_alignment = 4096, plain(), None),
         of("no time stamps", |c| c.candidate.queues.iter_mut().for_each(|q| q.valid_bits = 0), plain(), None),
-        of("no counts", |c| c.candidate.statistics = false, Options { spans: true, ..plain() }, None),
-        of("no clock in common", |c| c.candidate.calibrated = false, Options { spans: true, ..plain() }, None),
+        of("no counts", |c| c.candidate.pipeline_statistics = false, RendererOptions { spans: true, ..plain() }, None),
+        of(
+            "no clock in common",
+            |c| c.candidate.calibrated_timestamps = false,
+            RendererOptions { spans: true, ..plain() },
+            None,
+        ),
     ]
 }
 
@@ -196,7 +207,7 @@ fn fallbacks(bench: &mut Bench) -> Result<Found, GpuError> {
             found.expect(lack.sampling.is_none_or(|expected| expected == sampling), || {
                 format!("{what}: samples are taken {}", sampling.words())
             });
-            took = format!("samples {}, {}", sampling.words(), renderer.fetch().words());
+            took = format!("samples {}, {}", sampling.words(), renderer.texel_access().describe());
         }
         found.notes.push(format!("{}: {took}", lack.name));
         aside.tell(&mut found);

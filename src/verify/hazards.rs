@@ -5,11 +5,11 @@ use super::built_in::{BYTES, Noise, scene, wall, wobbler};
 use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn, shown};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
-use crate::queues::MOST;
+use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Level, Shown};
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 /// The same story on one, two and three queues.
 fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     let (mut found, mut sums) = (Found::default(), [0, 0]);
-    for queues in 1..=MOST {
+    for queues in 1..=MAX_QUEUES {
         let aside = IsolatedContext::of_queues(bench, queues)?;
         let [compared, wrong] = story(&mut found, &aside, queues, bench.level)?;
         sums = [sums[0] + compared, sums[1] + wrong];
@@ -41,8 +41,8 @@ fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
     }
     counted(&mut found, sums[0], sums[1]);
     let there = bench.context.queue_count();
-    if there < MOST {
-        found.notes.push(format!("queues for different work: {there} of {MOST}; one does what several would"));
+    if there < MAX_QUEUES {
+        found.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
     }
     Ok(found)
 }
@@ -81,7 +81,8 @@ fn volume_waited_for(
     scene: &Scene,
     frames: &[Vec<u8>],
 ) -> Result<(Picture, Option<Texels>), GpuError> {
-    let mut renderer = Renderer::new(context, scene.clone(), &Options { queues: Some(1), ..Options::default() })?;
+    let mut renderer =
+        Renderer::new(context, scene.clone(), &RendererOptions { queues: Some(1), ..RendererOptions::default() })?;
     for (k, frame) in frames.iter().enumerate() {
         renderer.frame(k as u32, frame, 0)?;
         renderer.take_times()?;
@@ -103,7 +104,7 @@ pub fn taking_turns(
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
     let expected: Result<Vec<_>, _> = volumes.iter().map(|frames| waited_for(context, &scene, frames)).collect();
     let expected = expected?;
-    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene, &options)?;
     send(&mut renderer, &volumes[0], 0)?;
     let mut wrong = 0;
@@ -126,7 +127,7 @@ fn replaced(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Le
     let context = &aside.context;
     let (scene, mut noise) = (made(PLAIN)?, Noise(5));
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
-    let options = Options { queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene.clone(), &options)?;
     let mut there = volumes[0].clone();
     send(&mut renderer, &there, 0)?;
@@ -158,7 +159,7 @@ fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: L
     for toml in [PLAIN, SMOOTH] {
         let scene = made(toml)?;
         let line = scene.frame_size()[0] as usize;
-        let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+        let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
         let mut renderer = Renderer::new(context, scene.clone(), &options)?;
         context.faults.slow_down("scan_convert", 4);
         for round in 0..if level == Level::Quick { 1 } else { 12 } {
@@ -208,7 +209,7 @@ fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: L
             }
         }
         context.faults.slow_down("", 1);
-        found.expect(renderer.torn() > 0, || "no frame was given up".into());
+        found.expect(renderer.incomplete_frames() > 0, || "no frame was given up".into());
     }
     Ok(sums)
 }
@@ -228,7 +229,7 @@ fn changes(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Lev
     for scene in &scenes {
         expected.push([drawn::picture(context, scene, &frames[0])?, drawn::picture(context, scene, &frames[1])?]);
     }
-    let options = Options { volume_images: 2, queues: Some(queues), ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scenes[0].clone(), &options)?;
     let (rounds, mut wrong, mut noise) = (if level == Level::Quick { 8 } else { 80 }, 0, Noise(23));
     for round in 0..rounds {

@@ -1,7 +1,7 @@
 //! What passes alone are given: noise and extremes, in every slot that they read, and what follows from the one in the other.
 
 use super::built_in::Noise;
-use crate::gpu::renderer::size_of;
+use crate::gpu::resources::shape_size;
 use crate::passes::preprocess::packed_neighbours;
 use crate::passes::slots::Initializer;
 use crate::passes::{Arrays, Bind, DispatchArgs, MISS, Part, Pass, Slot, Texels};
@@ -14,7 +14,7 @@ pub const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
 
 fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
     let format = bind.slot.format(scene);
-    let mut size = size_of(bind.slot.shape(scene));
+    let mut size = shape_size(bind.slot.shape(scene));
     if bind.part == Part::Layer {
         size[2] = 1;
     }
@@ -81,7 +81,7 @@ fn leaps_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
         }
         for bind in (step.pass.writes)(scene, &args) {
             let channels = bind.slot.format(scene).channels();
-            outputs.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+            outputs.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
         }
         (step.pass.reference)(scene, &args, &inputs, &mut outputs);
         for bind in (step.pass.writes)(scene, &args) {
@@ -118,7 +118,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     if reads.iter().any(|b| b.slot == Slot::Quads) {
         let mut quads = Arrays::default();
         let channels = Slot::Quads.format(scene).channels();
-        quads.insert("quads", Texels::untouched(size_of(Slot::Quads.shape(scene)), channels));
+        quads.insert("quads", Texels::untouched(shape_size(Slot::Quads.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
         (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
         inputs.insert("quads", quads.get("quads").clone());

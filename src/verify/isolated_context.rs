@@ -59,7 +59,7 @@ impl IsolatedContext {
 
 /// Messages of validation that are to be believed; those of hazards between submissions only where one hears them.
 pub(super) fn told(context: &Context, mut messages: Vec<String>, hears: bool) -> Vec<String> {
-    if !hears || !context.hears_queues() {
+    if !hears || !context.validates_timelines() {
         messages.retain(|m| !(m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2")));
     }
     messages

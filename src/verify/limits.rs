@@ -5,7 +5,7 @@ use super::built_in::{BYTES, FLOATS, frames, scene};
 use super::failing::count;
 use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Found, drawn};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::probe::{Geometry, Grid};
 use crate::scene::{MAX_PICTURE, Scene};
 use crate::verify::report::{Fault, Figure, Level, Unit, Worst};
@@ -32,7 +32,7 @@ fn of(size: [usize; 3], toml: &str) -> Result<Scene, GpuError> {
 /// A fault unless the scene is refused by an error that says `names`, with nothing made.
 fn refused(found: &mut Found, context: &Arc<Context>, what: &str, scene: Scene, names: [&str; 2]) {
     let before = context.counts.allocations.load(Ordering::Relaxed);
-    match Renderer::new(context, scene, &Options::default()) {
+    match Renderer::new(context, scene, &RendererOptions::default()) {
         Ok(_) => found.expect(false, || format!("{what} was not refused")),
         Err(error) => {
             let text = error.to_string();
@@ -87,7 +87,7 @@ fn beyond(bench: &mut Bench) -> Result<Found, GpuError> {
 
 /// More volume images than the device has memory for.
 fn beyond_memory(bench: &mut Bench) -> Result<Found, GpuError> {
-    if bench.context.candidate.shares_memory() {
+    if bench.context.candidate.has_unified_memory() {
         return Ok(Found::left_out(
             "a device in the machine's memory is handed out more than there is, and killed for it",
         ));
@@ -99,7 +99,7 @@ fn beyond_memory(bench: &mut Bench) -> Result<Found, GpuError> {
     let scene = of([edge; 3], toml)?;
     let images = context.memory() / (edge as u64).pow(3) + 2;
     let before = context.allocated();
-    let options = Options { volume_images: images as u32, ..Options::default() };
+    let options = RendererOptions { volume_images: images as u32, ..RendererOptions::default() };
     match Renderer::new(context, scene, &options) {
         Ok(_) => found.expect(false, || format!("{images} volumes of {edge}^3 bytes were not refused")),
         Err(error) => {

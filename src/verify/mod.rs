@@ -148,7 +148,7 @@ impl Bench {
     /// As of [`Bench::new`].
     pub fn another(&self) -> Result<Arc<Context>, GpuError> {
         let context = Context::new(&self.options)?;
-        self.planted.iter().for_each(|change| context.faults.plant(*change));
+        self.planted.iter().for_each(|change| context.faults.inject_change(*change));
         self.prepare.iter().for_each(|prepare| prepare(&context));
         Ok(context)
     }

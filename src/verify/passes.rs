@@ -7,7 +7,7 @@ use super::shown::shown;
 use super::{Bench, Check, Comparison, Found, compare};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
-use crate::gpu::renderer::size_of;
+use crate::gpu::resources::shape_size;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, Bind, PASSES, Pass, Texels};
 use crate::scene::Scene;
@@ -50,7 +50,7 @@ pub fn beside(
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
-        expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(scene)), channels));
+        expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
     }
     pass.expected(scene, &turn, &inputs, &mut expected);
     let slack = Slack::of(pass, scene, &turn, single.filter_bits());

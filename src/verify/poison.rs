@@ -5,7 +5,7 @@ use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn, shown};
 use crate::gpu::faults::Poison;
-use crate::gpu::{Context, GpuError, Options};
+use crate::gpu::{Context, GpuError, RendererOptions};
 use crate::passes::slots::Initializer;
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
@@ -34,7 +34,7 @@ fn held(context: &Arc<Context>, scene: &Scene, frames: &[Texels], poison: Option
 }
 
 fn draw(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Held, GpuError> {
-    let mut renderer = drawn::sent(context, scene, frames, &Options::default())?;
+    let mut renderer = drawn::sent(context, scene, frames, &RendererOptions::default())?;
     let picture = renderer.picture()?;
     let mut slots = Vec::new();
     for slot in renderer.plan().slots.clone() {
@@ -58,7 +58,7 @@ struct Apart {
 fn apart(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &Scene) -> Apart {
     let mut apart = Apart::default();
     let format = slot.format(scene);
-    let marks = Poison::BOTH.map(|poison| poison.seen_in(format));
+    let marks = Poison::BOTH.map(|poison| poison.texel_value(format));
     let is = |value: f64, mark: f64| value == mark || (value.is_nan() && mark.is_nan());
     for (i, zero) in zeros.values.iter().enumerate() {
         let got = poisoned.map(|texels| texels.values[i]);

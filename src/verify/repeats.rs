@@ -4,7 +4,7 @@
 use super::built_in::Noise;
 use super::isolated_context::IsolatedContext;
 use super::{Bench, Check, Drawn, Found, drawn, modes, shown, threads};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Picture;
 use crate::source::igtl::crc64;
@@ -90,7 +90,7 @@ fn send(renderer: &mut Renderer, of: &Drawn, way: Way) -> Result<(), GpuError> {
 
 /// Every mode, one after the other in one renderer.
 fn draw(context: &Arc<Context>, modes: &[Drawn], way: Way) -> Result<Vec<Picture>, GpuError> {
-    let options = Options { queues: way.queues, volume_images: way.images, ..Options::default() };
+    let options = RendererOptions { queues: way.queues, volume_images: way.images, ..RendererOptions::default() };
     let Some(first) = modes.first() else { return Ok(Vec::new()) };
     let mut renderer = Renderer::new(context, first.scene.clone(), &options)?;
     let picture = |of: &Drawn| {
@@ -143,7 +143,7 @@ fn in_a_way(bench: &mut Bench, own: bool, way: Way) -> Result<Found, GpuError> {
 /// Every mode drawn again, shown again, and sent again.
 fn again(bench: &mut Bench) -> Result<Found, GpuError> {
     let (mut found, modes) = (Found::default(), bench.modes()?);
-    let options = Options { queues: Some(1), ..Options::default() };
+    let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
     let (mut compared, mut wrong) = (0, 0);
     let Some(first) = modes.first() else { return Ok(found) };
     let mut renderer = Renderer::new(&bench.context, first.scene.clone(), &options)?;

@@ -67,7 +67,7 @@ fn time(bench: &mut Bench, pass: &'static Pass) -> Result<Found, GpuError> {
     // Validation looks at every command and at every submission: times are taken without it.
     let own = bench.watched().then(|| Context::new(&ContextOptions { validation: false, ..bench.options().clone() }));
     let context = own.transpose()?.unwrap_or_else(|| bench.context.clone());
-    let samples = pass_runner::time(&context, scene, pass, repeats)?;
+    let samples = pass_runner::time_pass(&context, scene, pass, repeats)?;
     let mut found = Found::default();
     if samples.is_empty() {
         return Ok(Found::left_out("the device has no time stamps"));

@@ -6,7 +6,7 @@ use super::failing::count;
 use super::isolated_context::IsolatedContext;
 use super::repeats::same;
 use super::{Bench, Check, Found, drawn};
-use crate::gpu::{Context, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{PassTime, Span};
 use crate::picture::Picture;
 use crate::probe::Geometry;
@@ -104,7 +104,7 @@ fn within(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
     let toml = "mode = 'sr'\npicture = { size = [192, 192] }\nslices = { pixels = 64 }\nray = { step = 0.1 }\ndistance = { median = 9 }";
     let scene = picture_scene(toml)?;
-    let options = Options { spans: true, ..Options::default() };
+    let options = RendererOptions { spans: true, ..RendererOptions::default() };
     // The first picture compiles shaders.
     let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &options)?;
     renderer.picture()?;
@@ -123,7 +123,7 @@ fn within(bench: &mut Bench) -> Result<Found, GpuError> {
         }
         for name in ["raycast_surface", "light"] {
             let counted = spans.iter().find(|s| s.name == name && s.on_device).map(|s| s.invocations);
-            let expected = context.candidate.statistics.then_some(192 * 192);
+            let expected = context.candidate.pipeline_statistics.then_some(192 * 192);
             found.expect(counted == Some(expected), || {
                 format!("{name}: expected {expected:?} invocations, got {counted:?}")
             });
@@ -134,7 +134,7 @@ fn within(bench: &mut Bench) -> Result<Found, GpuError> {
     found.expect(shares.is_empty() || best > 0.2, || {
         format!("at most {best:.3} of the time from submission to idle is stamped")
     });
-    if context.candidate.calibrated {
+    if context.candidate.calibrated_timestamps {
         found.expect(outside.is_empty() || least < 0.5, || {
             format!("by the device's clock passes ran outside submission and wait, by {least:.2} of it at least")
         });
@@ -165,7 +165,7 @@ fn slowed(bench: &mut Bench) -> Result<Found, GpuError> {
     let mut found = Found::default();
     let scene =
         picture_scene("mode = 'vr'\npicture = { size = [192, 192] }\nslices = { pixels = 64 }\nray = { step = 0.2 }")?;
-    let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &Options::default())?;
+    let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &RendererOptions::default())?;
     let (mut plain, mut slow, mut runs) = (f64::INFINITY, f64::INFINITY, 0);
     time_of(&mut renderer, "raycast_volume")?;
     while runs < RUNS && (runs < 3 || slow < 1.5 * plain) {
@@ -195,7 +195,7 @@ fn as_if(
     let aside = IsolatedContext::lacking(bench, change)?;
     let context: &Arc<Context> = &aside.context;
     let scene = picture_scene("mode = 'vr'\npicture = { size = [96, 96] }")?;
-    let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &Options::default())?;
+    let mut renderer = drawn::sent(context, &scene, &wall(&scene, 0), &RendererOptions::default())?;
     let picture = renderer.picture()?;
     let times = renderer.take_times()?;
     drop(renderer);

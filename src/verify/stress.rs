@@ -7,7 +7,7 @@ use super::isolated_context::IsolatedContext;
 use super::repeats::{counted, same};
 use super::{Bench, Check, Found, drawn};
 use crate::files::signals;
-use crate::gpu::{Context, Fetch, GpuError, Options, Renderer};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TexelAccess};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::plan::{Plan, Rerun};
@@ -150,8 +150,9 @@ impl Stress<'_> {
             self.lived.swap_remove(gone);
         }
         let (images, scene) = (1 + self.pick(3), self.pick(self.scenes.len()));
-        let fetch = [None, Some(Fetch::Textures), Some(Fetch::Storage)][self.pick(3)];
-        let options = Options { volume_images: images as u32, fetch, ..Options::default() };
+        let fetch = [None, Some(TexelAccess::Textures), Some(TexelAccess::Storage)][self.pick(3)];
+        let options =
+            RendererOptions { volume_images: images as u32, texel_access: fetch, ..RendererOptions::default() };
         let renderer = Renderer::new(self.context, self.scenes[scene].clone(), &options)?;
         let lived = Lived { renderer, scene, holds: vec![None; images], been: BTreeSet::new() };
         self.made += 1;

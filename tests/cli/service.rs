@@ -10,7 +10,10 @@ const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/kiosk/echolume
 fn the_service_starts_what_the_program_takes() {
     let start = UNIT.lines().find_map(|l| l.strip_prefix("ExecStart=")).expect("it starts something");
     let words: Vec<&str> = start.split(' ').collect();
-    assert_eq!(words, ["/usr/local/bin/echolume", "view", "--kiosk", "--config", echolume::kiosk::config::USUAL]);
+    assert_eq!(
+        words,
+        ["/usr/local/bin/echolume", "view", "--kiosk", "--config", echolume::kiosk::config::DEFAULT_PATH]
+    );
     let (code, out, err) = run(&["view", "--kiosk", "--config", EXAMPLE, "--help"]);
     assert!(code == Some(0) && out.contains("--config"), "{out}{err}");
 }

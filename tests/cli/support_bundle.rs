@@ -49,7 +49,7 @@ fn what_is_packed_is_listed_and_says_what_machine_this_is() {
     for name in &names[1..] {
         assert!(entries["README.txt"].contains(name), "{name}: {}", entries["README.txt"]);
     }
-    assert!(["NOT in it", "logs/echolume.log.2: "].iter().all(|w| entries["README.txt"].contains(w)));
+    assert!(["NOT contain", "logs/echolume.log.2: "].iter().all(|w| entries["README.txt"].contains(w)));
     assert!(entries["logs/echolume.log"].contains("newest") && entries["logs/echolume.log.1"].contains("older"));
     let written = &entries["configuration/as-written.toml"];
     assert!(written.contains("scale = 2") && !written.contains("comment") && !written.contains("another"), "{written}");
@@ -160,7 +160,7 @@ fn without_a_device_a_configuration_and_a_log_it_says_so_inside() {
     let (entries, _) = unpacked(&folder.path(name));
     assert!(entries["devices.txt"].contains("no Vulkan device"), "{}", entries["devices.txt"]);
     assert!(entries["system.txt"].contains("VK_DRIVER_FILES=/") || entries["system.txt"].contains("VK_DRIVER_FILES=<"));
-    if !Path::new(echolume::kiosk::config::USUAL).exists() {
+    if !Path::new(echolume::kiosk::config::DEFAULT_PATH).exists() {
         let about = &entries["README.txt"];
         assert!(about.contains("echolume.toml: cannot be read") && about.contains("logs: there is none"), "{about}");
     }

@@ -1,6 +1,6 @@
 //! A device with validation on, scenes, and noise that is the same everywhere.
 
-use echolume::gpu::{Choice, Context, ContextOptions, Options, Renderer};
+use echolume::gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
@@ -24,8 +24,8 @@ pub struct Device {
 }
 
 /// ECHOLUME_DEVICE picks another device than the first that fits.
-pub fn chosen() -> Choice {
-    std::env::var("ECHOLUME_DEVICE").map_or(Choice::Best, |name| name.parse().expect("a device"))
+pub fn chosen() -> DeviceChoice {
+    std::env::var("ECHOLUME_DEVICE").map_or(DeviceChoice::Best, |name| name.parse().expect("a device"))
 }
 
 impl Device {
@@ -73,7 +73,7 @@ pub fn frame_format(scene: &Scene) -> Format {
 
 /// A renderer with the frames sent.
 pub fn rendered(device: &Device, scene: Scene, frames: &[Texels]) -> Renderer {
-    let mut renderer = Renderer::new(device, scene, &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(device, scene, &RendererOptions::default()).expect("renderer");
     send(&mut renderer, frames, 0);
     renderer
 }

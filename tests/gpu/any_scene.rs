@@ -1,7 +1,7 @@
 //! Scenes that nobody would ask for: each is refused in one line or drawn, and validation has nothing to say.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::probe::{Advance, Geometry};
 use echolume::scene::Scene;
 use echolume::scene::load::{Layers, PRESETS};
@@ -188,7 +188,7 @@ fn any_scene_is_drawn_or_refused_in_one_line_and_validation_is_silent() {
                 there.change(scene).expect("a scene that was checked");
                 there
             }
-            None => Renderer::new(&device, scene, &Options::default()).expect("a scene that was checked"),
+            None => Renderer::new(&device, scene, &RendererOptions::default()).expect("a scene that was checked"),
         };
         let frames =
             frames(now.scene(), |[x, y, k]| 0.5 + 0.5 * (0.7 * (x + 2 * k) as f64).sin() * (0.2 * y as f64).cos());

@@ -2,7 +2,7 @@
 //! that decimation leaves where they are.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::{Array, Axis, Geometry, Motion, Probe};
@@ -287,7 +287,7 @@ fn real_lines_of_3640_samples_keep_their_picture() {
         );
         let input = echolume::scene::Input { stored: recording.stored_type(), range: recording.range() };
         let scene = scene(recording.geometry(0), input, &toml);
-        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         let frame = recording.next_frame().expect("frame").expect("there");
         renderer.frame(0, &frame.bytes, 0).expect("frame");
         (scene.line_lattice(), renderer.read(Slot::Volume).expect("read").expect("there"))

@@ -3,7 +3,7 @@
 use crate::common::gpu::*;
 use crate::detector::{STEP, columns, depths, ramp};
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::renderer::size_of;
+use echolume::gpu::resources::shape_size;
 use echolume::passes::slots::Initializer;
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
@@ -319,7 +319,7 @@ fn every_detector_follows_its_reference_through_noise() {
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
             let mut inputs = Arrays::default();
             for bind in (pass.reads)(&scene, &args) {
-                let size = size_of(bind.slot.shape(&scene));
+                let size = shape_size(bind.slot.shape(&scene));
                 let mut texels = Texels::from_fn(size, bind.slot.format(&scene).channels(), |at, _| match bind.slot {
                     Slot::Volume => f64::from(value(at) as f32),
                     _ => 0.0,
@@ -333,7 +333,7 @@ fn every_detector_follows_its_reference_through_noise() {
             let mut expected = Arrays::default();
             for bind in (pass.writes)(&scene, &args) {
                 let channels = bind.slot.format(&scene).channels();
-                expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(&scene)), channels));
+                expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(&scene)), channels));
             }
             let mut mistaken = expected.clone();
             (pass.reference)(&scene, &args, &inputs, &mut expected);

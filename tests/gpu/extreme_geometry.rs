@@ -2,7 +2,7 @@
 //! names what is wrong.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::plan::Plan;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
@@ -277,7 +277,7 @@ fn pictures_of_one_pixel_and_of_16384_by_one_are_drawn_and_larger_ones_refused()
     assert!(plan.bytes(&largest) >= 3 << 30, "{}", plan.bytes(&largest));
     let limits = device.limits;
     if limits.max_image_dimension2_d < 16384 || device.candidate.max_bytes < Slot::Picture.bytes(&largest) {
-        let refused = Renderer::new(&device, largest, &Options::default()).err().expect("no room").to_string();
+        let refused = Renderer::new(&device, largest, &RendererOptions::default()).err().expect("no room").to_string();
         assert!(refused.contains("image '") && refused.contains("the device allows"), "{refused}");
     }
     for size in ["[16385, 1]", "[1, 16385]", "[0, 5]"] {

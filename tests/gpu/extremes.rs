@@ -5,7 +5,7 @@
 use crate::common::gpu::*;
 use crate::common::program;
 use crate::shading::{map, plate, run};
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{MISS, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::{Input, transfer};
@@ -139,8 +139,9 @@ fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
         for mode in ["vr", "sr"] {
             recording.rewind();
             let toml = format!("mode = '{mode}'\npicture = {{ size = [24, 24] }}\n{filters}");
-            let mut renderer = Renderer::new(&device, scene(recording.geometry(0), input, &toml), &Options::default())
-                .expect("renderer");
+            let mut renderer =
+                Renderer::new(&device, scene(recording.geometry(0), input, &toml), &RendererOptions::default())
+                    .expect("renderer");
             while let Some(frame) = recording.next_frame().expect("frame") {
                 renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
             }

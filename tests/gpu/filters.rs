@@ -2,7 +2,7 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::renderer::size_of;
+use echolume::gpu::resources::shape_size;
 use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
 use echolume::plan::Plan;
 use echolume::scene::{Scene, Settings};
@@ -63,7 +63,7 @@ pub fn by_reference(scene: &Scene, name: &str, source: &Texels) -> Texels {
 fn reference(scene: &Scene, pass: &Pass, args: &DispatchArgs, inputs: &Arrays) -> Arrays {
     let mut written = Arrays::default();
     for bind in (pass.writes)(scene, args) {
-        let size = size_of(bind.slot.shape(scene));
+        let size = shape_size(bind.slot.shape(scene));
         written.insert(bind.name, Texels::untouched(size, bind.slot.format(scene).channels()));
     }
     (pass.reference)(scene, args, inputs, &mut written);

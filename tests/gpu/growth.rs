@@ -3,7 +3,7 @@
 use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::filter::growth;
 use echolume::passes::{Slot, Texels};
 use echolume::plan::Plan;
@@ -160,7 +160,7 @@ fn the_larger_a_window_starts_the_more_often_it_grows() {
              slices = {{ pixels = 200, enhanced_sigma = {{ window = {window}, largest = {largest}, sigma = 0.1, growth = true }} }}"
         );
         let scene = scene(geometry.clone(), input, &toml);
-        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         renderer.show(0).expect("show");
         let shares = growth::shares(&scene, &renderer.read(Slot::Growth).expect("read").expect("there"));

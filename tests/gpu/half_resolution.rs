@@ -75,7 +75,7 @@ fn back_from_moving_the_picture_is_whole_again_and_no_frame_was_needed() {
         let change = |renderer: &mut Renderer, to: &Scene| {
             let rerun = renderer.change(to.clone()).expect("change");
             assert!(matches!(rerun, Rerun::Steps { .. }), "{mode}: {rerun:?}");
-            let names = renderer.dispatched(|r| r.picture()).expect("picture");
+            let names = renderer.dispatched_passes(|r| r.picture()).expect("picture");
             let stage_one = |n: &&str| PASSES.iter().any(|p| p.name == *n && p.stage == Stage::Preprocess);
             assert!(names.contains(&"tone") && !names.iter().any(stage_one), "{mode}: {names:?}");
             renderer.picture().expect("picture")

@@ -1,7 +1,7 @@
 //! Frames that arrive while pictures are drawn: what is shown is what was sent, whole, on one, two and three queues.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Advance, Geometry, Probe};
@@ -213,7 +213,7 @@ fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
         let Geometry::Sweep(probe) = &scene.geometry else { panic!("a sweep") };
         let back = vec![-0.3 * probe.slices.pitch(); 9];
         assert_eq!(probe.advance, Advance::Each(back), "all slices are of volume 3, which was swept backwards");
-        let mut plain = Renderer::new(device, scene, &Options::default()).expect("renderer");
+        let mut plain = Renderer::new(device, scene, &RendererOptions::default()).expect("renderer");
         speckled(3).iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
         plain.show(0).expect("show");
         assert!(last == Some((3, plain.picture().ok())), "{queues} queues");
@@ -227,7 +227,7 @@ fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
             r.show(0)?;
             r.picture()
         };
-        let done = renderer.recorded(work).expect("picture");
+        let done = renderer.dispatch_extents(work).expect("picture");
         let made: Vec<_> = done.iter().filter(|(name, _)| *name == "tile_ranges").map(|(_, n)| n[2]).collect();
         assert_eq!(made, [7], "{done:?}");
     }

@@ -2,7 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::live::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::live::{self, Step};
 use echolume::probe::Geometry;
 use echolume::source::Frame;
@@ -82,7 +82,7 @@ fn other_settings_are_drawn_of_the_volume_that_is_there() {
 /// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
 #[test]
 fn a_lost_device_costs_a_volume_and_not_the_stream() {
-    use echolume::gpu::faults::Seam;
+    use echolume::gpu::faults::InjectionPoint;
     let (device, other) = (Device::new(), Device::new());
     let options = live::StreamOptions::default();
     let mut stream = stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
@@ -92,7 +92,7 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
             Ok(Step::Picture(picture)) => {
                 shown.push(picture.volume);
                 if shown.len() == 2 {
-                    device.faults.inject(Seam::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
+                    device.faults.inject(InjectionPoint::Submit, 3, ash::vk::Result::ERROR_DEVICE_LOST);
                 }
             }
             Ok(Step::End(why)) => break assert_eq!(why, None),
@@ -126,7 +126,7 @@ fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
     let mut shown = Vec::new();
     let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
     assert_eq!((faults, shown), (vec![], vec![0, 1, 2]));
-    assert!(stream.renderer().expect("begun").skipped() > 0, "all slices are seen");
+    assert!(stream.renderer().expect("begun").skipped_frames() > 0, "all slices are seen");
 }
 
 /// Prevents slices that went through stage 1 as it was before from being shown beside those after, as one whole volume.
@@ -148,7 +148,7 @@ fn settings_that_need_frames_again_show_whole_volumes_only() {
                         continue;
                     }
                     checked += 1;
-                    let mut plain = Renderer::new(&device, scene, &Options::default()).expect("renderer");
+                    let mut plain = Renderer::new(&device, scene, &RendererOptions::default()).expect("renderer");
                     let whole = speckled(shown.volume);
                     whole.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
                     plain.show(0).expect("show");
@@ -173,7 +173,7 @@ fn lines_that_wait_in_a_slab_outlive_a_picture() {
     let scene =
         scene(cartesian([16, 12, 6]), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }\nslices.format = 'r8'");
     let frame = |k: usize| -> Vec<u8> { (0..16 * 12).map(|i| (i * 7 + k * 31) as u8).collect() };
-    let mut renderer = Renderer::new(&device, scene, &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(&device, scene, &RendererOptions::default()).expect("renderer");
     for k in 0..6u32 {
         let bytes = frame(k as usize);
         renderer.lines(k, 0, &bytes[..16 * 5], 0).expect("lines");
@@ -185,5 +185,5 @@ fn lines_that_wait_in_a_slab_outlive_a_picture() {
     let volume = volume_of(&mut renderer);
     let expected: Vec<f64> = (0..6).flat_map(frame).map(|v| f64::from(v) / 255.0).collect();
     let off = volume.values.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    assert!(off < 1e-6 && renderer.torn() == 0, "{off}");
+    assert!(off < 1e-6 && renderer.incomplete_frames() == 0, "{off}");
 }

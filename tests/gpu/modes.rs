@@ -135,15 +135,15 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
             let mut settings = back.clone();
             change(&mut settings);
             let scene = Scene::new(settings.geometry, settings.input, settings.settings).expect("scene");
-            let names = renderer.dispatched(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
+            let names = renderer.dispatched_passes(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
             assert_eq!(names, expected, "{mode}: {what}");
             renderer.change(base.clone()).expect("change");
             renderer.picture().expect("picture");
         }
         let frame = vec![0u8; renderer.frame_bytes()];
-        let names = renderer.dispatched(|r| r.frame(3, &frame, 0)).expect("frame");
+        let names = renderer.dispatched_passes(|r| r.frame(3, &frame, 0)).expect("frame");
         assert_eq!(names, ["scan_convert"], "{mode}: one frame");
-        let names = renderer.dispatched(|r| r.show(0).and_then(|_| r.picture())).expect("picture");
+        let names = renderer.dispatched_passes(|r| r.show(0).and_then(|_| r.picture())).expect("picture");
         assert_eq!(names, all[1..], "{mode}: its volume");
     }
 }
@@ -170,7 +170,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
             renderer.frame(*slice as u32, &frames[*slice].encode(format), 0).expect("frame");
         }
         renderer.show(0).expect("show");
-        let recorded = renderer.recorded(|r| r.picture()).expect("picture");
+        let recorded = renderer.dispatch_extents(|r| r.picture()).expect("picture");
         let reach = Plan::new(&smoothed()).steps.iter().map(|s| s.reach(&smoothed())).max().expect("steps");
         let mut changed = vec![false; frames.len()];
         slices.iter().for_each(|s| changed[*s] = true);
@@ -186,7 +186,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
         assert!(fresh.read(Slot::Volume).expect("read").expect("there") == volume, "{slices:?}");
         // Nothing new: nothing to filter.
         renderer.show(0).expect("show");
-        let names = renderer.dispatched(|r| r.picture()).expect("picture");
+        let names = renderer.dispatched_passes(|r| r.picture()).expect("picture");
         assert!(!names.contains(&"gaussian_elevation"), "{names:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! The motor moves while a frame is acquired: what stands still must not move between sweeps forth and back.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::probe::{Advance, Axis, Geometry, Indices, Probe};
 use echolume::scene::Scene;
@@ -242,7 +242,8 @@ fn the_phantom_stands_still_between_sweeps_forth_and_back() {
         let Advance::Same(advance) = phantom.probe(volume).advance else { panic!("even") };
         let probe = Probe { advance: Advance::Same(told * advance), ..phantom.probe(volume) };
         let mut renderer =
-            Renderer::new(&device, scene(Geometry::Sweep(probe), BYTES, &toml), &Options::default()).expect("renderer");
+            Renderer::new(&device, scene(Geometry::Sweep(probe), BYTES, &toml), &RendererOptions::default())
+                .expect("renderer");
         for frame in phantom.volume(volume) {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }

@@ -3,8 +3,8 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::renderer::size_of;
-use echolume::gpu::{ContextOptions, Fetch, Options, Renderer};
+use echolume::gpu::resources::shape_size;
+use echolume::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
 use echolume::passes::slots::Shape;
 use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
 use echolume::probe::Geometry;
@@ -37,8 +37,8 @@ fn every_pass_matches_its_reference() {
 #[test]
 fn texels_loaded_are_the_texels_fetched() {
     let device = Device::new();
-    let ways = [Fetch::Textures, Fetch::Storage];
-    let mut singles = ways.map(|fetch| PassRunner::fetching(&device, fetch).expect("single"));
+    let ways = [TexelAccess::Textures, TexelAccess::Storage];
+    let mut singles = ways.map(|fetch| PassRunner::with_texel_access(&device, fetch).expect("single"));
     let (mut seen, mut loaded) = (HashSet::new(), 0);
     for (name, mut scene) in scenes() {
         // Automatic sampling would be another for each way.
@@ -74,29 +74,29 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
             "picture.size = [{size}, {size}]\nslices = {{ pixels = 24, still = {still} }}\nray.sampling = '{asked}'"
         );
         let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml);
-        let options = Options { fetch, ..Options::default() };
+        let options = RendererOptions { texel_access: fetch, ..RendererOptions::default() };
         let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
         let before = renderer.scene().sampling;
         renderer.change(scene).expect("change");
         assert_eq!(before, renderer.scene().sampling, "a change of scene changes nothing of it");
         before
     };
-    let (textures, storage) = (Some(Fetch::Textures), Some(Fetch::Storage));
+    let (textures, storage) = (Some(TexelAccess::Textures), Some(TexelAccess::Storage));
     assert_eq!(of(textures, "auto", 64, true), Sampling::Hardware);
     assert_eq!(of(storage, "auto", 64, false), Sampling::Quads);
     assert_eq!(of(storage, "auto", 4, true), Sampling::Quads, "many pictures of one volume");
     assert_eq!(of(storage, "auto", 4, false), Sampling::Exact, "fewer samples than pay for quads");
     assert_eq!(of(storage, "hardware", 64, true), Sampling::Hardware);
     assert_eq!(of(textures, "exact", 64, true), Sampling::Exact);
-    assert_eq!(of(None, "auto", 64, true), Fetch::of(&device.candidate).sampling());
+    assert_eq!(of(None, "auto", 64, true), TexelAccess::for_device(&device.candidate).sampling());
 }
 
 #[test]
 fn what_measures_the_device_computes_what_it_says() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
-    for fetch in [Fetch::Textures, Fetch::Storage] {
-        let mut single = PassRunner::fetching(&device, fetch).expect("single");
+    for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
+        let mut single = PassRunner::with_texel_access(&device, fetch).expect("single");
         for pass in measure::MEASURES {
             let worst = beside(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
             assert!(worst.is_none(), "{}: {worst:?}", pass.name);
@@ -139,7 +139,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         let mut expected = Arrays::default();
         for bind in &right.writes {
             let channels = bind.slot.format(told).channels();
-            expected.insert(bind.name, Texels::untouched(size_of(bind.slot.shape(told)), channels));
+            expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(told)), channels));
         }
         (pass.reference)(wrong, &args, &right.inputs, &mut expected);
         let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
@@ -154,7 +154,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
     inputs.insert("source", source);
     let mut expected = Arrays::default();
-    expected.insert("target", Texels::untouched(size_of(right.writes[0].slot.shape(&base)), 1));
+    expected.insert("target", Texels::untouched(shape_size(right.writes[0].slot.shape(&base)), 1));
     (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
     let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");

@@ -1,7 +1,7 @@
 //! The presets' pictures of the recordings: not black, not holed, and what they show is where it is.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene};
@@ -17,7 +17,7 @@ fn preset(device: &Device, file: &str, preset: &str, mode: &str) -> (Scene, Rend
         layers.set(&set).expect("set");
     }
     let scene = Scene::new(recording.geometry(0), input, layers.finish().expect("settings")).expect("scene");
-    let mut renderer = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(device, scene.clone(), &RendererOptions::default()).expect("renderer");
     while let Some(frame) = recording.next_frame().expect("frame") {
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
     }

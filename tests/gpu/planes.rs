@@ -1,7 +1,7 @@
 //! Planes and slabs: what they show is where it is.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Grid, Probe};
 use echolume::scene::{Input, Scene, Settings};
@@ -132,8 +132,8 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
                     renderer
                 }
                 none => {
-                    let new =
-                        none.insert(Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer"));
+                    let new = none
+                        .insert(Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer"));
                     for frame in &frames {
                         new.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
                     }

@@ -1,7 +1,7 @@
 //! Real and simulated recordings against what is known of them.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Probe};
@@ -43,7 +43,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
         .map(|i| scene.grid.place(f64::from(i % 820), f64::from(i / 820)))
         .map(|(x, y)| scan_index(&scene, probe, x, y))
         .collect();
-    let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
     let (mut equal, mut largest) = (0usize, 0i32);
     for (frame, stored) in frames.iter().zip(&stored) {
         let value = |i: usize, j: usize| f64::from(frame[j * 3640 + i]);
@@ -75,7 +75,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
     // The half pixel matters: without it most pixels differ.
     let mut shifted = scene.clone();
     shifted.grid.origin[0] -= 0.5 * 0.15;
-    let mut renderer = Renderer::new(&device, shifted, &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(&device, shifted, &RendererOptions::default()).expect("renderer");
     renderer.frame(0, &frames[0], 0).expect("frame");
     let slice = renderer.read(Slot::Volume).expect("read").expect("there");
     let differ = slice.values.iter().zip(&stored[0]).filter(|(g, s)| (*g * 255.0 + 0.5).floor() as u8 != **s).count();
@@ -90,7 +90,7 @@ pub fn wobbler_volume(device: &Device, file: &str, more: &str) -> (Probe, Scene,
     let settings: Settings =
         toml::from_str(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}")).unwrap();
     let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
-    let mut renderer = Renderer::new(device, scene.clone(), &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(device, scene.clone(), &RendererOptions::default()).expect("renderer");
     while let Some(frame) = recording.next_frame().expect("frame") {
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
     }

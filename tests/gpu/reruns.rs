@@ -30,7 +30,7 @@ fn a_change_runs_again_what_it_touches_and_nothing_else() {
     let device = Device::new();
     let mut renderer = drawn(&device);
     let picture = renderer.picture().expect("picture");
-    assert_eq!(renderer.dispatched(|r| r.picture()).unwrap(), [""; 0], "nothing changed, nothing runs");
+    assert_eq!(renderer.dispatched_passes(|r| r.picture()).unwrap(), [""; 0], "nothing changed, nothing runs");
 
     let stages = |names: &[&str]| -> Vec<Stage> {
         let mut stages: Vec<_> = PASSES.iter().filter(|p| names.contains(&p.name)).map(|p| p.stage).collect();
@@ -54,7 +54,7 @@ fn a_change_runs_again_what_it_touches_and_nothing_else() {
             renderer.picture().expect("picture");
         }
         let names = renderer
-            .dispatched(|r| {
+            .dispatched_passes(|r| {
                 r.change(with(change))?;
                 r.picture()
             })
@@ -68,7 +68,7 @@ fn a_change_runs_again_what_it_touches_and_nothing_else() {
 
     let tone = SETTINGS.replace("window = 3, sigma = 0.1 }", "window = 3, sigma = 0.1 }, gamma = 2.0");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, &tone);
-    let names = renderer.dispatched(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
+    let names = renderer.dispatched_passes(|r| r.change(scene).and_then(|_| r.picture())).expect("picture");
     assert_eq!(names, ["tone"]);
 }
 
@@ -78,13 +78,14 @@ fn a_filter_switched_on_keeps_the_volume_and_a_frame_goes_through_stage_one_alon
     let mut renderer = drawn(&device);
     let plain = SETTINGS.replace("median = 3, bilateral = { pixels = 1.0, distance = 2.0 }", "");
     let unfiltered = scene(Geometry::Sweep(wobbler()), BYTES, &plain);
-    let names = renderer.dispatched(|r| r.change(unfiltered.clone()).and_then(|_| r.picture())).expect("picture");
+    let names =
+        renderer.dispatched_passes(|r| r.change(unfiltered.clone()).and_then(|_| r.picture())).expect("picture");
     assert_eq!(names, ["light", "sigma_picture", "tone"]);
-    let names = renderer.dispatched(|r| r.change(with("")).and_then(|_| r.picture())).expect("picture");
+    let names = renderer.dispatched_passes(|r| r.change(with("")).and_then(|_| r.picture())).expect("picture");
     assert_eq!(names, ["median_distance", "bilateral_distance", "light", "sigma_picture", "tone"]);
 
     let frame = vec![0u8; renderer.frame_bytes()];
-    let names = renderer.dispatched(|r| r.frame(3, &frame, 0)).expect("frame");
+    let names = renderer.dispatched_passes(|r| r.frame(3, &frame, 0)).expect("frame");
     assert_eq!(names, ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_depth"]);
 
     let sharper =

@@ -150,7 +150,7 @@ fn a_plane_that_moves_runs_again_alone() {
         ("mode = 'cube'\ncube = { inset = { left = 3 }, tilt = { left = [5, 0] } }", &["raycast_cube", "tone"]),
     ] {
         let scene = with(toml);
-        let names = renderer.dispatched(|r| r.change(scene.clone()).and_then(|_| r.picture())).expect("picture");
+        let names = renderer.dispatched_passes(|r| r.change(scene.clone()).and_then(|_| r.picture())).expect("picture");
         assert_eq!(names, expected, "{toml}");
         let fresh = rendered(&device, scene, &frames).picture().expect("picture");
         assert_eq!(renderer.picture().expect("picture"), fresh, "{toml}");

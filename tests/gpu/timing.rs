@@ -1,7 +1,7 @@
 //! Passes that are timed alone. Time stamps of whole pictures are looked at by `echolume verify`.
 
 use crate::common::gpu::*;
-use echolume::gpu::pass_runner::{PassRunner, Timed};
+use echolume::gpu::pass_runner::{PassRunner, PassTimer};
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name};
 use echolume::probe::Geometry;
 
@@ -23,7 +23,7 @@ fn a_timed_pass_works_on_the_contents_given() {
         let (first, last) =
             (DispatchArgs::default(), DispatchArgs { iteration: (pass.repeat)(&scene) - 1, ..DispatchArgs::default() });
         let (from, to) = ((pass.reads)(&scene, &first)[0], (pass.writes)(&scene, &last)[0]);
-        let mut timed = Timed::new(&devices[0], &scene, pass, &[(from.slot, picture.clone())]).expect("timed");
+        let mut timed = PassTimer::new(&devices[0], &scene, pass, &[(from.slot, picture.clone())]).expect("timed");
         assert!(timed.run().expect("run").expect("time stamps") > 0.0, "{name}");
         let got = timed.read(to.slot).expect("read").expect("an image");
 
@@ -44,7 +44,7 @@ fn a_timed_pass_works_on_the_contents_given() {
         }
         let (_, expected) = slots.iter().find(|(s, _)| *s == to.slot).expect("written");
         assert!(got == *expected, "{name}: timed and single dispatches differ");
-        let mut empty = Timed::new(&devices[1], &scene, pass, &[]).expect("timed");
+        let mut empty = PassTimer::new(&devices[1], &scene, pass, &[]).expect("timed");
         let zeros = empty.read(to.slot).expect("read").expect("an image");
         assert!(
             zeros != got && empty.read(Slot::Volume).expect("read").is_none(),

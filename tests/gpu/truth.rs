@@ -1,7 +1,7 @@
 //! The surface detector on the simulated sweep, against the head that was simulated.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::chain::distance_end;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::scene::{Input, Scene, Settings};
@@ -132,7 +132,7 @@ fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
         let mut settings: Settings = toml::from_str(SETTINGS).expect("settings");
         settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
         let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
-        let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+        let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         while let Some(frame) = recording.next_frame().expect("frame") {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }

@@ -2,7 +2,7 @@
 //! them pass is `cli`'s to say.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
+use echolume::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
 use echolume::passes::Span;
 use echolume::picture::Picture;
 use echolume::probe::Geometry;
@@ -110,7 +110,7 @@ fn memory_that_is_not_given_back_is_seen() {
     let context: Arc<Context> = bench().context.clone();
     let before = context.allocated();
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }");
-    let renderer: Result<Renderer, GpuError> = Renderer::new(&context, scene, &Options::default());
+    let renderer: Result<Renderer, GpuError> = Renderer::new(&context, scene, &RendererOptions::default());
     let mut found = Found::default();
     verify::failing::returned(&mut found, &context, before, "while it is there");
     assert!(found.faults[0].what.contains("are still held"), "{:?}", found.faults);

@@ -2,7 +2,7 @@
 //! bit, and frames are asked for anew only when more is to be seen.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::chain::rectangle;
 use echolume::passes::{DispatchArgs, Slot, Texels};
 use echolume::plan::Rerun;
@@ -269,14 +269,14 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
     let frames = scene.frames_seen();
     assert!(frames.len() < 8 && frames.len() > scene.seen.slices().len(), "{frames:?} of 9, {:?}", scene.seen);
     let bright = speckle(&scene);
-    let mut renderer = Renderer::new(&device, scene.clone(), &Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
     let recorded = renderer
-        .recorded(|r| {
+        .dispatch_extents(|r| {
             send(r, &bright, 0);
             r.picture()
         })
         .expect("recorded");
-    assert_eq!(renderer.skipped(), 9 - frames.len() as u64);
+    assert_eq!(renderer.skipped_frames(), 9 - frames.len() as u64);
     for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
         let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
@@ -321,7 +321,7 @@ fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
     let mut renderer = rendered(&device, middle.clone(), &frames);
     assert_eq!(renderer.picture().expect("picture"), fresh(&middle));
     assert!(without_frames(&renderer.change(small.clone()).expect("change")), "it shrinks");
-    let passes = renderer.dispatched(|r| r.picture()).expect("picture");
+    let passes = renderer.dispatched_passes(|r| r.picture()).expect("picture");
     assert!(passes[0] == "raycast_surface", "{passes:?}");
     assert_eq!(renderer.picture().expect("picture"), fresh(&small));
     assert!(without_frames(&renderer.change(middle.clone()).expect("change")), "what was there is there still");
@@ -350,6 +350,7 @@ fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
         assert!(without_frames(&renderer.change(scene.clone()).expect("change")));
         assert_eq!(renderer.picture().expect("picture"), fresh(scene));
     }
-    let recorded = renderer.recorded(|r| r.frame(4, &frames[4].encode(frame_format(&middle)), 0)).expect("frame");
+    let recorded =
+        renderer.dispatch_extents(|r| r.frame(4, &frames[4].encode(frame_format(&middle)), 0)).expect("frame");
     assert!(recorded.iter().all(|(_, [x, _, _])| *x < middle.grid.size[0]), "{recorded:?}");
 }

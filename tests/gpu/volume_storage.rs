@@ -1,7 +1,7 @@
 //! How the volume is stored for the rays: frames that are slices already are copied, and quads of neighbours are what eight texels are.
 
 use crate::common::gpu::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, chain, is_hit};
 use echolume::plan::Rerun;
@@ -144,7 +144,7 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     let first = renderer.picture().expect("picture");
     let packs = |r: &Renderer| r.plan().steps.iter().any(|s| s.pass.name == "quads");
     assert!(!packs(&renderer), "fewer than six samples a texel do not pay");
-    let software = renderer.fetch() == echolume::gpu::Fetch::Storage;
+    let software = renderer.texel_access() == echolume::gpu::TexelAccess::Storage;
     assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));
     assert_eq!(packs(&renderer), software, "a GPU filters by itself");
     assert!(difference(&renderer.picture().expect("picture"), &first).1 <= 1.0);
@@ -156,5 +156,5 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     others[7] = frames[3].clone();
     assert_eq!(changed.rgba, rendered(&device, still, &others).picture().expect("picture").rgba);
     let floats = of("ray.sampling = 'quads'\nslices = { format = 'r32f', still = true }");
-    assert!(!packs(&Renderer::new(&device, floats, &Options::default()).expect("renderer")));
+    assert!(!packs(&Renderer::new(&device, floats, &RendererOptions::default()).expect("renderer")));
 }

@@ -2,7 +2,7 @@
 
 use crate::scenes::alone;
 use crate::scenes::device;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{DispatchArgs, Slot, Stage, Texels, is_hit};
 use echolume::picture::Grey;
 use echolume::plan::Plan;
@@ -78,7 +78,7 @@ fn rays_meet_the_surface_where_the_body_has_it() {
         let scene = scene(&conditions).expect("scene");
         let (step, rays) = (scene.step, scene.rays);
         let face = scene.probe().expect("a sweep").array_radius();
-        let mut renderer = Renderer::new(&device(), scene, &Options::default()).expect("renderer");
+        let mut renderer = Renderer::new(&device(), scene, &RendererOptions::default()).expect("renderer");
         for frame in frames(conditions.frames, conditions.lines) {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }

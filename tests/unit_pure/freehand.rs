@@ -18,7 +18,7 @@ fn straight(grid: &Grid, slice: f64) -> DAffine3 {
 }
 
 fn options() -> CompoundingOptions {
-    CompoundingOptions { widest_hole: 0.0, ..CompoundingOptions::default() }
+    CompoundingOptions { max_hole: 0.0, ..CompoundingOptions::default() }
 }
 
 fn compounder(grid: Grid, stored: StoredType, options: CompoundingOptions) -> Compounder {
@@ -182,7 +182,7 @@ fn holes_up_to_the_width_are_bridged_and_wider_ones_stay_empty() {
         for gap in 1..=5usize {
             let grid = grid([4, 4, 12], 0.5);
             let mut compounder =
-                compounder(grid, stored, CompoundingOptions { widest_hole: 1.5, ..CompoundingOptions::default() });
+                compounder(grid, stored, CompoundingOptions { max_hole: 1.5, ..CompoundingOptions::default() });
             for (slice, value) in [(2, low), (3 + gap, high)] {
                 let values = floats(&[value; 16]);
                 compounder.push(&frame(straight(&grid, slice as f64), [4, 4], StoredType::F32, &values)).unwrap();
@@ -207,7 +207,7 @@ fn holes_up_to_the_width_are_bridged_and_wider_ones_stay_empty() {
 fn only_slices_near_a_frame_are_given_out_again() {
     let grid = grid([4, 3, 20], 1.0);
     let mut compounder =
-        compounder(grid, StoredType::U8, CompoundingOptions { widest_hole: 2.0, ..CompoundingOptions::default() });
+        compounder(grid, StoredType::U8, CompoundingOptions { max_hole: 2.0, ..CompoundingOptions::default() });
     assert!(compounder.changed_slices().is_empty());
     let push = |compounder: &mut Compounder, slice: f64, value: u8| {
         compounder.push(&frame(straight(&grid, slice), [4, 3], StoredType::U8, &[value; 12])).unwrap()
@@ -348,7 +348,7 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     }
     // Coarser until it fits, and not much coarser than that.
     for most in [100_000, 1000, 1] {
-        let options = CompoundingOptions { most_voxels: most, spacing: Some(0.05), ..options.clone() };
+        let options = CompoundingOptions { max_voxels: most, spacing: Some(0.05), ..options.clone() };
         let Grid { size, spacing, .. } = Lattice::around(&poses, &options).unwrap().grid;
         let count: usize = size.iter().product();
         assert!(count <= most && spacing[0] == spacing[2] && (most == 1 || count > most / 3), "{size:?}");
@@ -381,13 +381,13 @@ fn a_volume_that_is_too_large_is_refused_before_anything_is_allocated() {
         (grid([1 << 21, 1 << 21, 1 << 21], 1.0), options(), "at most 33554432"),
         (
             grid([1 << 12, 1 << 12, 1 << 12], 1.0),
-            CompoundingOptions { most_voxels: huge, ..options() },
+            CompoundingOptions { max_voxels: huge, ..options() },
             "at most 2147483648",
         ),
         (grid([4, 0, 4], 1.0), options(), "size"),
         (grid([4, 4, 4], f64::NAN), options(), "spacing"),
-        (grid([4, 4, 4], 1.0), CompoundingOptions { widest_hole: 65.0, ..options() }, "widest hole"),
-        (grid([4, 4, 4], 1.0), CompoundingOptions { widest_hole: f64::NAN, ..options() }, "widest hole"),
+        (grid([4, 4, 4], 1.0), CompoundingOptions { max_hole: 65.0, ..options() }, "widest hole"),
+        (grid([4, 4, 4], 1.0), CompoundingOptions { max_hole: f64::NAN, ..options() }, "widest hole"),
     ] {
         let refused = Compounder::new(Lattice::straight(grid), StoredType::U8, options).err().unwrap();
         assert!(refused.contains(named) && refused.lines().count() == 1, "{refused}");
@@ -409,7 +409,7 @@ proptest! {
         values in prop::collection::vec(any::<f32>(), 64),
     ) {
         let grid = Grid { size: [5, 6, 7], spacing: [1.0; 3], origin: [-2.0; 3] };
-        let options = CompoundingOptions { splat, overlap, clip, most_voxels: 20_000, ..CompoundingOptions::default() };
+        let options = CompoundingOptions { splat, overlap, clip, max_voxels: 20_000, ..CompoundingOptions::default() };
         let mut compounder = compounder(grid, StoredType::F32, options.clone());
         let mut poses = Vec::new();
         for numbers in numbers.chunks(12) {

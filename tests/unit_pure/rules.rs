@@ -48,7 +48,7 @@ fn layers_hold() {
         ("src/source", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
         ("src/plan", &["crate::gpu", "ash::vk"]),
         ("src/barriers", &["crate::gpu", "ash::vk"]),
-        ("src/queues.rs", &["crate::gpu", "ash::vk"]),
+        ("src/queues", &["crate::gpu", "ash::vk"]),
         ("src/spirv", &["crate::gpu", "crate::passes", "ash::vk"]),
         ("src/shader_source.rs", &["crate::", "ash::vk"]),
         ("src/files", &["crate::", "ash::vk"]),

@@ -3,11 +3,11 @@
 use crate::desktop::*;
 use echolume::picture::Picture;
 
-/// The window of these tests, and the picture that the panels leave room for: what `ui::panels::place` says.
+/// The window of these tests, and the picture that the panels leave room for: what `ui::panels::picture_area` says.
 const WINDOW: [u32; 2] = [1000, 700];
 
 fn picture() -> ([u32; 2], [u32; 2]) {
-    echolume::ui::panels::place(WINDOW, 1.0, true)
+    echolume::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
 /// Waits until the middle of the picture, which no mark lies on, is that of a headless one.

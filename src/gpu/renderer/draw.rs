@@ -1,9 +1,15 @@
-//! From volumes to pictures: what changed is run again, here and now or while the host does something else.
+//! Stages 2 to 4: draws pictures from volumes, synchronously or while the host does other work. Only steps whose inputs changed
+//! run again.
 
 use super::*;
+#[cfg(feature = "view")]
+use crate::gpu::window::screen::{Drawn, Panels, PresentOutcome, Screen};
 
 impl Renderer {
-    /// All frames of volume image `image` that are to be seen have been sent: the next picture shows it.
+    /// The next picture shows volume image `image`. All of its visible frames must have been sent.
+    ///
+    /// # Errors
+    /// An image that does not exist; a device that fails.
     pub fn show(&mut self, image: u32) -> Result<(), GpuError> {
         self.check(image)?;
         self.flush()?;
@@ -12,14 +18,20 @@ impl Renderer {
         Ok(())
     }
 
-    /// Runs what changed since the last picture and brings the result back; where nothing changed, nothing runs.
+    /// Draws a picture and copies it to the host. If nothing changed since the last picture, nothing runs.
+    ///
+    /// # Errors
+    /// A device that fails; a failed change of scene.
     pub fn picture(&mut self) -> Result<Picture, GpuError> {
         self.begin_picture()?;
         self.end_picture()
     }
 
-    /// Sends off what changed since the last picture. Frames may be sent meanwhile, but not into the slices that it shows unless they
-    /// may wait for it. One picture is on its way at a time: another is waited for.
+    /// Submits the steps that have changed since the last picture. Frames may be sent meanwhile; those for slices that the picture
+    /// shows wait for it. If a picture is in flight, this waits for it first.
+    ///
+    /// # Errors
+    /// A device that fails; a failed change of scene.
     pub fn begin_picture(&mut self) -> Result<(), GpuError> {
         self.check(self.shown)?;
         if self.drawing {
@@ -31,18 +43,24 @@ impl Renderer {
         }
     }
 
-    /// Whether a picture is on its way and not done.
+    /// True if a picture is in flight.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn is_drawing(&self) -> Result<bool, GpuError> {
         Ok(self.drawing && !self.picture.is_done(&self.timelines)?)
     }
 
-    /// Whether there is a picture of this size, done or on its way.
+    /// True if there is a picture of the current size, done or in flight.
     pub fn has_drawn(&self) -> bool {
         self.drawn
     }
 
-    /// Waits for the picture that is on its way; the last one, where there is none. Where pictures stay on the device this one is brought
-    /// back now.
+    /// Waits for the picture in flight and returns it; without one, returns the last picture. With pictures that stay on the
+    /// device, copies it to the host now.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
         self.wait_drawn()?;
         let [width, height] = self.scene.picture_size();
@@ -53,25 +71,28 @@ impl Renderer {
         Ok(Picture { width, height, rgba })
     }
 
-    /// The same without bringing it back, where pictures stay on the device.
+    /// Waits for the picture in flight. Returns it, or `None` if pictures stay on the device.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn end_drawing(&mut self) -> Result<Option<Picture>, GpuError> {
         match self.readback.is_some() {
             true => self.end_picture().map(Some),
             false => {
                 self.wait_drawn()?;
-                // Whoever watches wants the times of what is shown, not of what was shown before.
-                self.picture.collect(&self.timelines, &mut self.measured).map(|()| None)
+                // So that the times are those of this picture, not of the one before.
+                self.picture.collect(&self.timelines, &mut self.timings).map(|()| None)
             }
         }
     }
 
-    /// Waits for the picture that is on its way.
+    /// Waits for the picture in flight.
     pub(super) fn wait_drawn(&mut self) -> Result<(), GpuError> {
         if !self.drawing {
             return Ok(());
         }
         let (picture, timelines) = (&self.picture, &self.timelines);
-        let done = self.measured.host("wait", || picture.wait(timelines));
+        let done = self.timings.host("wait", || picture.wait(timelines));
         match done.is_ok() {
             true => self.drawing = false,
             false => self.stale.iter_mut().for_each(|stale| *stale = true),
@@ -82,44 +103,70 @@ impl Renderer {
     fn draw(&mut self) -> Result<(), GpuError> {
         self.flush()?;
         self.plan.complete(&self.scene, &mut self.stale, &self.contents);
-        self.picture.collect(&self.timelines, &mut self.measured)?;
-        self.picture.begin(&mut self.order, &self.timelines)?;
-        let unseen = &self.unseen[self.shown as usize];
+        self.picture.collect(&self.timelines, &mut self.timings)?;
+        self.picture.begin(&mut self.barriers, &self.timelines)?;
+        let unprocessed = &self.unprocessed[self.shown as usize];
         let steps = self.plan.steps_of(Frequency::Volume).chain(self.plan.steps_of(Frequency::Picture));
         for (i, step) in steps.filter(|(i, _)| self.stale[*i]) {
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             let runs: Vec<_> = match step.pass.frequency {
                 Frequency::Volume => {
                     let (low, high) = (scene.seen.low[2], scene.seen.high[2]);
-                    let runs = affected(unseen, step.reach(scene)).into_iter();
+                    let runs = affected(unprocessed, step.reach(scene)).into_iter();
                     runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
                 }
                 _ => std::iter::once(0..0).collect(),
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
-                self.filtered = scene.seen;
+                self.filtered_bounds = scene.seen;
             }
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
                 let args = DispatchArgs { image: self.shown, slice, slices, ..step.args() };
-                let work = Work { slots, pipeline, scene, pass: step.pass, args: &args };
-                self.picture.dispatch(&mut self.order, &work)?;
+                let dispatch = Dispatch { slots, pipeline, scene, pass: step.pass, args: &args };
+                self.picture.dispatch(&mut self.barriers, &dispatch)?;
             }
-            // Taken as written from here on: if the submission fails, all of it is stale still.
+            // The slots count as written from here on. If the submission fails, all steps stay stale.
             self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
         }
         if let (Some(screen), Some(readback)) = (self.slots.image(Slot::Screen, 0), &self.readback) {
-            self.picture.copy_out(&mut self.order, screen, Slot::Screen, 0, readback);
+            self.picture.copy_out(&mut self.barriers, screen, Slot::Screen, 0, readback);
             self.picture.stamp("readback");
         }
-        let (picture, order, timelines) = (&mut self.picture, &mut self.order, &mut self.timelines);
-        self.measured.host("submit", || picture.submit(order, timelines))?;
+        let (picture, barriers, timelines) = (&mut self.picture, &mut self.barriers, &mut self.timelines);
+        self.timings.host("submit", || picture.submit(barriers, timelines))?;
         (self.drawing, self.drawn) = (true, true);
-        // A frame that arrives from here on is seen the next time, and so is one whose volume was not shown.
+        // Frames that arrive from here on are processed with the next picture.
         if self.plan.steps_of(Frequency::Volume).all(|(i, _)| self.stale[i]) {
-            self.unseen[self.shown as usize].iter_mut().for_each(|unseen| *unseen = false);
+            self.unprocessed[self.shown as usize].iter_mut().for_each(|unprocessed| *unprocessed = false);
         }
         self.stale.iter_mut().for_each(|stale| *stale = false);
         Ok(())
+    }
+}
+
+#[cfg(feature = "view")]
+impl Renderer {
+    /// Presents the last picture, with its upper left corner at pixel `at` of the window, and panels over it. A picture in flight is
+    /// waited for on the device and presented.
+    ///
+    /// # Errors
+    /// A device that fails, or a lost surface that cannot be recreated.
+    pub fn present(
+        &mut self,
+        screen: &mut Screen,
+        at: [u32; 2],
+        panels: Option<Panels>,
+    ) -> Result<PresentOutcome, GpuError> {
+        self.check(self.shown)?;
+        let drawn = self.slots.image(Slot::Screen, 0).map(|image| Drawn {
+            image,
+            barriers: &mut self.barriers,
+            timelines: &mut self.timelines,
+            at,
+        });
+        let outcome = screen.show_with(drawn, panels);
+        self.presented = self.timelines.of(0).submitted;
+        outcome
     }
 }

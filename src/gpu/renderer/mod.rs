@@ -1,61 +1,60 @@
-//! The four stages on one device: frames in, pictures out. Each frame takes a lane of a ring (staging buffer, layer of the
-//! frame array, command buffer), so that several are on their way at once; a picture re-runs what changed and nothing else.
+//! The four stages on one device: frames in, pictures out. Each frame uses an entry of a ring (staging buffer, layer of the frame
+//! array, command buffer), so that several are in flight. A picture runs only the passes whose inputs changed.
 
-mod change;
 mod draw;
-mod frames;
-mod inspect;
-#[cfg(feature = "view")]
-mod present;
-mod slab;
+mod ingest;
 
-use super::GpuError;
+use super::async_compiler::{AsyncPipelineCompiler, Wake};
 use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
-use super::measured::Measured;
-use super::pipelines::{AsyncPipelineCompiler, Fetch, Pipeline, Pipelines, Shaders, Wake, embedded};
-use super::recorder::{Place, Recorder, Work};
-use super::resources::{Buffer, Purpose};
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
+use super::recorder::{Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, shape_size};
 use super::slots::Slots;
 use super::timeline::Timelines;
-use crate::barriers::oracle::Log;
+use super::timing::Timings;
 use crate::passes::chain;
-use crate::passes::slots::{FRAMES_IN_FLIGHT, Format, Initializer, Shape};
+use crate::passes::slots::{FRAMES_IN_FLIGHT, Format, Initializer};
 use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Texels};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
-use crate::queues::{Queues, Work as Task};
+use crate::queues::oracle::SubmissionLog;
+use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
 use std::collections::HashSet;
 use std::sync::Arc;
 
+/// How a [`Renderer`] runs.
 #[derive(Clone)]
-pub struct Options {
-    /// Volume images that take turns: 1 for a still picture, 2 or 3 while frames arrive during rendering.
+pub struct RendererOptions {
+    /// Number of volume images: 1 for a still picture, 2 or 3 (double or triple buffering) while frames arrive during rendering.
     pub volume_images: u32,
+    /// Where the SPIR-V of a shader comes from; the embedded shaders by default.
     pub shaders: Arc<Shaders>,
-    /// Keep every span of time, host and device, and count invocations.
+    /// Record a span of time for each host and device operation, and count shader invocations.
     pub spans: bool,
-    /// How single texels are read; what is fast on the device unless given.
-    pub fetch: Option<Fetch>,
-    /// Queues that share the work, 1..=3; as many as the device has for different work unless given. Where it has fewer than given,
-    /// several are one.
+    /// How single texels are read; `None` selects what is fast on the device.
+    pub texel_access: Option<TexelAccess>,
+    /// Number of queues, 1..=3; `None` uses all that the device has. With fewer on the device than given, several of them share
+    /// one.
     pub queues: Option<usize>,
-    /// Bring every picture back; otherwise it stays on the device, where it is shown.
+    /// Copy every picture to the host. Otherwise it stays on the device, for presentation.
     pub readback: bool,
-    /// Called when something was made beside the drawing.
+    /// Called when a pipeline has been compiled in the background.
     pub wake: Option<Wake>,
-    /// Keep a log of all that is recorded: [`Renderer::log`].
+    /// Keep a log of everything that is recorded and submitted: [`Renderer::log`].
     pub log: bool,
 }
 
-impl Default for Options {
+impl Default for RendererOptions {
     fn default() -> Self {
-        Options {
+        RendererOptions {
             volume_images: 1,
             shaders: embedded(),
             spans: false,
-            fetch: None,
+            texel_access: None,
             queues: None,
             readback: true,
             wake: None,
@@ -64,162 +63,188 @@ impl Default for Options {
     }
 }
 
-struct Lane {
-    /// Copies the samples in, where a queue of its own does that.
+/// An entry of the ring: one upload in flight.
+struct InFlight {
+    /// Copies the samples, if the device has a queue for copies.
     copier: Option<Recorder>,
     recorder: Recorder,
     staging: Buffer,
 }
 
+/// A frame of which some lines have arrived in the staging buffer of a ring entry.
+struct PartialFrame {
+    slice: u32,
+    image: u32,
+    /// Bytes that have arrived.
+    received: usize,
+}
+
+impl PartialFrame {
+    /// Its slice, its volume image, and its bytes that have arrived.
+    fn place(&self) -> (u32, u32, usize) {
+        (self.slice, self.image, self.received)
+    }
+}
+
+/// Consecutive slices in the staging buffer of a ring entry that are not submitted yet.
+struct SliceBatch {
+    image: u32,
+    first: u32,
+    count: u32,
+}
+
+/// Renders one scene: frames are sent into volume images, and pictures come out. The scene can be changed at any time.
 pub struct Renderer {
-    // Dropped in this order, after `drop` has waited for the device.
-    lanes: Vec<Lane>,
+    // Fields are dropped in this order, after `drop` has waited for the device.
+    ring: Vec<InFlight>,
     picture: Recorder,
-    /// None: pictures stay on the device.
+    /// `None` if pictures stay on the device.
     readback: Option<Buffer>,
     slots: Slots,
     steps: Vec<Arc<Pipeline>>,
-    /// Started when it is needed first.
-    beside: Option<AsyncPipelineCompiler>,
+    /// Started at its first use.
+    compiler: Option<AsyncPipelineCompiler>,
     pipelines: Arc<Pipelines>,
     timelines: Timelines,
-    order: BarrierRecorder,
+    barriers: BarrierRecorder,
     context: Arc<Context>,
     plan: Plan,
     scene: Scene,
-    /// Steps of the volume and the picture that have to run before the next picture.
+    /// By step of the plan: it has to run before the next picture.
     stale: Vec<bool>,
-    /// Which step wrote each slot last.
+    /// The step that last wrote each slot.
     contents: Contents,
-    /// By volume image and slice: what the passes over the volume have not seen yet.
-    unseen: Vec<Vec<bool>>,
-    /// Why the last change of scene was left half done.
+    /// By volume image and slice: the passes over the volume have not processed it yet.
+    unprocessed: Vec<Vec<bool>>,
+    /// The error that left the last change of scene incomplete.
     broken: Option<String>,
-    /// One-shot staging buffers, kept until the device is done with them.
+    /// Buffers of a single copy, kept until the device is done with them.
     uploads: Vec<Buffer>,
     volume_images: u32,
-    next_lane: usize,
+    ring_index: usize,
     /// The frame whose lines are arriving.
-    arriving: Option<frames::Arriving>,
-    /// Frames that were given up because another began before all of their lines had come.
-    torn: u64,
-    /// Slices that wait to be copied together.
-    slab: Option<slab::Slab>,
-    /// A picture is on its way.
+    partial: Option<PartialFrame>,
+    /// Frames that were dropped because another began before all of their lines had arrived.
+    incomplete: u64,
+    /// Slices that will be copied together.
+    batch: Option<SliceBatch>,
+    /// A picture has been submitted and not waited for.
     drawing: bool,
-    /// The picture's image holds one.
+    /// The picture's image holds a picture, or will when the device is done.
     drawn: bool,
-    /// The value of the first queue's timeline at which it has been shown.
+    /// The value of queue 0's timeline at which the last presentation is done.
     presented: u64,
-    /// The volume image that is shown.
+    /// The volume image that pictures show.
     shown: u32,
-    /// What all frames that were sent have been filtered over, at least.
-    filtered: VisibleBounds,
+    /// The smallest region that stage 1 has filtered for any frame since the last reset.
+    filtered_bounds: VisibleBounds,
+    /// Frames that are not visible in their scene.
     skipped: u64,
-    measured: Measured,
+    timings: Timings,
     spans: bool,
-    fetch: Fetch,
+    texel_access: TexelAccess,
     wake: Option<Wake>,
 }
 
 impl Renderer {
-    /// Makes everything the scene needs, and nothing else.
+    /// Allocates the slots and compiles the pipelines that the scene needs.
     ///
     /// # Errors
-    /// What the device cannot hold or compile, named.
-    pub fn new(context: &Arc<Context>, scene: Scene, options: &Options) -> Result<Renderer, GpuError> {
-        let fetch = options.fetch.unwrap_or(Fetch::of(&context.candidate));
-        let scene = super::formats::suited(context, fetch, scene);
+    /// A slot that the device cannot hold, or a shader that does not compile; the error names it.
+    pub fn new(context: &Arc<Context>, scene: Scene, options: &RendererOptions) -> Result<Renderer, GpuError> {
+        let texel_access = options.texel_access.unwrap_or(TexelAccess::for_device(&context.candidate));
+        let scene = formats::adapt_scene(context, texel_access, scene);
         let plan = Plan::new(&scene);
-        super::formats::check(context, &plan, &scene)?;
-        let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), fetch)?);
+        formats::check(context, &plan, &scene)?;
+        let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), texel_access)?);
         let steps = pipelines_of(&pipelines, &plan, &scene)?;
-        let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, crate::queues::MOST);
+        let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut renderer = Renderer {
-            lanes: Vec::new(),
+            ring: Vec::new(),
             picture: Recorder::new(context, 0, "picture", options.spans)?,
             readback: options.readback.then(|| readback(context, &scene)).transpose()?,
             slots: Slots::new(context, options.volume_images.max(1)),
             steps,
-            beside: None,
+            compiler: None,
             pipelines,
             timelines: Timelines::new(context, queues)?,
-            order: BarrierRecorder {
-                queues: Queues::new(queues),
-                log: options.log.then(Log::default),
+            barriers: BarrierRecorder {
+                queues: QueueTracker::new(queues),
+                log: options.log.then(SubmissionLog::default),
                 ..BarrierRecorder::default()
             },
             context: context.clone(),
             stale: vec![true; plan.steps.len()],
             contents: Contents::new(),
-            unseen: Vec::new(),
+            unprocessed: Vec::new(),
             broken: None,
             uploads: Vec::new(),
             volume_images: options.volume_images.max(1),
             plan,
-            filtered: scene.seen,
+            filtered_bounds: scene.seen,
             skipped: 0,
             scene,
-            next_lane: 0,
-            arriving: None,
-            torn: 0,
-            slab: None,
+            ring_index: 0,
+            partial: None,
+            incomplete: 0,
+            batch: None,
             drawing: false,
             drawn: false,
             presented: 0,
             shown: 0,
-            measured: Measured::new(context, options.spans),
+            timings: Timings::new(context, options.spans),
             spans: options.spans,
-            fetch,
+            texel_access,
             wake: options.wake.clone(),
         };
-        renderer.lanes = renderer.new_lanes()?;
-        renderer.forget_volumes();
+        renderer.ring = renderer.new_ring()?;
+        renderer.invalidate_volumes();
         renderer.fit()?;
         Ok(renderer)
     }
 
+    /// The passes and slots of the current scene.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// The scene that is shown, with what the device decides of it decided.
+    /// The current scene, with the fields that the device resolves.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
     /// How single texels are read.
-    pub fn fetch(&self) -> Fetch {
-        self.fetch
+    pub fn texel_access(&self) -> TexelAccess {
+        self.texel_access
     }
 
-    /// Bytes of a frame as this scene expects it.
+    /// Bytes of a frame of the current scene.
     pub fn frame_bytes(&self) -> usize {
         frame_bytes(&self.scene) as usize
     }
 
-    /// No slice of any volume image has been seen by the passes over the volume.
-    fn forget_volumes(&mut self) {
-        self.unseen = vec![vec![true; self.scene.slices() as usize]; self.volume_images as usize];
+    /// Marks every slice of every volume image as unprocessed.
+    fn invalidate_volumes(&mut self) {
+        self.unprocessed = vec![vec![true; self.scene.slices() as usize]; self.volume_images as usize];
     }
 
-    /// Makes and fills the slots that are not there yet.
+    /// Allocates and fills the slots that are missing.
     fn fit(&mut self) -> Result<(), GpuError> {
         let new = self.slots.fit(&self.plan, &self.scene)?;
         self.drawn &= !new.iter().any(|(slot, _)| *slot == Slot::Screen);
         if new.is_empty() {
             return Ok(());
         }
-        self.picture.begin(&mut self.order, &self.timelines)?;
-        self.picture.clear_new(&mut self.order, &self.slots, &new);
-        self.picture.submit(&mut self.order, &mut self.timelines)?;
+        self.picture.begin(&mut self.barriers, &self.timelines)?;
+        self.picture.clear_new(&mut self.barriers, &self.slots, &new);
+        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
         for (slot, _) in new {
             self.fill(slot)?;
         }
         self.timelines.wait_all()
     }
 
-    /// Uploads a slot that is made from the scene. Nothing that reads it may be in flight.
+    /// Uploads a slot that the CPU computes from the scene. Nothing that reads it may be in flight.
     fn fill(&mut self, slot: Slot) -> Result<(), GpuError> {
         let Initializer::ByScene(make) = slot.filled() else { return Ok(()) };
         if self.slots.image(slot, 0).is_none() {
@@ -235,16 +260,21 @@ impl Renderer {
         let mut staging = Buffer::new(&self.context, "upload", slot.bytes(&self.scene), Purpose::Staging)?;
         let length = bytes.len().min(staging.bytes().len());
         staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-        self.picture.begin(&mut self.order, &self.timelines)?;
-        self.picture.copy_in(&mut self.order, &staging, image, Place { slot, copy, parts: 0..image.shape.parts() });
+        self.picture.begin(&mut self.barriers, &self.timelines)?;
+        self.picture.copy_in(
+            &mut self.barriers,
+            &staging,
+            image,
+            SlotParts { slot, copy, parts: 0..image.shape.parts() },
+        );
         self.uploads.push(staging);
-        self.picture.submit(&mut self.order, &mut self.timelines)?;
+        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
         self.timelines.wait_all()?;
         self.uploads.clear();
         Ok(())
     }
 
-    /// Refuses to go on with a scene that was left half changed, or an image that is not there.
+    /// An error if the last change of scene failed, or if there is no such volume image.
     fn check(&self, image: u32) -> Result<(), GpuError> {
         if let Some(fault) = &self.broken {
             return Err(GpuError::Broken(fault.clone()));
@@ -255,31 +285,224 @@ impl Renderer {
         }
     }
 
-    /// Waits until the device has done everything, and adds up what was measured.
+    /// Waits until the device is idle, and adds up the measured times.
     fn collect(&mut self) -> Result<(), GpuError> {
         self.flush()?;
         self.timelines.wait_all()?;
-        for lane in &mut self.lanes {
-            lane.collect(&self.timelines, &mut self.measured)?;
+        for entry in &mut self.ring {
+            entry.collect(&self.timelines, &mut self.timings)?;
         }
-        self.picture.collect(&self.timelines, &mut self.measured)
+        self.picture.collect(&self.timelines, &mut self.timings)
+    }
+}
+
+impl Renderer {
+    /// True if `scene` differs from the current one, ignoring fields that the device resolves.
+    pub fn differs_from(&self, scene: &Scene) -> bool {
+        (&scene.geometry, &scene.settings, scene.input, scene.seen)
+            != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.seen)
     }
 
-    fn new_lanes(&self) -> Result<Vec<Lane>, GpuError> {
-        let (context, count) = (&self.context, self.order.queues.count());
-        let bytes = slab::frames_a_lane(&self.scene) * frame_bytes(&self.scene);
-        let (copy, ingest) = (Task::Copy.queue(count), Task::Ingest.queue(count));
-        // Slices of a 3D image are not sub-resources: not every queue may copy one alone.
-        let copies = copy != ingest && (chain::copied(&self.scene).is_none() || context.queue(copy).copies_slices);
-        let lane = |_| {
-            let copier = || Recorder::new(context, copy, "copy", false);
-            Ok(Lane {
-                copier: copies.then(copier).transpose()?,
-                recorder: Recorder::new(context, ingest, "frame", self.spans)?,
-                staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
-            })
+    /// True if the last change of scene failed halfway: nothing can be drawn until another change succeeds.
+    pub fn needs_rebuild(&self) -> bool {
+        self.broken.is_some()
+    }
+
+    /// True if every pipeline of this scene is compiled. Those that are not are compiled in the background from now on, and
+    /// [`RendererOptions::wake`] is called after each.
+    ///
+    /// # Errors
+    /// A shader that does not compile, or a slot that the device cannot hold.
+    pub fn prepare(&mut self, scene: &Scene) -> Result<bool, GpuError> {
+        let scene = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
+        let plan = Plan::new(&scene);
+        formats::check(&self.context, &plan, &scene)?;
+        let compiler = match &mut self.compiler {
+            Some(compiler) => compiler,
+            None => self.compiler.insert(AsyncPipelineCompiler::new(&self.pipelines, self.wake.clone())?),
         };
-        (0..FRAMES_IN_FLIGHT).map(lane).collect()
+        compiler.prepare(&self.pipelines, &plan, &scene)
+    }
+
+    /// Changes the scene. The next picture runs the passes that this affects. If it returns [`Rerun::Everything`] or
+    /// [`Rerun::Frames`], all frames have to be sent again first.
+    ///
+    /// # Errors
+    /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory runs out
+    /// halfway, nothing can be drawn until another change succeeds; that one rebuilds everything.
+    pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
+        let scene = formats::adapt_scene(&self.context, self.texel_access, scene);
+        let plan = Plan::new(&scene);
+        // After the visible region shrank, the volume still holds the larger one.
+        let before = Scene { seen: self.filtered_bounds, ..self.scene.clone() };
+        let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
+        formats::check(&self.context, &plan, &scene)?;
+        let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
+        // Frames in flight use nothing that such a change touches, so only the picture is waited for.
+        let touched = |slots: &[Slot]| {
+            plan.steps_of(Frequency::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)))
+        };
+        self.wait_presented()?;
+        match &rerun {
+            Rerun::Steps { slots, .. } if !touched(slots) => self.wait_drawn()?,
+            _ => self.collect()?,
+        }
+        let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
+        self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
+        (self.plan, self.steps, self.scene) = (plan, steps, scene);
+        self.broken = None;
+        if !matches!(rerun, Rerun::Steps { .. }) {
+            self.filtered_bounds = self.scene.seen;
+        }
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
+    /// Compiles the pipelines that use `shaders` again, because their source changed. Returns what has to run again, as
+    /// [`Renderer::change`] does.
+    ///
+    /// # Errors
+    /// A shader that does not exist, or that disagrees with the declaration of its pass. The previous pipelines stay.
+    pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
+        if let Some(fault) = &self.broken {
+            return Err(GpuError::Broken(fault.clone()));
+        }
+        // Its thread may be compiling the previous source.
+        self.compiler = None;
+        self.wait_presented()?;
+        self.collect()?;
+        self.steps = self.pipelines.recompile(shaders, &self.plan, &self.scene)?;
+        let rerun = self.plan.rerun_shaders(&self.scene, |shader| shaders.contains(shader));
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
+    /// Waits until the last presentation has read the picture's image.
+    fn wait_presented(&self) -> Result<(), GpuError> {
+        self.timelines.of(0).wait(self.presented)
+    }
+
+    fn rebuild(&mut self, rerun: &Rerun) -> Result<(), GpuError> {
+        let refilled = match rerun {
+            Rerun::Steps { steps, slots } => {
+                steps.iter().for_each(|i| self.stale[*i] = true);
+                if steps.iter().any(|i| self.plan.steps[*i].pass.frequency == Frequency::Volume) {
+                    self.invalidate_volumes();
+                }
+                slots.clone()
+            }
+            Rerun::Frames | Rerun::Everything => {
+                self.stale.iter_mut().for_each(|stale| *stale = true);
+                self.invalidate_volumes();
+                if *rerun == Rerun::Everything {
+                    // Their bytes are in the ring that is replaced.
+                    self.incomplete += u64::from(self.partial.take().is_some());
+                    self.batch = None;
+                    self.slots.clear();
+                    self.ring = self.new_ring()?;
+                    self.ring_index = 0;
+                }
+                self.plan.slots.clone()
+            }
+        };
+        self.fit()?;
+        for slot in refilled {
+            self.fill(slot)?;
+        }
+        if self.readback.as_ref().is_some_and(|r| r.size != Slot::Screen.bytes(&self.scene)) {
+            self.readback = Some(readback(&self.context, &self.scene)?);
+        }
+        Ok(())
+    }
+}
+
+impl Renderer {
+    /// The current content of an image slot. `None` for a slot that is not in the plan, and for a lookup table in a buffer.
+    ///
+    /// # Errors
+    /// A device that fails; a failed change of scene.
+    pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
+        let there = self.bring_back(slot)?;
+        Ok(there.map(|(buffer, size, format)| Texels::decode(size, format, buffer.bytes())))
+    }
+
+    /// The current bytes of an image slot, its texels along x, y, z, and their format.
+    pub(super) fn bring_back(&mut self, slot: Slot) -> Result<Option<(Buffer, [usize; 3], Format)>, GpuError> {
+        self.check(self.shown)?;
+        self.flush()?;
+        let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
+        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
+        let (format, size) = (image.format, shape_size(image.shape));
+        let copy = if slot.is_multibuffered() { self.shown } else { 0 };
+        self.picture.collect(&self.timelines, &mut self.timings)?;
+        self.picture.begin(&mut self.barriers, &self.timelines)?;
+        self.picture.copy_out(&mut self.barriers, image, slot, copy, &buffer);
+        self.picture.submit(&mut self.barriers, &mut self.timelines)?;
+        let done = self.timelines.wait_all();
+        if done.is_err() {
+            // The copy may still be running: the buffer must outlive it.
+            self.uploads.push(buffer);
+            return done.map(|()| None);
+        }
+        Ok(Some((buffer, size, format)))
+    }
+
+    /// Waits for the device, and returns the times of every pass and copy since the last call, ns. Empty if the device has no
+    /// time stamps.
+    pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
+        self.collect()?;
+        Ok(self.timings.take_times())
+    }
+
+    /// As [`Renderer::take_times`], without waiting for work in flight.
+    pub fn times_so_far(&mut self) -> Vec<PassTime> {
+        self.timings.take_times()
+    }
+
+    /// Waits for the device, and returns every span since the last call, ns on the host's clock; empty without
+    /// [`RendererOptions::spans`].
+    pub fn take_spans(&mut self) -> Result<Vec<Span>, GpuError> {
+        self.collect()?;
+        Ok(self.timings.take_spans())
+    }
+
+    /// The names of the passes that `work` dispatches, in order.
+    pub fn dispatched_passes<T>(
+        &mut self,
+        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
+    ) -> Result<Vec<&'static str>, GpuError> {
+        Ok(self.dispatch_extents(work)?.into_iter().map(|(name, _)| name).collect())
+    }
+
+    /// The names of the passes that `work` dispatches, and their invocations along x, y, z.
+    pub fn dispatch_extents<T>(
+        &mut self,
+        work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,
+    ) -> Result<Vec<(&'static str, [u32; 3])>, GpuError> {
+        self.barriers.dispatched = Some(Vec::new());
+        let done = work(self);
+        let dispatched = self.barriers.dispatched.take().unwrap_or_default();
+        done.map(|_| dispatched)
+    }
+
+    /// Number of frames so far that were not visible in their scene and were not uploaded.
+    pub fn skipped_frames(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Number of barriers recorded so far.
+    pub fn barriers(&self) -> u32 {
+        self.barriers.count
+    }
+
+    /// Everything recorded and submitted so far, with [`RendererOptions::log`].
+    pub fn log(&self) -> Option<&SubmissionLog> {
+        self.barriers.log.as_ref()
+    }
+
+    /// Fault injection: leaves out the n-th barrier (1 is the first ever recorded).
+    pub fn drop_barrier(&mut self, n: u32) {
+        self.barriers.drop_barrier = Some(n);
     }
 }
 
@@ -293,15 +516,6 @@ fn frame_bytes(scene: &Scene) -> u64 {
 
 fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Buffer, GpuError> {
     Buffer::new(context, "readback", Slot::Screen.bytes(scene), Purpose::Readback)
-}
-
-/// Texels of a shape, x fastest.
-pub fn size_of(shape: Shape) -> [usize; 3] {
-    match shape {
-        Shape::Two([w, h]) => [w as usize, h as usize, 1],
-        Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
-        Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
-    }
 }
 
 impl Drop for Renderer {

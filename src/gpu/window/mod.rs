@@ -1,15 +1,21 @@
-//! What shows pictures: [`target`] is a window or a monitor, [`swapchain`] the images that it takes in turns, [`screen`] puts the
-//! picture and the panels into one of them, [`overlay`] draws panels, [`display`] finds a monitor where there is no compositor.
+//! Presentation: [`target`] is a window or a monitor, [`swapchain`] the images of its surface, [`screen`] copies the picture into
+//! one of them and draws the panels over it, [`overlay`] draws the panels. A build without the feature `view` has only a target
+//! that cannot exist.
 
-pub mod display;
+#[cfg(feature = "view")]
 mod overlay;
-mod screen;
-mod stages;
+#[cfg(feature = "view")]
+pub(super) mod screen;
+#[cfg(feature = "view")]
 mod swapchain;
-mod target;
+#[cfg_attr(not(feature = "view"), path = "no_target.rs")]
+pub(super) mod target;
 
+#[cfg(feature = "view")]
 pub use overlay::Panels;
-pub(super) use screen::Drawn;
-pub use screen::{PresentOutcome, Screen};
+#[cfg(feature = "view")]
+pub use screen::{PresentOutcome, Screen, monitor_size};
+#[cfg(feature = "view")]
 pub use swapchain::PresentMode;
-pub use target::{Handles, Target};
+#[cfg(feature = "view")]
+pub use target::{MonitorChoice, Target, WindowHandles};

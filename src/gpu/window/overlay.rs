@@ -1,7 +1,7 @@
 //! Panels over a picture: what egui laid out, drawn with dynamic rendering.
 
-use crate::gpu::error::Doing;
-use crate::gpu::{Context, GpuError};
+use crate::gpu::context::Context;
+use crate::gpu::error::{ErrorContext, GpuError};
 use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
@@ -37,7 +37,7 @@ pub struct Overlay {
 fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
     match error {
         egui_ash_renderer::RendererError::Vulkan(result) => {
-            GpuError::Vulkan { doing: "draw the panels".into(), result }
+            GpuError::Vulkan { operation: "draw the panels".into(), result }
         }
         other => GpuError::Window(format!("the panels cannot be drawn: {other}")),
     }
@@ -50,7 +50,7 @@ impl Overlay {
             .queue_family_index(context.queue(0).family)
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the create structure is complete.
-        let pool = unsafe { context.device.create_command_pool(&create, None) }.doing(|| "create commands".into())?;
+        let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
         let mut overlay = Overlay { context: context.clone(), renderer: None, pool, going: Vec::new() };
         let mode = RenderMode::DynamicRendering(DynamicRendering {
             color_attachment_format: format,

@@ -1,37 +1,37 @@
 //! The picture and the panels, onto the next image of the window. One such drawing is on its way at a time: it is a copy and a few
 //! triangles, and takes no time beside a picture.
 
-use super::overlay::{Overlay, Panels};
-use super::stages::{Stage, barrier, region};
+use super::overlay::Overlay;
+pub use super::overlay::Panels;
 use super::swapchain::{PresentMode, Swapchain};
-use super::target::Target;
-use crate::barriers::{Access, Worker};
+use super::target::{MonitorChoice, Target, choose_monitor};
+use crate::barriers::{Access, PipelineStage};
 use crate::gpu::barrier_recorder::BarrierRecorder;
-use crate::gpu::error::Doing;
+use crate::gpu::context::Context;
+use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::resources::{Image, WHOLE};
 use crate::gpu::timeline::Timelines;
-use crate::gpu::{Context, GpuError};
 use crate::passes::Slot;
 use ash::vk;
 use std::sync::Arc;
 
 /// How long an image of the window is waited for, ns: what is covered or unplugged may give none.
-const PATIENCE: u64 = 100_000_000;
+const ACQUIRE_TIMEOUT_NS: u64 = 100_000_000;
 /// What surrounds the picture: the panels' background.
 const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
 
 /// What became of showing something.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PresentOutcome {
-    Shown,
+    Presented,
     /// There is nothing to show it on now: the window is minimised, covered, or its monitor is gone.
-    Nowhere,
+    NotPresentable,
 }
 
 /// The picture that a renderer holds, and what orders it before and after what that renderer does.
 pub(in crate::gpu) struct Drawn<'a> {
     pub image: &'a Image,
-    pub order: &'a mut BarrierRecorder,
+    pub barriers: &'a mut BarrierRecorder,
     pub timelines: &'a mut Timelines,
     /// Its upper left corner on the window, pixels.
     pub at: [u32; 2],
@@ -39,7 +39,7 @@ pub(in crate::gpu) struct Drawn<'a> {
 
 /// A window or monitor that is drawn on.
 pub struct Screen {
-    // Dropped in this order, after `drop` has waited for the device.
+    // Dropped in this barriers, after `drop` has waited for the device.
     overlay: Option<Overlay>,
     chain: Swapchain,
     pool: vk::CommandPool,
@@ -54,7 +54,7 @@ pub struct Screen {
     /// The surface itself is gone.
     lost: bool,
     /// An image was acquired and never shown: its semaphore is of no use any more.
-    spoilt: bool,
+    unused_acquire: bool,
     wanted: [u32; 2],
     shown: u64,
 }
@@ -64,8 +64,13 @@ impl Screen {
     ///
     /// # Errors
     /// A target that the device cannot show anything on.
-    pub fn new(context: &Arc<Context>, target: Target, size: [u32; 2], pace: PresentMode) -> Result<Screen, GpuError> {
-        let chain = Swapchain::new(context, target, pace)?;
+    pub fn new(
+        context: &Arc<Context>,
+        target: Target,
+        size: [u32; 2],
+        present_mode: PresentMode,
+    ) -> Result<Screen, GpuError> {
+        let chain = Swapchain::new(context, target, present_mode)?;
         let device = &context.device;
         let mut screen = Screen {
             overlay: None,
@@ -77,19 +82,19 @@ impl Screen {
             context: context.clone(),
             stale: true,
             lost: false,
-            spoilt: false,
+            unused_acquire: false,
             wanted: size,
             shown: 0,
         };
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(0).family);
         // SAFETY: the create structures are complete; a failure drops `screen`, which frees what is made (null is allowed).
         unsafe {
-            screen.pool = device.create_command_pool(&create, None).doing(|| "create commands".into())?;
+            screen.pool = device.create_command_pool(&create, None).context(|| "create commands".into())?;
             let allocate = vk::CommandBufferAllocateInfo::default().command_pool(screen.pool).command_buffer_count(1);
-            screen.commands = device.allocate_command_buffers(&allocate).doing(|| "create commands".into())?[0];
+            screen.commands = device.allocate_command_buffers(&allocate).context(|| "create commands".into())?[0];
             let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-            screen.done = device.create_fence(&signalled, None).doing(|| "create a fence".into())?;
-            screen.free = device.create_semaphore(&Default::default(), None).doing(|| "create a semaphore".into())?;
+            screen.done = device.create_fence(&signalled, None).context(|| "create a fence".into())?;
+            screen.free = device.create_semaphore(&Default::default(), None).context(|| "create a semaphore".into())?;
         }
         context.name(screen.commands, "window");
         Ok(screen)
@@ -111,7 +116,7 @@ impl Screen {
         self.shown
     }
 
-    /// Shows panels alone: there is no picture yet.
+    /// Presentation panels alone: there is no picture yet.
     ///
     /// # Errors
     /// A device that fails; a surface that is lost and cannot be had anew.
@@ -137,20 +142,20 @@ impl Screen {
         // Once more where the first image says that it does not fit.
         for _ in 0..2 {
             if !self.fit()? {
-                return Ok(PresentOutcome::Nowhere);
+                return Ok(PresentOutcome::NotPresentable);
             }
-            match self.chain.acquire(PATIENCE, self.free) {
+            match self.chain.acquire(ACQUIRE_TIMEOUT_NS, self.free) {
                 Ok(image) => {
-                    self.spoilt = true;
+                    self.unused_acquire = true;
                     self.draw(image, drawn.as_mut(), panels.as_ref())?;
-                    self.spoilt = false;
+                    self.unused_acquire = false;
                     return self.present(image);
                 }
-                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::Nowhere),
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(PresentOutcome::NotPresentable),
                 Err(result) => self.note(result)?,
             }
         }
-        Ok(PresentOutcome::Nowhere)
+        Ok(PresentOutcome::NotPresentable)
     }
 
     /// What a call about the surface said: what can be mended is mended before the next one.
@@ -160,7 +165,7 @@ impl Screen {
             vk::Result::ERROR_SURFACE_LOST_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
                 (self.lost, self.stale) = (true, true);
             }
-            result => return Err(GpuError::Vulkan { doing: "show a picture".into(), result }),
+            result => return Err(GpuError::Vulkan { operation: "show a picture".into(), result }),
         }
         Ok(())
     }
@@ -170,18 +175,18 @@ impl Screen {
             Ok(unfit) => self.stale |= unfit,
             Err(result) => {
                 self.note(result)?;
-                return Ok(PresentOutcome::Nowhere);
+                return Ok(PresentOutcome::NotPresentable);
             }
         }
         self.shown += 1;
-        Ok(PresentOutcome::Shown)
+        Ok(PresentOutcome::Presented)
     }
 
     /// Waits for the last drawing.
     fn wait(&self) -> Result<(), GpuError> {
         // SAFETY: the fence is alive; it is signalled or a submission that signals it is on its way.
         unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
-            .doing(|| "draw on the window".into())
+            .context(|| "draw on the window".into())
     }
 
     /// Images that fit the surface; false where there is nothing to show on.
@@ -193,19 +198,19 @@ impl Screen {
             self.lost = false;
             return Ok(false);
         }
-        if !(self.stale || self.spoilt) {
+        if !(self.stale || self.unused_acquire) {
             return Ok(true);
         }
         self.context.wait_idle();
-        if self.spoilt {
+        if self.unused_acquire {
             // SAFETY: the device is idle.
             unsafe {
                 self.context.device.destroy_semaphore(self.free, None);
                 self.free = vk::Semaphore::null();
                 let made = self.context.device.create_semaphore(&Default::default(), None);
-                self.free = made.doing(|| "create a semaphore".into())?;
+                self.free = made.context(|| "create a semaphore".into())?;
             }
-            self.spoilt = false;
+            self.unused_acquire = false;
         }
         match self.chain.fit(self.wanted) {
             Ok(fits) => {
@@ -233,7 +238,7 @@ impl Screen {
                 .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
                 .and_then(|()| device.begin_command_buffer(commands, &begin))
         }
-        .doing(|| "record the window".into())?;
+        .context(|| "record the window".into())?;
         let mut at = Stage::Acquired;
         let mut go = |to: Stage| {
             barrier(&device, commands, target, at, to);
@@ -250,9 +255,9 @@ impl Screen {
             go(Stage::Copied);
         }
         if let (Some(drawn), Some((region, [w, h]))) = (drawn, region) {
-            drawn.order.begin(0);
-            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, Worker::Copy);
-            drawn.order.before(&self.context, 0, commands, &[read]);
+            drawn.barriers.begin(0);
+            let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
+            drawn.barriers.before(&self.context, 0, commands, &[read]);
             if w > 0 && h > 0 {
                 // Of the same size: no value changes, only the order of the channels.
                 // SAFETY: both images are alive and in these layouts; the region lies in both.
@@ -268,7 +273,7 @@ impl Screen {
                     );
                 }
             }
-            queued = Some((&mut *drawn.order, &mut *drawn.timelines));
+            queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
         }
         if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
             go(Stage::Drawn);
@@ -288,7 +293,7 @@ impl Screen {
         }
         go(Stage::Shown);
         // SAFETY: the command buffer is being recorded.
-        unsafe { device.end_command_buffer(commands) }.doing(|| "record the window".into())?;
+        unsafe { device.end_command_buffer(commands) }.context(|| "record the window".into())?;
         self.submit(after, queued)
     }
 
@@ -303,8 +308,8 @@ impl Screen {
         let mut signals = vec![semaphore(drawn).stage_mask(everything)];
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let mut after = Vec::new();
-        if let Some((order, timelines)) = &queued {
-            after = order.queues.waits(0);
+        if let Some((barriers, timelines)) = &queued {
+            after = barriers.queues.waits(0);
             let wait = |w: &crate::queues::Wait| {
                 semaphore(timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
             };
@@ -318,18 +323,18 @@ impl Screen {
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(&signals);
         // SAFETY: its last submission is done.
-        unsafe { self.context.device.reset_fences(&[self.done]) }.doing(|| "reset a fence".into())?;
+        unsafe { self.context.device.reset_fences(&[self.done]) }.context(|| "reset a fence".into())?;
         let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
         if let Err(error) = sent {
             // Nothing is on its way that would signal it.
             self.signal();
             return Err(error);
         }
-        if let Some((order, timelines)) = queued {
+        if let Some((barriers, timelines)) = queued {
             let timeline = timelines.of_mut(0);
             timeline.submitted += 1;
-            timeline.doing = "window".into();
-            order.submitted(0, &after, timeline.submitted);
+            timeline.label = "window".into();
+            barriers.submitted(0, &after, timeline.submitted);
         }
         Ok(())
     }
@@ -352,4 +357,85 @@ impl Drop for Screen {
             self.context.device.destroy_fence(self.done, None);
         }
     }
+}
+
+/// Size of the monitor that is wanted, in the mode that it would be given, pixels.
+///
+/// # Errors
+/// No such monitor or mode; a context that was not opened for a monitor.
+pub fn monitor_size(context: &Context, wanted: &MonitorChoice) -> Result<[u32; 2], GpuError> {
+    let displays = context.presentation.as_ref().and_then(|shows| shows.displays.as_ref());
+    let displays = displays.ok_or_else(|| GpuError::Window("the device was not opened for a monitor".into()))?;
+    let region = choose_monitor(displays, context.candidate.handle, wanted)?.mode.parameters.visible_region;
+    Ok([region.width, region.height])
+}
+
+/// What part of a picture goes where on a window of this size, and how large that is: it is cropped, never scaled.
+pub fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u32; 2]) {
+    let from = [image.extent.width, image.extent.height];
+    let [w, h] = std::array::from_fn(|i| from[i].min(size[i].saturating_sub(at[i])));
+    let layers =
+        vk::ImageSubresourceLayers { aspect_mask: vk::ImageAspectFlags::COLOR, layer_count: 1, ..Default::default() };
+    let corner = |x: u32, y: u32, z: i32| vk::Offset3D { x: x as i32, y: y as i32, z };
+    let blit = vk::ImageBlit {
+        src_subresource: layers,
+        src_offsets: [corner(0, 0, 0), corner(w, h, 1)],
+        dst_subresource: layers,
+        dst_offsets: [corner(at[0], at[1], 0), corner(at[0] + w, at[1] + h, 1)],
+    };
+    (blit, [w, h])
+}
+
+/// What happens to an image of the window, in this barriers.
+#[derive(Clone, Copy)]
+pub enum Stage {
+    Acquired,
+    Copied,
+    Drawn,
+    Shown,
+}
+
+impl Stage {
+    fn layout(self) -> vk::ImageLayout {
+        match self {
+            Stage::Acquired => vk::ImageLayout::UNDEFINED,
+            Stage::Copied => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+            Stage::Drawn => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            Stage::Shown => vk::ImageLayout::PRESENT_SRC_KHR,
+        }
+    }
+
+    fn stages(self) -> vk::PipelineStageFlags2 {
+        match self {
+            // As the semaphore's wait, which comes before it so.
+            Stage::Acquired | Stage::Copied => vk::PipelineStageFlags2::ALL_TRANSFER,
+            Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+            // As the semaphore that showing it waits for.
+            Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
+        }
+    }
+
+    fn accesses(self) -> vk::AccessFlags2 {
+        match self {
+            Stage::Acquired | Stage::Shown => vk::AccessFlags2::NONE,
+            Stage::Copied => vk::AccessFlags2::TRANSFER_WRITE,
+            Stage::Drawn => vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ,
+        }
+    }
+}
+
+pub fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
+    let barrier = [vk::ImageMemoryBarrier2::default()
+        .src_stage_mask(from.stages())
+        .src_access_mask(from.accesses())
+        .dst_stage_mask(to.stages())
+        .dst_access_mask(to.accesses())
+        .old_layout(from.layout())
+        .new_layout(to.layout())
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .image(image)
+        .subresource_range(WHOLE)];
+    // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image was acquired.
+    unsafe { device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().image_memory_barriers(&barrier)) };
 }

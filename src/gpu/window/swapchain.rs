@@ -1,8 +1,10 @@
 //! The images that a surface takes in turns.
 
 use super::target::Target;
-use crate::gpu::error::Doing;
-use crate::gpu::{Context, GpuError};
+use crate::gpu::context::{Context, Presentation};
+use crate::gpu::error::{ErrorContext, GpuError};
+use crate::gpu::faults::InjectionPoint;
+use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
 
@@ -38,7 +40,7 @@ pub struct Swapchain {
     pub images: Vec<Shown>,
     pub format: vk::Format,
     pub size: [u32; 2],
-    pace: PresentMode,
+    present_mode: PresentMode,
 }
 
 /// One of its images.
@@ -54,17 +56,17 @@ const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8
 
 impl Swapchain {
     /// No images yet: [`Swapchain::fit`] makes them.
-    pub fn new(context: &Arc<Context>, target: Target, pace: PresentMode) -> Result<Swapchain, GpuError> {
+    pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
         let mut made =
-            Swapchain { context: context.clone(), target, surface, handle, images, format, size: [0; 2], pace };
+            Swapchain { context: context.clone(), target, surface, handle, images, format, size: [0; 2], present_mode };
         made.format = made.choose_format()?;
         Ok(made)
     }
 
-    fn shows(&self) -> Result<&crate::gpu::context::Shows, GpuError> {
-        self.context.shows.as_ref().ok_or_else(|| GpuError::Window("the device was not opened for one".into()))
+    fn shows(&self) -> Result<&Presentation, GpuError> {
+        self.context.presentation.as_ref().ok_or_else(|| GpuError::Window("the device was not opened for one".into()))
     }
 
     fn choose_format(&self) -> Result<vk::Format, GpuError> {
@@ -79,7 +81,7 @@ impl Swapchain {
         let there = unsafe {
             self.shows()?.surfaces.get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
         }
-        .doing(|| "list the formats of the surface".into())?;
+        .context(|| "list the formats of the surface".into())?;
         let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
         let found = FORMATS.into_iter().find(|f| there.iter().any(|t| t.format == *f && is_plain(t)));
         found.ok_or_else(|| GpuError::Window("the surface takes no 8-bit UNORM images".into()))
@@ -101,10 +103,10 @@ impl Swapchain {
         let shows = self.shows()?;
         let device = self.context.candidate.handle;
         // SAFETY: surface and device belong to this instance; the calls only read.
-        let (can, paces) = unsafe {
+        let (can, modes) = unsafe {
             let can = shows.surfaces.get_physical_device_surface_capabilities(device, self.surface);
-            let paces = shows.surfaces.get_physical_device_surface_present_modes(device, self.surface);
-            (can.doing(|| "ask the surface for its size".into())?, paces.unwrap_or_default())
+            let modes = shows.surfaces.get_physical_device_surface_present_modes(device, self.surface);
+            (can.context(|| "ask the surface for its size".into())?, modes.unwrap_or_default())
         };
         let (least, most) = (can.min_image_extent, can.max_image_extent);
         let size = match can.current_extent.width {
@@ -121,8 +123,8 @@ impl Swapchain {
         if !can.supported_usage_flags.contains(usage) {
             return Err(GpuError::Window("the surface's images cannot be copied into and drawn on".into()));
         }
-        let pace = match self.pace {
-            PresentMode::Mailbox if paces.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
+        let present_mode = match self.present_mode {
+            PresentMode::Mailbox if modes.contains(&vk::PresentModeKHR::MAILBOX) => vk::PresentModeKHR::MAILBOX,
             _ => vk::PresentModeKHR::FIFO,
         };
         let alphas = [
@@ -142,16 +144,16 @@ impl Swapchain {
             .image_usage(usage)
             .pre_transform(can.current_transform)
             .composite_alpha(alpha)
-            .present_mode(pace)
+            .present_mode(present_mode)
             .clipped(true)
             .old_swapchain(self.handle);
         // SAFETY: the create structure is complete; nothing of the old one is in flight, and it is destroyed below.
-        let made = unsafe { shows.swapchains.create_swapchain(&create, None) }.doing(|| "create a swapchain".into());
+        let made = unsafe { shows.swapchains.create_swapchain(&create, None) }.context(|| "create a swapchain".into());
         self.drop_images();
         self.handle = made?;
         // SAFETY: the swapchain is alive.
         let images = unsafe { self.shows()?.swapchains.get_swapchain_images(self.handle) }
-            .doing(|| "list the images of the swapchain".into())?;
+            .context(|| "list the images of the swapchain".into())?;
         for handle in images {
             let shown = self.shown(handle)?;
             self.images.push(shown);
@@ -165,10 +167,11 @@ impl Swapchain {
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(self.format)
-            .subresource_range(crate::gpu::resources::WHOLE);
+            .subresource_range(WHOLE);
         let device = &self.context.device;
         // SAFETY: the image belongs to the swapchain, which outlives the view; the structures are complete.
-        let view = unsafe { device.create_image_view(&create, None) }.doing(|| "view an image of the window".into())?;
+        let view =
+            unsafe { device.create_image_view(&create, None) }.context(|| "view an image of the window".into())?;
         // SAFETY: as above; a view without its semaphore is destroyed at once.
         match unsafe { device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) } {
             Ok(drawn) => {
@@ -178,15 +181,15 @@ impl Swapchain {
             Err(result) => {
                 // SAFETY: nothing uses the view yet.
                 unsafe { device.destroy_image_view(view, None) };
-                Err(GpuError::Vulkan { doing: "create a semaphore".into(), result })
+                Err(GpuError::Vulkan { operation: "create a semaphore".into(), result })
             }
         }
     }
 
     /// The next image to draw on, waiting for it at most so long; the semaphore is signalled when it may be written.
     pub fn acquire(&self, nanoseconds: u64, free: vk::Semaphore) -> Result<u32, vk::Result> {
-        let Some(shows) = &self.context.shows else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
-        self.context.faults.pass(crate::gpu::faults::Seam::Acquire)?;
+        let Some(shows) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        self.context.faults.check(InjectionPoint::Acquire)?;
         // SAFETY: the swapchain is alive, and nothing waits for the semaphore.
         let acquired =
             unsafe { shows.swapchains.acquire_next_image(self.handle, nanoseconds, free, vk::Fence::null()) };
@@ -194,9 +197,9 @@ impl Swapchain {
         acquired.map(|(image, _)| image)
     }
 
-    /// Shows an image when it has been drawn; true where the swapchain fits no more.
+    /// Presentation an image when it has been drawn; true where the swapchain fits no more.
     pub fn present(&self, image: u32) -> Result<bool, vk::Result> {
-        let Some(shows) = &self.context.shows else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        let Some(shows) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);
         let present = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
         // SAFETY: the image was acquired and a submission that signals `drawn` is on its way.
@@ -210,7 +213,7 @@ impl Swapchain {
                 self.context.device.destroy_image_view(view, None);
                 self.context.device.destroy_semaphore(drawn, None);
             }
-            if let (Some(shows), false) = (&self.context.shows, self.handle == vk::SwapchainKHR::null()) {
+            if let (Some(shows), false) = (&self.context.presentation, self.handle == vk::SwapchainKHR::null()) {
                 shows.swapchains.destroy_swapchain(self.handle, None);
             }
         }
@@ -219,7 +222,7 @@ impl Swapchain {
 
     fn destroy(&mut self) {
         self.drop_images();
-        if let Some(shows) = &self.context.shows {
+        if let Some(shows) = &self.context.presentation {
             // SAFETY: its swapchain is gone; null is allowed.
             unsafe { shows.surfaces.destroy_surface(self.surface, None) };
         }

@@ -1,24 +1,23 @@
 //! What pictures are shown on: a window of a windowing system, or a monitor that nothing else uses.
 
-use super::display;
-use crate::gpu::error::Doing;
-use crate::gpu::{Candidate, GpuError};
+use crate::gpu::device_selection::Candidate;
+use crate::gpu::error::{ErrorContext, GpuError};
 use ash::{Entry, Instance, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
 
 /// A window, whichever library made it. It lives as long as anything that is shown on it.
-pub trait Handles: HasWindowHandle + HasDisplayHandle {}
+pub trait WindowHandles: HasWindowHandle + HasDisplayHandle {}
 
-impl<T: HasWindowHandle + HasDisplayHandle> Handles for T {}
+impl<T: HasWindowHandle + HasDisplayHandle> WindowHandles for T {}
 
 /// What pictures are shown on.
 #[derive(Clone)]
 pub enum Target {
-    Window(Arc<dyn Handles>),
+    Window(Arc<dyn WindowHandles>),
     /// A monitor without a compositor (VK_KHR_display).
-    Monitor(display::Wanted),
+    Monitor(MonitorChoice),
 }
 
 impl Target {
@@ -62,22 +61,22 @@ impl Target {
     ) -> Result<vk::SurfaceKHR, GpuError> {
         let window = match self {
             Target::Window(window) => window,
-            Target::Monitor(wanted) => return display::surface(entry, instance, device, wanted),
+            Target::Monitor(wanted) => return monitor_surface(entry, instance, device, wanted),
         };
         let display = window.display_handle().map_err(|e| GpuError::Window(e.to_string()))?;
         let handle = window.window_handle().map_err(|e| GpuError::Window(e.to_string()))?;
         // SAFETY: both handles are alive: whoever makes the surface holds the window as long as it.
         unsafe { ash_window::create_surface(entry, instance, display.as_raw(), handle.as_raw(), None) }
-            .doing(|| "create a surface on the window".into())
+            .context(|| "create a surface on the window".into())
     }
 
     /// Notes in a candidate's list what keeps it from showing anything here.
-    pub fn note_lack(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
-        if !candidate.presents {
-            candidate.lacks.push("VK_KHR_swapchain or dynamicRendering".into());
+    pub fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
+        if !candidate.can_present {
+            candidate.missing.push("VK_KHR_swapchain or dynamicRendering".into());
         }
         let Some(queue) = candidate.queues.first().filter(|q| q.draws) else {
-            candidate.lacks.push("a queue that draws and computes".into());
+            candidate.missing.push("a queue that draws and computes".into());
             return;
         };
         let surfaces = ash::khr::surface::Instance::new(entry, instance);
@@ -91,12 +90,217 @@ impl Target {
         });
         match shows {
             Ok(true) => {}
-            Ok(false) => candidate.lacks.push("a way to show pictures here".into()),
+            Ok(false) => candidate.missing.push("a way to show pictures here".into()),
             // Which monitors there are is said nowhere else.
             Err(why) => {
                 let why = if let GpuError::Window(why) = why { why } else { why.to_string() };
-                candidate.lacks.push(format!("a way to show pictures here ({why})").into());
+                candidate.missing.push(format!("a way to show pictures here ({why})").into());
             }
         }
+    }
+}
+
+/// Which monitor, and how.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MonitorChoice {
+    /// A part of its name, in any case; the first unless given.
+    pub monitor: Option<String>,
+    /// Pixels; its own unless given.
+    pub size: Option<[u32; 2]>,
+    /// Refreshes a second; the most at that size unless given.
+    pub refresh: Option<f64>,
+}
+
+/// A monitor as a driver lists it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Monitor {
+    pub name: String,
+    /// Pixels of its panel.
+    pub size: [u32; 2],
+    pub modes: Vec<Mode>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    pub size: [u32; 2],
+    /// Thousandths of a refresh a second.
+    pub refresh: u32,
+}
+
+impl MonitorChoice {
+    /// Numbers of the monitor and of its mode.
+    ///
+    /// # Errors
+    /// What is wanted and not there, with what is.
+    pub fn choose(&self, monitors: &[Monitor]) -> Result<(usize, usize), String> {
+        let all = || monitors.iter().map(|m| format!("{:?}", m.name)).collect::<Vec<_>>().join(", ");
+        let is_it =
+            |m: &Monitor| self.monitor.as_ref().is_none_or(|part| m.name.to_lowercase().contains(&part.to_lowercase()));
+        let found = monitors.iter().position(|m| is_it(m) && !m.modes.is_empty());
+        let Some(monitor) = found else {
+            return Err(match (&self.monitor, monitors.is_empty()) {
+                (_, true) => "no monitor is connected to this device".into(),
+                (Some(part), _) => format!("no monitor is called {part:?}; there are: {}", all()),
+                (None, _) => format!("no monitor has a mode; there are: {}", all()),
+            });
+        };
+        let Monitor { name, size, modes } = &monitors[monitor];
+        let wanted = self.size.unwrap_or(*size);
+        let area = |m: &Mode| u64::from(m.size[0]) * u64::from(m.size[1]);
+        let near = |m: &Mode| self.refresh.map_or(0.0, |hz| (f64::from(m.refresh) / 1000.0 - hz).abs());
+        let candidates = modes.iter().enumerate().filter(|(_, m)| m.size == wanted);
+        // The nearest to the refresh that is wanted; otherwise the fastest.
+        let best = candidates.min_by(|(_, a), (_, b)| near(a).total_cmp(&near(b)).then(b.refresh.cmp(&a.refresh)));
+        // A panel whose own size is in no mode takes its largest.
+        let best = best.or_else(|| match self.size {
+            None => modes.iter().enumerate().max_by_key(|(_, m)| (area(m), m.refresh)),
+            Some(_) => None,
+        });
+        match best {
+            Some((mode, _)) => Ok((monitor, mode)),
+            None => {
+                let there: Vec<String> = modes.iter().map(|m| format!("{}x{}", m.size[0], m.size[1])).collect();
+                Err(format!("{name:?} has no mode of {}x{}; it has: {}", wanted[0], wanted[1], there.join(", ")))
+            }
+        }
+    }
+}
+
+/// A plane of the device that can show on a display: the lowest that is free or shows on it already.
+fn plane(
+    displays: &ash::khr::display::Instance,
+    device: vk::PhysicalDevice,
+    display: vk::DisplayKHR,
+    mode: vk::DisplayModeKHR,
+) -> Result<Option<(u32, u32, vk::DisplayPlaneAlphaFlagsKHR)>, GpuError> {
+    // SAFETY: the device belongs to the instance; the calls only read.
+    let planes = unsafe { displays.get_physical_device_display_plane_properties(device) }
+        .context(|| "list the planes of the monitors".into())?;
+    for (number, plane) in (0..).zip(&planes) {
+        let is_free = plane.current_display == vk::DisplayKHR::null() || plane.current_display == display;
+        // SAFETY: as above; the plane's number is one of those listed.
+        let (reaches, can) = unsafe {
+            (
+                displays.get_display_plane_supported_displays(device, number).unwrap_or_default(),
+                displays.get_display_plane_capabilities(device, mode, number),
+            )
+        };
+        let Ok(can) = can else { continue };
+        if is_free && reaches.contains(&display) {
+            let alphas = [
+                vk::DisplayPlaneAlphaFlagsKHR::OPAQUE,
+                vk::DisplayPlaneAlphaFlagsKHR::GLOBAL,
+                vk::DisplayPlaneAlphaFlagsKHR::PER_PIXEL,
+            ];
+            let alpha = alphas.into_iter().find(|a| can.supported_alpha.contains(*a)).unwrap_or(alphas[0]);
+            return Ok(Some((number, plane.current_stack_index, alpha)));
+        }
+    }
+    Ok(None)
+}
+
+/// What is wanted, as a device lists it.
+pub(super) struct Chosen {
+    name: String,
+    display: vk::DisplayKHR,
+    pub mode: vk::DisplayModePropertiesKHR,
+}
+
+/// # Errors
+/// No such monitor or mode.
+pub(super) fn choose_monitor(
+    displays: &ash::khr::display::Instance,
+    device: vk::PhysicalDevice,
+    wanted: &MonitorChoice,
+) -> Result<Chosen, GpuError> {
+    // SAFETY: the device belongs to the instance; the call only reads.
+    let there =
+        unsafe { displays.get_physical_device_display_properties(device) }.context(|| "list the monitors".into())?;
+    let mut monitors = Vec::new();
+    let mut modes = Vec::new();
+    for display in &there {
+        // SAFETY: as above.
+        let of = unsafe { displays.get_display_mode_properties(device, display.display) }.unwrap_or_default();
+        // SAFETY: the name is null or a terminated string that lives as long as the instance.
+        let name = unsafe { display.display_name_as_c_str() }.map(|name| name.to_string_lossy().into_owned());
+        let mode = |m: &vk::DisplayModePropertiesKHR| Mode {
+            size: [m.parameters.visible_region.width, m.parameters.visible_region.height],
+            refresh: m.parameters.refresh_rate,
+        };
+        let size = [display.physical_resolution.width, display.physical_resolution.height];
+        monitors.push(Monitor { name: name.unwrap_or_default(), size, modes: of.iter().map(mode).collect() });
+        modes.push(of);
+    }
+    let (monitor, mode) = wanted.choose(&monitors).map_err(GpuError::Window)?;
+    let name = monitors.swap_remove(monitor).name;
+    Ok(Chosen { name, display: there[monitor].display, mode: modes[monitor][mode] })
+}
+
+/// A surface over all of the monitor that is wanted.
+///
+/// # Errors
+/// No such monitor, or another program holds it.
+fn monitor_surface(
+    entry: &Entry,
+    instance: &Instance,
+    device: vk::PhysicalDevice,
+    wanted: &MonitorChoice,
+) -> Result<vk::SurfaceKHR, GpuError> {
+    let displays = ash::khr::display::Instance::new(entry, instance);
+    let Chosen { name, display, mode } = choose_monitor(&displays, device, wanted)?;
+    let Some((plane, stack, alpha)) = plane(&displays, device, display, mode.display_mode)? else {
+        return Err(GpuError::Window(format!("{name:?} is in use: no plane of it is free")));
+    };
+    let create = vk::DisplaySurfaceCreateInfoKHR::default()
+        .display_mode(mode.display_mode)
+        .plane_index(plane)
+        .plane_stack_index(stack)
+        .transform(vk::SurfaceTransformFlagsKHR::IDENTITY)
+        .global_alpha(1.0)
+        .alpha_mode(alpha)
+        .image_extent(mode.parameters.visible_region);
+    // SAFETY: mode and plane were listed by this device.
+    unsafe { displays.create_display_plane_surface(&create, None) }.context(|| format!("take monitor {name:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn monitors() -> Vec<Monitor> {
+        let mode = |size, hz: u32| Mode { size, refresh: hz * 1000 };
+        let bare = |name: &str, size| Monitor { name: name.into(), size, modes: Vec::new() };
+        vec![
+            bare("HDMI-1", [0, 0]),
+            Monitor {
+                name: "EIZO MX243W".into(),
+                size: [1920, 1200],
+                modes: vec![mode([1920, 1200], 60), mode([1920, 1200], 75), mode([1024, 768], 85)],
+            },
+            Monitor { name: "Panel".into(), size: [800, 480], modes: vec![mode([640, 480], 60), mode([720, 480], 50)] },
+        ]
+    }
+
+    #[test]
+    fn the_first_monitor_with_a_mode_is_taken_at_its_own_size_and_fastest() {
+        assert_eq!(MonitorChoice::default().choose(&monitors()), Ok((1, 1)));
+    }
+
+    #[test]
+    fn name_size_and_refresh_are_obeyed() {
+        let wanted = |monitor: &str, size, refresh| MonitorChoice { monitor: Some(monitor.into()), size, refresh };
+        assert_eq!(wanted("eizo", None, Some(60.0)).choose(&monitors()), Ok((1, 0)));
+        assert_eq!(wanted("eizo", Some([1024, 768]), None).choose(&monitors()), Ok((1, 2)));
+        assert_eq!(wanted("panel", None, None).choose(&monitors()), Ok((2, 1)), "the largest, its own is in no mode");
+    }
+
+    #[test]
+    fn what_is_not_there_is_named_with_what_is() {
+        let none =
+            MonitorChoice { monitor: Some("dell".into()), ..MonitorChoice::default() }.choose(&monitors()).unwrap_err();
+        assert!(none.contains("dell") && none.contains("EIZO"), "{none}");
+        let small = MonitorChoice { size: Some([5, 5]), ..MonitorChoice::default() }.choose(&monitors()).unwrap_err();
+        assert!(small.contains("5x5") && small.contains("1024x768"), "{small}");
+        assert!(MonitorChoice::default().choose(&[]).unwrap_err().contains("connected"));
     }
 }

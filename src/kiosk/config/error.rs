@@ -7,14 +7,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
-/// Longest part of a message that the file decides, in characters.
-const LONGEST: usize = 400;
+/// Longest part of a message that comes from the file, characters.
+const MAX_MESSAGE: usize = 400;
 
-/// Why a configuration is refused, in one line: the file, and where it is known the line and the key.
+/// An error in a configuration, in one line: the file, the line and the key if they are known, and the fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct ConfigError {
     path: PathBuf,
-    /// From 1.
+    /// Line number from 1.
     line: Option<usize>,
     key: String,
     fault: String,
@@ -26,14 +26,14 @@ impl ConfigError {
     }
 
     fn new(path: &Path, line: Option<usize>, key: &str, fault: &str) -> ConfigError {
-        let short = |text: &str| match text.char_indices().nth(LONGEST) {
+        let short = |text: &str| match text.char_indices().nth(MAX_MESSAGE) {
             Some((end, _)) => format!("{} ...", &text[..end]),
             None => text.to_string(),
         };
         ConfigError { path: path.into(), line, key: short(&printable(key)), fault: short(&printable(fault)) }
     }
 
-    /// The key at fault, such as `display.scale`; empty where it is the file itself.
+    /// The wrong key, such as `display.scale`; empty if the fault is in the file itself.
     pub fn key(&self) -> &str {
         &self.key
     }
@@ -52,37 +52,39 @@ impl fmt::Display for ConfigError {
     }
 }
 
-/// The file, and its keys from the upper ones inwards.
+/// The path of the file, and where its keys are, outer keys first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Places {
+pub(super) struct KeyLocations {
     path: PathBuf,
-    keys: Vec<Place>,
+    keys: Vec<KeyLocation>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Place {
-    /// With those of the tables around it, parted by dots.
+struct KeyLocation {
+    /// The complete key with its tables, separated by dots.
     key: String,
     line: usize,
-    /// Of its last part, and of the value, bytes.
+    /// Byte ranges of the last part of the key, and of the value.
     name: Range<usize>,
     value: Range<usize>,
 }
 
-impl Places {
+impl KeyLocations {
+    /// Finds the keys of a text.
+    ///
     /// # Errors
-    /// What is no TOML.
-    pub fn of(text: &str, path: &Path) -> Result<Places, ConfigError> {
+    /// The text is not TOML.
+    pub fn of(text: &str, path: &Path) -> Result<KeyLocations, ConfigError> {
         let table = DeTable::parse(text).map_err(|e| {
             let line = e.span().map(|span| line_of(text, span.start));
             ConfigError::new(path, line, "", e.message())
         })?;
         let mut keys = Vec::new();
-        walk("", table.get_ref(), text, &mut keys);
-        Ok(Places { path: path.into(), keys })
+        collect_keys("", table.get_ref(), text, &mut keys);
+        Ok(KeyLocations { path: path.into(), keys })
     }
 
-    /// That of the file.
+    /// The folder of the file.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
@@ -91,8 +93,8 @@ impl Places {
         self.keys.iter().find(|place| place.key == key).map(|place| place.line)
     }
 
-    /// What is wrong with the value of a key; where the file does not have it, of the table that would.
-    pub fn fault(&self, key: &str, fault: &str) -> ConfigError {
+    /// An error about the value of a key, with its line. If the file lacks the key, the line is that of the table it belongs to.
+    pub fn error_at(&self, key: &str, fault: &str) -> ConfigError {
         let mut at = key;
         let line = loop {
             match (self.line(at), at.rsplit_once('.')) {
@@ -103,15 +105,15 @@ impl Places {
         ConfigError::new(&self.path, line, key, fault)
     }
 
-    /// What the parser found wrong, at the key whose value or name that is in, with what is allowed there.
-    pub fn refuse(&self, error: &toml::de::Error) -> ConfigError {
+    /// Converts an error of the parser to one that names the key and the allowed values.
+    pub fn parse_error(&self, error: &toml::de::Error) -> ConfigError {
         let at = error.span().unwrap_or_default();
         let holds = |range: &Range<usize>| range.start <= at.start && at.end <= range.end;
         let place = self.keys.iter().rfind(|place| holds(&place.name));
         match place.or_else(|| self.keys.iter().rfind(|place| holds(&place.value))) {
             None => ConfigError::new(&self.path, None, "", error.message()),
             Some(place) => {
-                // A key that there is not is refused with those that there are.
+                // For an unknown key the parser lists the existing ones.
                 let allowed = allowed(&place.key).map_or(String::new(), |allowed| format!("; must be {allowed}"));
                 let fault = format!("{}{allowed}", error.message());
                 ConfigError::new(&self.path, Some(place.line), &place.key, &fault)
@@ -120,21 +122,21 @@ impl Places {
     }
 }
 
-fn walk(above: &str, table: &DeTable, text: &str, keys: &mut Vec<Place>) {
+fn collect_keys(above: &str, table: &DeTable, text: &str, keys: &mut Vec<KeyLocation>) {
     for (name, value) in table {
         let key = match above {
             "" => name.get_ref().to_string(),
             above => format!("{above}.{}", name.get_ref()),
         };
         let line = line_of(text, name.span().start);
-        keys.push(Place { key: key.clone(), line, name: name.span(), value: value.span() });
+        keys.push(KeyLocation { key: key.clone(), line, name: name.span(), value: value.span() });
         if let DeValue::Table(inner) = value.get_ref() {
-            walk(&key, inner, text, keys);
+            collect_keys(&key, inner, text, keys);
         }
     }
 }
 
-/// What each key may be, said when it is not. The ranges of the source's keys are those of the flags, which `cli` checks.
+/// The allowed values of each key, for error messages. The ranges of the source's keys are those of the flags, which `cli` checks.
 pub(super) const ALLOWED: &[(&str, &str)] = &[
     ("source", "\"phantom\", a file (.mha, .mhd, .vol, .frames) or \"igtl://HOST[:PORT]\""),
     ("probe", "a file, as \"probe.toml\""),
@@ -169,7 +171,7 @@ pub(super) const ALLOWED: &[(&str, &str)] = &[
     ("display.panels", "true or false"),
     ("display.scale", "0.5 to 4"),
     ("display.budget", "a time from 1ms to 10s, or none"),
-    ("display.report", "the error.json of `echolume report error`, with display.budget beside it"),
+    ("display.report", "the error.json of `echolume report error`, needs display.budget"),
     ("keys", "a table"),
     ("keys.exit", "keys as \"ctrl+alt+q\", or \"none\""),
     ("live", "a table"),
@@ -185,6 +187,7 @@ pub(super) const ALLOWED: &[(&str, &str)] = &[
     ("files.log_files", "1 to 100"),
 ];
 
+/// The allowed values of a key.
 pub(super) fn allowed(key: &str) -> Option<&'static str> {
     ALLOWED.iter().find(|(name, _)| *name == key).map(|(_, allowed)| *allowed)
 }

@@ -1,10 +1,10 @@
-//! The keys of the source as the flags that they stand for, so that one place knows what those may be; and back, in messages.
+//! Converts the keys of the source to the flags of `echolume stream`, which are checked in one place; and flags back to keys in messages.
 
 use super::error::ConfigError;
 use super::{Config, Motor};
 use std::path::Path;
 
-/// Every key that stands for a flag.
+/// All keys that correspond to flags.
 const KEYS: &[&str] = &[
     "source",
     "probe",
@@ -27,7 +27,7 @@ const KEYS: &[&str] = &[
     "motor.timeout",
 ];
 
-/// The flag that a key stands for.
+/// The flag of a key.
 fn flag(key: &str) -> String {
     match key {
         "motor.port" => "--motor".into(),
@@ -36,7 +36,7 @@ fn flag(key: &str) -> String {
 }
 
 impl Config {
-    /// The arguments of `echolume stream` that say the same of where frames come from, each as one word `--flag=value`.
+    /// The arguments of `echolume stream` for the same source, each as one word `--flag=value`.
     pub fn source_arguments(&self) -> Vec<String> {
         let path = |path: &Path| path.to_string_lossy().into_owned();
         let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));
@@ -69,32 +69,33 @@ impl Config {
         values.chain(switches.into_iter().filter(|(_, on)| *on).map(|(key, _)| flag(key))).collect()
     }
 
-    /// A message about those arguments as one about the file: it names keys where it named flags, and the line of the first.
-    pub fn refuse(&self, message: &str) -> ConfigError {
-        let mut said = message.to_string();
+    /// Converts a message about those arguments to one about the file: with keys instead of flags, and the line of the first key.
+    pub fn flag_error(&self, message: &str) -> ConfigError {
+        let mut text_with_keys = message.to_string();
         let mut first: Option<(usize, &str)> = None;
         for key in KEYS {
             let flag = flag(key);
             let mut from = 0;
-            while let Some(at) = said[from..].find(&flag).map(|at| from + at) {
+            while let Some(at) = text_with_keys[from..].find(&flag).map(|at| from + at) {
                 let end = at + flag.len();
                 from = end;
-                // Not the beginning of a longer one.
-                if said[end..].starts_with(|c: char| c == '-' || c.is_alphanumeric()) {
+                // Not the start of a longer flag.
+                if text_with_keys[end..].starts_with(|c: char| c == '-' || c.is_alphanumeric()) {
                     continue;
                 }
-                // What usage says of the value belongs to the flag.
-                let value = said[end..].strip_prefix(" <").and_then(|rest| rest.find('>')).map_or(0, |n| n + 3);
-                said.replace_range(at..end + value, key);
+                // The placeholder of the value, such as `<N>`, belongs to the flag.
+                let value =
+                    text_with_keys[end..].strip_prefix(" <").and_then(|rest| rest.find('>')).map_or(0, |n| n + 3);
+                text_with_keys.replace_range(at..end + value, key);
                 from = at + key.len();
                 first = Some(first.filter(|(earlier, _)| *earlier < at).unwrap_or((at, key)));
             }
         }
         match first {
-            // It begins with the key itself, and the value.
-            Some((0, key)) => self.places.fault(key, said[key.len()..].trim_start_matches([':', ' '])),
-            Some((_, key)) => self.places.fault(key, &said),
-            None => self.places.fault("", &said),
+            // The message begins with the key and its value.
+            Some((0, key)) => self.locations.error_at(key, text_with_keys[key.len()..].trim_start_matches([':', ' '])),
+            Some((_, key)) => self.locations.error_at(key, &text_with_keys),
+            None => self.locations.error_at("", &text_with_keys),
         }
     }
 }

@@ -8,13 +8,13 @@ fn parse(text: &str) -> Result<Config, ConfigError> {
     Config::parse(text, Path::new("/etc/e/echolume.toml"))
 }
 
-fn refused(text: &str) -> String {
+fn parse_error(text: &str) -> String {
     let error = parse(text).expect_err(text).to_string();
     assert!(error.starts_with("/etc/e/echolume.toml: ") && error.lines().count() == 1, "{error}");
     error
 }
 
-/// Every key of a table, with those of the tables in it but for the scene's.
+/// All keys of a table and of its tables, without those of the scene.
 fn keys(above: &str, table: &toml::Table) -> BTreeSet<String> {
     let named = table.iter().flat_map(|(name, value)| {
         let key = if above.is_empty() { name.clone() } else { format!("{above}.{name}") };
@@ -24,12 +24,12 @@ fn keys(above: &str, table: &toml::Table) -> BTreeSet<String> {
     named.collect()
 }
 
-/// Those of [`Config`], as serde names them when it meets one that there is not.
-fn keys_there_are() -> BTreeSet<String> {
+/// The keys of [`Config`], as serde lists them for an unknown key.
+fn keys_of_the_type() -> BTreeSet<String> {
     let mut all = BTreeSet::new();
     for (above, text) in ["", "motor", "display", "keys", "live", "files"].map(|t| (t, format!("[{t}]\nzz = 1"))) {
         let text = if above.is_empty() { "zz = 1" } else { &text };
-        let message = toml::from_str::<Config>(text).expect_err("there is no zz").message().to_string();
+        let message = toml::from_str::<Config>(text).expect_err("zz is unknown").message().to_string();
         let names = message.split('`').skip(3).step_by(2);
         all.extend(names.map(|name| if above.is_empty() { name.into() } else { format!("{above}.{name}") }));
     }
@@ -37,29 +37,32 @@ fn keys_there_are() -> BTreeSet<String> {
 }
 
 #[test]
-fn the_example_shows_every_key_and_says_where_it_is_not_what_it_would_be() {
+fn the_example_has_every_key_and_marks_values_that_are_not_the_default() {
     let all: BTreeSet<String> = ALLOWED.iter().map(|(key, _)| key.to_string()).collect();
-    assert_eq!(all, keys_there_are());
+    assert_eq!(all, keys_of_the_type());
     let off: String = EXAMPLE
         .lines()
         .map(|l| l.strip_prefix('#').filter(|l| !l.starts_with(' ')).unwrap_or(l).to_string() + "\n")
         .collect();
     assert_eq!(keys("", &toml::from_str(&off).expect("TOML")), all);
-    // Each alone may be said, but for those that exclude each other.
+    // All keys together are valid, except for those that exclude each other.
     parse(&off.replace("rounds = 3", "").replace("stamps = true", "")).expect("all of it");
 
     let example = parse(EXAMPLE).expect("the example");
     let shown = toml::Table::try_from(&example).expect("tables");
-    let usual = toml::Table::try_from(Config::default()).expect("tables");
+    let defaults = toml::Table::try_from(Config::default()).expect("tables");
     for (name, value) in keys("", &shown).iter().map(|key| (key, at(&shown, key))) {
         let line =
             EXAMPLE.lines().position(|l| l.starts_with(&format!("{} =", name.rsplit('.').next().expect("a name"))));
-        let says = |line: usize| {
+        let mentions_default = |line: usize| {
             let comment = EXAMPLE.lines().take(line).collect::<Vec<_>>();
             comment.iter().rev().take_while(|l| l.starts_with("# ")).any(|l| l.contains("Default:"))
         };
-        let differs = !value.is_table() && value != at(&usual, name);
-        assert!(!differs || line.is_some_and(says), "{name} = {value} is not what it would be, and does not say so");
+        let differs = !value.is_table() && value != at(&defaults, name);
+        assert!(
+            !differs || line.is_some_and(mentions_default),
+            "{name} = {value} is not the default, and its comment does not say so"
+        );
     }
 }
 
@@ -72,7 +75,7 @@ fn at(table: &toml::Table, key: &str) -> toml::Value {
 }
 
 #[test]
-fn what_is_said_is_taken_and_what_is_not_is_as_documented() {
+fn values_are_read_and_missing_ones_have_the_documented_defaults() {
     assert_eq!(parse("").expect("an empty file").display, Config::default().display);
     let text = "source = 'sweeps/a b.mha'\nprobe = '/p.toml'\nreal_time = true\nclip = [1, 2, 3, 4]\npreset = ['bone']\n\
                 [scene]\nmode = 'volume'\n[scene.surface]\nthreshold = 0.3\n\
@@ -101,7 +104,7 @@ fn what_is_said_is_taken_and_what_is_not_is_as_documented() {
 }
 
 #[test]
-fn what_is_written_out_is_read_back() {
+fn a_written_configuration_is_read_back() {
     let text = "source = 'igtl://u:p@h:1'\n[scene]\nclip = [{ at = [0, 0, 0], normal = [1, 0, 0] }]\n[display]\nbudget = '1s'\n\
                 report = '/r'\n[motor]\nport = 'p'\nsweeps = 0.5";
     for text in ["", text] {
@@ -113,7 +116,7 @@ fn what_is_written_out_is_read_back() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line_and_what_is_allowed() {
+fn errors_name_the_line_the_key_and_the_allowed_values() {
     for (text, named) in [
         ("\n\nsorce = 'x'", &["line 3: sorce: unknown field `sorce`", "`source`"][..]),
         ("[display]\n\nscal = 2", &["line 3: display.scal: unknown", "`scale`"]),
@@ -125,7 +128,7 @@ fn what_is_wrong_is_named_with_its_line_and_what_is_allowed() {
         ("[display]\nsize = 5", &["line 2: display.size", "each 64 to 16384"]),
         ("[display]\npresent = 'vsync'", &["line 2: display.present", "mailbox"]),
         ("[display]\nbudget = '33 parsecs'", &["line 2: display.budget", "33 parsecs", "1ms to 10s"]),
-        ("[display]\nbudget = 'none'\nreport = 'a.json'", &["line 3: display.report", "display.budget beside it"]),
+        ("[display]\nbudget = 'none'\nreport = 'a.json'", &["line 3: display.report", "needs display.budget"]),
         ("[keys]\nexit = 'hyper+q'", &["line 2: keys.exit", "hyper", "ctrl+alt+q"]),
         ("[live]\nupdate = 'often'", &["line 2: live.update", "rolling"]),
         ("[live]\ncine_volumes = 0", &["line 2: live.cine_volumes: must be 1 to 1000"]),
@@ -153,19 +156,19 @@ fn what_is_wrong_is_named_with_its_line_and_what_is_allowed() {
         ("a = 1\na = 2", &["line 2: "]),
         ("display = 5", &["line 1: display", "must be a table"]),
     ] {
-        let error = refused(text);
+        let error = parse_error(text);
         assert!(named.iter().all(|n| error.contains(n)), "{text:?}: {error}");
     }
-    assert!(refused(&format!("source = ['{}']", "x".repeat(100_000))).len() < 1000);
-    assert!(refused(&"[a.".repeat(100_000)).len() < 1000);
-    assert!(refused(&format!("a = {}", "[".repeat(100_000))).len() < 1000);
+    assert!(parse_error(&format!("source = ['{}']", "x".repeat(100_000))).len() < 1000);
+    assert!(parse_error(&"[a.".repeat(100_000)).len() < 1000);
+    assert!(parse_error(&format!("a = {}", "[".repeat(100_000))).len() < 1000);
 }
 
 #[test]
-fn messages_of_the_command_line_become_messages_of_the_file() {
+fn messages_about_flags_become_messages_about_keys() {
     let config =
         parse("source = 'a.mha'\nrate = 0\n[motor]\nport = 'p'\nsweeps = 1\nstop_bits = 3").expect("right so far");
-    for (said, wanted) in [
+    for (message, expected) in [
         ("--rate 0: must be above 0, at most 1e6", "line 2: rate: 0: must be above 0, at most 1e6"),
         (
             "invalid value '3' for '--stop-bits <N>': 3 is not",
@@ -179,13 +182,13 @@ fn messages_of_the_command_line_become_messages_of_the_file() {
         ("--tool x", "echolume.toml: tool: x"),
         ("something else --rates", "echolume.toml: something else --rates"),
     ] {
-        let error = config.refuse(said).to_string();
-        assert!(error.contains(wanted), "{error}");
+        let error = config.flag_error(message).to_string();
+        assert!(error.contains(expected), "{error}");
     }
 }
 
 #[test]
-fn what_is_no_small_text_file_is_refused_in_a_line() {
+fn a_file_that_is_no_small_text_is_refused_in_one_line() {
     let folder = std::env::temp_dir().join(format!("echolume-config-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("make a folder");
     let write = |name: &str, bytes: &[u8]| std::fs::write(folder.join(name), bytes).expect("write");

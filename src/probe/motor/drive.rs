@@ -3,16 +3,14 @@
 
 use super::fault::{Fault, MotorError, Stopped};
 use super::guard::{Guard, Interrupter};
-use super::port::{Answer, Port, PortSettings};
+use super::port::{Answer, PERIOD, Port, PortSettings};
 use super::sweep::{Direction, Position, Sweep};
-use super::table::{MotorTable, Side};
+use super::table::{Home, MotorTable, Side};
 use super::tmcl::{self, Request, axis};
 use std::time::{Duration, Instant};
 
-/// Shortest time between two questions for the position.
-pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// Without any movement for so long the motor does not follow.
-const STILL: Duration = Duration::from_millis(400);
+const STALL_TIME: Duration = Duration::from_millis(400);
 /// Every how many positions the limit switch ahead is looked at as well.
 const LOOK_AHEAD: usize = 8;
 
@@ -125,15 +123,15 @@ impl Drive {
         result.map_err(|fault| self.guard.fail(operation, fault))
     }
 
-    pub(super) fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
+    fn ask(&mut self, request: impl Fn(u8, u8) -> Request) -> Result<Answer, Fault> {
         self.guard.ask(&request(self.table.address, self.table.motor))
     }
 
-    pub(super) fn get(&mut self, parameter: u8) -> Result<i32, Fault> {
+    fn get(&mut self, parameter: u8) -> Result<i32, Fault> {
         self.ask(|a, m| Request::get_axis(a, m, parameter)).map(|answer| answer.value)
     }
 
-    pub(super) fn set(&mut self, parameter: u8, value: i32) -> Result<(), Fault> {
+    fn set(&mut self, parameter: u8, value: i32) -> Result<(), Fault> {
         self.ask(|a, m| Request::set_axis(a, m, parameter, value)).map(drop)
     }
 
@@ -238,7 +236,7 @@ impl Drive {
             if last != Some(answer.value) {
                 (last, moved) = (Some(answer.value), Instant::now());
             }
-            let still = moved.elapsed() > STILL;
+            let still = moved.elapsed() > STALL_TIME;
             if still || usize::is_multiple_of(count, LOOK_AHEAD) {
                 self.check_limit(ahead)?;
             }
@@ -254,7 +252,7 @@ impl Drive {
         Ok(())
     }
 
-    pub(super) fn limit_closed(&mut self, side: Side) -> Result<bool, Fault> {
+    fn limit_closed(&mut self, side: Side) -> Result<bool, Fault> {
         let switch = if side == Side::Left { axis::LEFT_LIMIT } else { axis::RIGHT_LIMIT };
         Ok(self.get(switch)? != 0)
     }
@@ -267,12 +265,12 @@ impl Drive {
         Ok(())
     }
 
-    pub(super) fn at_home_switch(&mut self) -> Result<bool, Fault> {
+    fn at_home_switch(&mut self) -> Result<bool, Fault> {
         Ok((self.get(axis::HOME_SWITCH)? != 0) != self.table.home_inverted)
     }
 
     /// Waits until the motor stands, 5 s at most.
-    pub(super) fn wait_still(&mut self) -> Result<(), Fault> {
+    fn wait_still(&mut self) -> Result<(), Fault> {
         let (start, limit) = (Instant::now(), Duration::from_secs(5));
         while self.get(axis::SPEED)? != 0 {
             if start.elapsed() > limit {
@@ -281,5 +279,141 @@ impl Drive {
             std::thread::sleep(PERIOD);
         }
         Ok(())
+    }
+}
+
+/// Without any movement for so long a search has stalled. A module's own search may pause between its steps.
+const SEARCH_STALL_TIME: Duration = Duration::from_millis(1500);
+/// Speed of the second, exact approach to the switch, of that of the first.
+const SLOW_APPROACH: f64 = 0.1;
+
+/// What ended a rotation.
+enum RotationEnd {
+    /// The home switch is as wanted, at this position.
+    Switch(i32),
+    Limit,
+}
+
+impl Drive {
+    fn find_home(&mut self) -> Result<(), Fault> {
+        self.set(axis::LARGEST_ACCELERATION, self.table.acceleration(self.table.acceleration_deg_per_s2))?;
+        match self.table.home {
+            Home::ReferenceSearch => self.search_by_module(),
+            Home::Switch => self.search_by_switch(),
+        }?;
+        self.wait_still()?;
+        self.guard.at_rest();
+        Ok(())
+    }
+
+    /// Longest time that a search may take: there and back over the whole travel, and as much again.
+    fn longest_search(&self) -> Duration {
+        Duration::from_secs_f64(5.0 + 4.0 * self.table.largest_angle_deg / self.table.search_speed())
+    }
+
+    fn search_by_module(&mut self) -> Result<(), Fault> {
+        if let Some(speed) = self.table.search_speed_deg_per_s {
+            let velocity = self.table.velocity(speed);
+            self.set(axis::SEARCH_SPEED, velocity)?;
+            self.set(axis::SWITCH_SPEED, (velocity / 2).max(1))?;
+        }
+        let limit = self.longest_search();
+        self.ask(Request::search_start)?;
+        let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
+        while self.ask(Request::search_status)?.value != 0 {
+            let position = self.get(axis::POSITION)?;
+            if last != Some(position) {
+                (last, moved) = (Some(position), Instant::now());
+            }
+            self.check_moves(position, moved)?;
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "the module's reference search", limit });
+            }
+        }
+        Ok(())
+    }
+
+    /// Turns towards the switch, turning round once at a limit switch; then slowly back over its edge, which is home. The edge is
+    /// always met in the same direction, so that the play of the gear is the same.
+    fn search_by_switch(&mut self) -> Result<(), Fault> {
+        let (towards, speed) = (self.table.home_direction, self.table.search_speed());
+        if !self.at_home_switch()? && matches!(self.rotate(towards, speed, true)?, RotationEnd::Limit) {
+            self.rest()?;
+            if let RotationEnd::Limit = self.rotate(towards.other(), speed, true)? {
+                return Err(Fault::HomeNotFound);
+            }
+        }
+        self.rest()?;
+        // Fast off the switch and again onto it: the slow way below is then short wherever the search began.
+        if let RotationEnd::Limit = self.rotate(towards.other(), speed, false)? {
+            return Err(Fault::HomeNotFound);
+        }
+        self.rest()?;
+        if let RotationEnd::Limit = self.rotate(towards, speed * SLOW_APPROACH.sqrt(), true)? {
+            return Err(Fault::HomeNotFound);
+        }
+        self.rest()?;
+        let RotationEnd::Switch(edge) = self.rotate(towards.other(), speed * SLOW_APPROACH, false)? else {
+            return Err(Fault::HomeNotFound);
+        };
+        self.rest()?;
+        // Position and target together, at rest: the motor has nowhere to go.
+        let position = self.get(axis::POSITION)?.saturating_sub(edge);
+        self.set(axis::POSITION, position)?;
+        self.set(axis::TARGET, position)
+    }
+
+    fn rest(&mut self) -> Result<(), Fault> {
+        self.ask(Request::stop)?;
+        self.wait_still()
+    }
+
+    /// Turns until the home switch is closed, or open, or the limit switch ahead is closed.
+    fn rotate(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<RotationEnd, Fault> {
+        let (velocity, limit) = (self.table.velocity(speed), self.longest_search().mul_f64(1.0 / SLOW_APPROACH));
+        let turn = if side == Side::Left { Request::rotate_left } else { Request::rotate_right };
+        if self.limit_closed(side)? {
+            return Ok(RotationEnd::Limit);
+        }
+        let first = self.get(axis::POSITION)?;
+        let travel = 1.5 * self.table.largest_angle_deg * self.table.steps_per_degree();
+        self.ask(|a, m| turn(a, m, velocity))?;
+        let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
+        loop {
+            // The position before and after: the switch changed somewhere between.
+            let before = self.get(axis::POSITION)?;
+            if self.at_home_switch()? == until_closed {
+                let after = self.get(axis::POSITION)?;
+                return Ok(RotationEnd::Switch(((i64::from(before) + i64::from(after)) / 2) as i32));
+            }
+            if self.limit_closed(side)? {
+                return Ok(RotationEnd::Limit);
+            }
+            if last != Some(before) {
+                (last, moved) = (Some(before), Instant::now());
+            }
+            self.check_moves(before, moved)?;
+            if (f64::from(before) - f64::from(first)).abs() > travel {
+                return Err(Fault::HomeNotFound);
+            }
+            if start.elapsed() > limit {
+                return Err(Fault::TooLong { what: "the search for the home switch", limit });
+            }
+        }
+    }
+
+    /// # Errors
+    /// The motor has not moved for long: at a limit switch, or stalled.
+    fn check_moves(&mut self, position: i32, moved: Instant) -> Result<(), Fault> {
+        if moved.elapsed() < SEARCH_STALL_TIME {
+            return Ok(());
+        }
+        let angle = self.table.angle(position);
+        for side in [Side::Left, Side::Right] {
+            if self.limit_closed(side)? {
+                return Err(Fault::LimitSwitch { side, angle });
+            }
+        }
+        Err(Fault::Stalled { angle })
     }
 }

@@ -8,7 +8,6 @@ pub mod background_sweep;
 pub mod drive;
 pub mod fault;
 pub mod guard;
-mod home;
 pub mod port;
 #[cfg(target_os = "linux")]
 pub mod simulate;

@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 
 pub use serialport::{Parity, StopBits};
 
+/// Shortest time between two requests for the position.
+pub(super) const PERIOD: Duration = Duration::from_millis(5);
 /// How often a repeatable request is sent at most.
 const TRIES: usize = 3;
 

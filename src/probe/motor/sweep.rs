@@ -1,8 +1,8 @@
 //! A sweep: how fast it has to be, and where the array was at any time, from the positions that were read: each frame's
 //! angle and direction. Pure.
 
-use super::drive::PERIOD;
 use super::fault::Fault;
+use super::port::PERIOD;
 use super::table::MotorTable;
 use std::time::Duration;
 

@@ -1,10 +1,10 @@
 //! A connection that is kept up by a thread of its own, and the queue that the thread fills.
 
-use super::decode::{BODY_LIMIT, Decoded, decode};
-use super::error::DecodeError;
+use super::codec::{BODY_LIMIT, Decoded, decode};
 use super::message::Message;
-use super::queue::{Queue, Received};
-use crate::source::error::escaped;
+use super::wire::DecodeError;
+use crate::files::escaped;
+use std::collections::VecDeque;
 use std::io::{self, BufReader, ErrorKind, Read};
 use std::net::{IpAddr, Shutdown, TcpStream, ToSocketAddrs};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -16,17 +16,17 @@ pub const PORT: u16 = 18944;
 /// How often a waiting thread looks whether it shall stop.
 const POLL: Duration = Duration::from_millis(100);
 /// Shortest time for a try, and between two, whatever the options say: a refused one comes back at once.
-const SHORTEST: Duration = Duration::from_millis(10);
+const MIN_WAIT: Duration = Duration::from_millis(10);
 /// How long dropping a client waits for its thread, which may be looking up a name.
 const STOP: Duration = Duration::from_secs(1);
 /// A message is read in steps of so many bytes: memory follows what came, not what was claimed.
 const STEP: usize = 1 << 20;
 /// What a large message leaves allocated for the next, bytes.
-const KEPT: usize = 16 << 20;
+const MAX_KEPT_BYTES: usize = 16 << 20;
 /// Addresses of one name that are tried.
-const ADDRESSES: usize = 8;
+const MAX_ADDRESSES: usize = 8;
 /// Longest description of a fault, in characters.
-const LONGEST: usize = 600;
+const MAX_ERROR_CHARACTERS: usize = 600;
 
 /// How a [`Client`] behaves. Every number may be anything; zeros make little sense but do no harm: tries take and are apart 10 ms at least.
 #[derive(Clone, Debug)]
@@ -112,7 +112,7 @@ struct State {
 }
 
 /// Why a connection ended, in words.
-struct Ended {
+struct ConnectionEnd {
     why: String,
     /// It had brought a message.
     useful: bool,
@@ -135,7 +135,7 @@ impl Client {
             finished: false,
         };
         let shared = Arc::new(Shared { state: Mutex::new(state), changed: Condvar::new() });
-        let (theirs, address) = (Finish(shared.clone()), with_port(address));
+        let (theirs, address) = (FinishOnExit(shared.clone()), with_port(address));
         let thread = thread::Builder::new().name("igtl".into()).spawn(move || theirs.0.run(&address, &options))?;
         Ok(Client { shared, thread: Some(thread) })
     }
@@ -194,9 +194,9 @@ impl Drop for Client {
 }
 
 /// Says that the thread is done, however it came to that.
-struct Finish(Arc<Shared>);
+struct FinishOnExit(Arc<Shared>);
 
-impl Drop for Finish {
+impl Drop for FinishOnExit {
     fn drop(&mut self) {
         self.0.lock().finished = true;
         self.0.changed.notify_all();
@@ -214,12 +214,12 @@ impl Shared {
     }
 
     fn run(&self, address: &str, options: &ClientOptions) {
-        let first_wait = options.first_wait.max(SHORTEST);
+        let first_wait = options.first_wait.max(MIN_WAIT);
         let mut wait = first_wait;
         while !self.lock().stop {
             let ended = match self.open(address, options) {
                 Ok(stream) => self.receive(&stream, options),
-                Err(error) => Ended { why: format!("cannot connect: {error}"), useful: false },
+                Err(error) => ConnectionEnd { why: format!("cannot connect: {error}"), useful: false },
             };
             if ended.useful {
                 wait = first_wait;
@@ -228,7 +228,7 @@ impl Shared {
             state.socket = None;
             state.statistics.connected = false;
             if !state.stop {
-                let why = escaped(&ended.why, LONGEST);
+                let why = escaped(&ended.why, MAX_ERROR_CHARACTERS);
                 tracing::info!("OpenIGTLink from {address}: {why}; trying again in {} ms", wait.as_millis());
                 state.last_error = Some(why);
             }
@@ -242,11 +242,11 @@ impl Shared {
 
     fn open(&self, address: &str, options: &ClientOptions) -> io::Result<TcpStream> {
         let mut last = io::Error::new(ErrorKind::NotFound, "the name has no address");
-        for address in address.to_socket_addrs()?.take(ADDRESSES) {
+        for address in address.to_socket_addrs()?.take(MAX_ADDRESSES) {
             if self.lock().stop {
                 break;
             }
-            match TcpStream::connect_timeout(&address, options.connect_timeout.max(SHORTEST)) {
+            match TcpStream::connect_timeout(&address, options.connect_timeout.max(MIN_WAIT)) {
                 Ok(stream) => {
                     stream.set_read_timeout(Some(POLL))?;
                     let mut state = self.lock();
@@ -263,7 +263,7 @@ impl Shared {
     }
 
     /// Until the connection breaks, or cannot be understood any more, or the client is dropped.
-    fn receive(&self, stream: &TcpStream, options: &ClientOptions) -> Ended {
+    fn receive(&self, stream: &TcpStream, options: &ClientOptions) -> ConnectionEnd {
         let mut input = BufReader::with_capacity(1 << 16, stream);
         // Never more than one message, so that none has to be moved.
         let mut bytes = Vec::new();
@@ -280,7 +280,7 @@ impl Shared {
                 }
                 Err(DecodeError::Framing { error }) => {
                     self.lock().statistics.lost_framing += 1;
-                    return Ended { why: DecodeError::Framing { error }.to_string(), useful };
+                    return ConnectionEnd { why: DecodeError::Framing { error }.to_string(), useful };
                 }
                 Err(passed_over) => {
                     self.pass_over(&passed_over);
@@ -295,7 +295,7 @@ impl Shared {
             let mut state = self.lock();
             state.statistics.bytes += came as u64;
             if state.stop {
-                return Ended { why: "stopped".into(), useful };
+                return ConnectionEnd { why: "stopped".into(), useful };
             }
             let why = match read {
                 _ if came > 0 && came == step => None,
@@ -309,7 +309,7 @@ impl Shared {
             };
             if let Some(why) = why {
                 state.statistics.cut_short += u64::from(!bytes.is_empty());
-                return Ended { why, useful };
+                return ConnectionEnd { why, useful };
             }
             if came > 0 {
                 last = Instant::now();
@@ -338,7 +338,7 @@ impl Shared {
 
 fn clear(bytes: &mut Vec<u8>) {
     bytes.clear();
-    bytes.shrink_to(KEPT);
+    bytes.shrink_to(MAX_KEPT_BYTES);
 }
 
 /// The address with [`PORT`] where it names none.
@@ -347,6 +347,47 @@ fn with_port(address: &str) -> String {
         Ok(IpAddr::V6(number)) => format!("[{number}]:{PORT}"),
         Err(_) if address.contains(':') && !address.ends_with(']') => address.to_string(),
         _ => format!("{address}:{PORT}"),
+    }
+}
+
+/// A message and when it came.
+#[derive(Clone, Debug)]
+pub struct Received {
+    pub message: Message,
+    /// When its last byte was there.
+    pub arrived: Instant,
+}
+
+struct Queue {
+    waiting: VecDeque<(Received, usize)>,
+    /// Of memory, of all that wait.
+    bytes: usize,
+    max_messages: usize,
+    max_bytes: usize,
+}
+
+impl Queue {
+    fn new(max_messages: usize, max_bytes: usize) -> Queue {
+        Queue { waiting: VecDeque::new(), bytes: 0, max_messages, max_bytes }
+    }
+
+    /// How many had to go for it. The newest itself always stays: with a limit below its size nothing would ever come.
+    fn push(&mut self, received: Received) -> u64 {
+        let weight = received.message.weight();
+        self.bytes = self.bytes.saturating_add(weight);
+        self.waiting.push_back((received, weight));
+        let mut dropped = 0;
+        while self.waiting.len() > 1 && (self.waiting.len() > self.max_messages || self.bytes > self.max_bytes) {
+            self.pop();
+            dropped += 1;
+        }
+        dropped
+    }
+
+    fn pop(&mut self) -> Option<Received> {
+        let (received, weight) = self.waiting.pop_front()?;
+        self.bytes = self.bytes.saturating_sub(weight);
+        Some(received)
     }
 }
 
@@ -366,5 +407,27 @@ mod tests {
         ] {
             assert_eq!(with_port(given), whole);
         }
+    }
+}
+
+#[cfg(test)]
+mod queue_tests {
+    use super::*;
+    use crate::source::igtl::Text;
+
+    fn text(length: usize) -> Received {
+        let text = Text { device: String::new(), time: length as f64, text: "x".repeat(length) };
+        Received { message: Message::Text(text), arrived: Instant::now() }
+    }
+
+    #[test]
+    fn the_oldest_go_by_number_and_by_bytes_and_the_newest_stays() {
+        let mut queue = Queue::new(2, 10_000);
+        assert_eq!([1, 2, 3].map(|n| queue.push(text(n))), [0, 0, 1]);
+        assert_eq!(queue.push(text(9_000)), 1);
+        assert_eq!(queue.push(text(20_000)), 2);
+        assert_eq!(queue.pop().map(|r| r.message.time()), Some(20_000.0));
+        assert!(queue.pop().is_none());
+        assert_eq!(queue.bytes, 0);
     }
 }

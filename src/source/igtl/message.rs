@@ -1,6 +1,7 @@
-//! What a consumer gets.
+//! The messages as a consumer gets them.
 
-use super::image::Image;
+use super::wire::{Fault, Fields};
+use glam::{DMat4, DVec3, DVec4};
 
 /// A decoded message.
 #[derive(Clone, Debug, PartialEq)]
@@ -158,5 +159,189 @@ impl Message {
             Message::Transform(_) => 0,
         };
         size_of::<Message>() + self.device().len() + held
+    }
+}
+
+/// IMAGE: a picture, a volume, or a box of one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    pub device: String,
+    /// Since 1970, s; 0: not stamped.
+    pub time: f64,
+    /// Pixels of the whole image along i (fastest), j and k, each at least 1.
+    pub size: [u16; 3],
+    /// The box of the image that this message brings: all of it, as a rule.
+    pub region: Region,
+    pub scalar: Scalar,
+    /// Values of a pixel, interleaved; at least 1.
+    pub components: u8,
+    /// Which way x and y of `axes` and `centre` point.
+    pub coordinates: Coordinates,
+    /// One step along i, j and k, mm: directions times spacing. Finite; that of an axis of one pixel may be 0.
+    pub axes: [[f32; 3]; 3],
+    /// The middle of the whole image, mm. Finite.
+    pub centre: [f32; 3],
+    /// The region's samples, little-endian whatever came over the wire, i fastest.
+    pub bytes: Vec<u8>,
+}
+
+/// A box of pixels within an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Region {
+    /// The first pixel.
+    pub offset: [u16; 3],
+    pub size: [u16; 3],
+}
+
+/// What a sample is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+/// Axes of the patient: x to the right or left, y to the front or back, z to the head.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Right, anterior, superior.
+    Ras,
+    /// Left, posterior, superior.
+    Lps,
+}
+
+const SCALARS: [(u8, Scalar); 8] = [
+    (2, Scalar::I8),
+    (3, Scalar::U8),
+    (4, Scalar::I16),
+    (5, Scalar::U16),
+    (6, Scalar::I32),
+    (7, Scalar::U32),
+    (10, Scalar::F32),
+    (11, Scalar::F64),
+];
+/// Version of the image's own header.
+const VERSION: u16 = 1;
+const BIG: u8 = 1;
+const LITTLE: u8 = 2;
+
+impl Scalar {
+    pub fn bytes(self) -> usize {
+        match self {
+            Scalar::I8 | Scalar::U8 => 1,
+            Scalar::I16 | Scalar::U16 => 2,
+            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
+            Scalar::F64 => 8,
+        }
+    }
+}
+
+impl Image {
+    /// Pixel index of the whole image (of the pixel's middle, from 0) to mm, in the coordinates asked for.
+    ///
+    /// The message's position is the middle of the image (image.md, note of 2011), which lies at index (size - 1) / 2.
+    pub fn index_to_mm(&self, coordinates: Coordinates) -> DMat4 {
+        let axes = self.axes.map(|a| DVec3::from(a.map(f64::from)));
+        let middle = self.size.map(|n| (f64::from(n) - 1.0) / 2.0);
+        let first =
+            DVec3::from(self.centre.map(f64::from)) - axes[0] * middle[0] - axes[1] * middle[1] - axes[2] * middle[2];
+        let own = DMat4::from_cols(axes[0].extend(0.0), axes[1].extend(0.0), axes[2].extend(0.0), first.extend(1.0));
+        match coordinates == self.coordinates {
+            true => own,
+            false => DMat4::from_diagonal(DVec4::new(-1.0, -1.0, 1.0, 1.0)) * own,
+        }
+    }
+
+    /// Distance of neighbouring pixels along i, j and k, mm.
+    pub fn spacing(&self) -> [f64; 3] {
+        self.axes.map(|a| DVec3::from(a.map(f64::from)).length())
+    }
+
+    pub(super) fn read(device: String, time: f64, content: &[u8]) -> Result<Image, Fault> {
+        let mut fields = Fields(content);
+        let version = fields.u16("image version")?;
+        if version != VERSION {
+            return Err(Fault::new("image version", format!("is {version}, must be {VERSION}")));
+        }
+        let components = fields.u8("components")?;
+        let scalar = fields.u8("scalar type")?;
+        let endian = fields.u8("byte order")?;
+        let coordinates = fields.u8("coordinates")?;
+        if components == 0 {
+            return Err(Fault::new("components", "is 0, must be 1 to 255"));
+        }
+        let Some((_, scalar)) = SCALARS.into_iter().find(|(number, _)| *number == scalar) else {
+            return Err(Fault::new("scalar type", format!("is {scalar}, must be 2 to 7, 10 or 11")));
+        };
+        if ![BIG, LITTLE].contains(&endian) {
+            return Err(Fault::new("byte order", format!("is {endian}, must be 1 (big) or 2 (little)")));
+        }
+        let coordinates = match coordinates {
+            1 => Coordinates::Ras,
+            2 => Coordinates::Lps,
+            other => return Err(Fault::new("coordinates", format!("is {other}, must be 1 (RAS) or 2 (LPS)"))),
+        };
+        let size = fields.three("size")?;
+        let axes = [fields.vector("axes")?, fields.vector("axes")?, fields.vector("axes")?];
+        let centre = fields.vector("position")?;
+        let region = Region { offset: fields.three("sub-volume's start")?, size: fields.three("sub-volume's size")? };
+        let bytes = fields.0.to_vec();
+        let mut image = Image { device, time, size, region, scalar, components, coordinates, axes, centre, bytes };
+        image.check()?;
+        if endian == BIG && scalar.bytes() > 1 {
+            image.bytes.chunks_exact_mut(scalar.bytes()).for_each(<[u8]>::reverse);
+        }
+        Ok(image)
+    }
+
+    /// Sizes that agree with each other and with the samples.
+    fn check(&self) -> Result<(), Fault> {
+        let Region { offset, size } = self.region;
+        if self.size.contains(&0) {
+            let [i, j, k] = self.size;
+            return Err(Fault::new("size", format!("is {i} x {j} x {k}, each must be 1 to 65535")));
+        }
+        for axis in 0..3 {
+            let (start, count, whole) = (u32::from(offset[axis]), u32::from(size[axis]), u32::from(self.size[axis]));
+            if count == 0 || start + count > whole {
+                let end = start + count;
+                let fault = format!(
+                    "covers {start} to {end} of {whole} pixels along {}, must lie within",
+                    ["i", "j", "k"][axis]
+                );
+                return Err(Fault::new("sub-volume", fault));
+            }
+        }
+        // Below 2^16 each, 255 components and 8 bytes: fits.
+        let pixels: u64 = size.iter().map(|n| u64::from(*n)).product();
+        let bytes = pixels * u64::from(self.components) * self.scalar.bytes() as u64;
+        match self.bytes.len() as u64 == bytes {
+            true => Ok(()),
+            false => Err(Fault::new("samples", format!("are {} bytes, must be {bytes}", self.bytes.len()))),
+        }
+    }
+
+    pub(super) fn write(&self, content: &mut Vec<u8>) -> Result<(), Fault> {
+        if self.components == 0 {
+            return Err(Fault::new("components", "is 0, must be 1 to 255"));
+        }
+        if let Some(value) = self.axes.iter().flatten().chain(&self.centre).find(|v| !v.is_finite()) {
+            return Err(Fault::new("axes and position", format!("have {value}, must be finite")));
+        }
+        self.check()?;
+        let scalar = SCALARS.iter().find(|(_, s)| *s == self.scalar).map_or(0, |(number, _)| *number);
+        let coordinates = if self.coordinates == Coordinates::Ras { 1 } else { 2 };
+        content.extend(VERSION.to_be_bytes());
+        content.extend([self.components, scalar, LITTLE, coordinates]);
+        content.extend(self.size.iter().flat_map(|v| v.to_be_bytes()));
+        content.extend(self.axes.iter().flatten().chain(&self.centre).flat_map(|v| v.to_be_bytes()));
+        content.extend(self.region.offset.iter().chain(&self.region.size).flat_map(|v| v.to_be_bytes()));
+        content.extend_from_slice(&self.bytes);
+        Ok(())
     }
 }

@@ -7,26 +7,17 @@
 //! library's bytes differ, the bytes are followed: the document's extended header has 8 or 14 bytes, the library's 12.
 
 mod client;
-mod crc;
-mod decode;
-mod encode;
-mod error;
-mod fields;
-mod header;
-mod image;
+mod codec;
 mod message;
 mod network;
 mod pairing;
-mod queue;
+mod wire;
 
-pub use client::{Client, ClientOptions, ClientStatistics, PORT};
-pub use crc::crc64;
-pub use decode::{BODY_LIMIT, Decoded, decode};
-pub use encode::{Version, encode};
-pub use error::{DecodeError, MessageError};
-pub use header::HEADER;
-pub use image::{Coordinates, Image, Region, Scalar};
-pub use message::{Message, Other, Status, Text, Tool, ToolKind, TrackingData, Transform};
+pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received};
+pub use codec::{BODY_LIMIT, Decoded, Version, decode, encode};
+pub use message::{
+    Coordinates, Image, Message, Other, Region, Scalar, Status, Text, Tool, ToolKind, TrackingData, Transform,
+};
 pub use network::{Network, NetworkOptions, Poses};
 pub use pairing::{PairedFrame, Pairing, PairingCounts};
-pub use queue::Received;
+pub use wire::{DecodeError, HEADER, MessageError, crc64};

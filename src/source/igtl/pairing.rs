@@ -1,17 +1,16 @@
 //! Poses for 2D frames: an IMAGE says where its pixels lie within the frame, a TRANSFORM where the frame was at a time.
 
-use super::image::Image;
-use super::message::Message;
+use super::message::{Image, Message};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::collections::VecDeque;
 
 /// Poses that are kept to choose from.
-const POSES: usize = 1024;
+const MAX_POSES: usize = 1024;
 /// Frames that wait for a later pose, and their bytes.
-const FRAMES: usize = 64;
-const FRAME_BYTES: usize = 256 << 20;
+const MAX_FRAMES: usize = 64;
+const MAX_FRAME_BYTES: usize = 256 << 20;
 /// How far from a rotation (largest entry of R^T R - 1) a matrix may be to be turned by angles.
-const NOT_A_ROTATION: f64 = 1e-3;
+const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// Gives every 2D frame (IMAGE of depth 1) a pose, in the order in which the frames came. Pure: its clock is the stamps.
 ///
@@ -108,7 +107,7 @@ impl Pairing {
     fn pose(&mut self, device: String, time: f64, rows: &[[f32; 4]; 3]) {
         let column = |c: usize| DVec3::from(rows.map(|row| f64::from(row[c])));
         let matrix = DAffine3::from_cols(column(0), column(1), column(2), column(3));
-        if self.poses.len() == POSES {
+        if self.poses.len() == MAX_POSES {
             self.poses.pop_front();
         }
         self.poses.push_back(Pose { device, time, matrix });
@@ -118,7 +117,7 @@ impl Pairing {
     fn settle(&mut self, at_once: bool) -> Vec<PairedFrame> {
         let mut settled = Vec::new();
         while let Some(frame) = self.frames.front() {
-            let full = self.frames.len() > FRAMES || self.frame_bytes > FRAME_BYTES;
+            let full = self.frames.len() > MAX_FRAMES || self.frame_bytes > MAX_FRAME_BYTES;
             let newest = self.frames.back().map_or(frame.time, |f| f.time);
             let poses_past = self.poses.back().is_some_and(|p| p.time > frame.time + self.tolerance);
             let over = at_once || full || poses_past || newest > frame.time + self.patience;
@@ -168,7 +167,7 @@ impl Pairing {
 fn between(a: &DAffine3, b: &DAffine3, part: f64) -> Option<DAffine3> {
     let rotation = |m: DMat3| {
         let off = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();
-        let rigid = m.determinant() > 0.0 && off.iter().all(|v| v.abs() <= NOT_A_ROTATION);
+        let rigid = m.determinant() > 0.0 && off.iter().all(|v| v.abs() <= ROTATION_TOLERANCE);
         rigid.then(|| DQuat::from_mat3(&m).normalize())
     };
     let turned = rotation(a.matrix3)?.slerp(rotation(b.matrix3)?, part);

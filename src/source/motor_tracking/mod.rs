@@ -11,30 +11,28 @@
 //!
 //! [`Track::at`]: crate::probe::motor::Track::at
 
-mod counts;
-mod free;
+mod free_running;
 mod passes;
 
-pub use counts::TrackingCounts;
-pub use free::FreeRunning;
+pub use free_running::FreeRunning;
+pub use passes::TrackingCounts;
 
-use super::Frame;
+use super::frame::{Frame, Header};
 use super::live::{Event, Live};
-use super::recorder::Header;
 use crate::probe::motor::{ArrayState, BackgroundSweep};
 use crate::probe::{Advance, Axis, Geometry, Motion, Probe};
-use passes::{MOST_FILLED, Passes};
+use passes::{MAX_FILLED, Passes};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 /// Frames that wait for the motor's position at most, and how long.
-const MOST_WAITING: usize = 32;
-const LONGEST_WAIT: Duration = Duration::from_millis(300);
+const MAX_WAITING: usize = 32;
+const MAX_WAIT: Duration = Duration::from_millis(300);
 /// How long the source is waited for before the motor is looked at again; shorter where frames wait for a position.
-const LOOK: Duration = Duration::from_millis(20);
-const LOOK_SOON: Duration = Duration::from_millis(4);
-/// Shortest time between two faults that are told.
-const TELL: Duration = Duration::from_secs(1);
+const POLL: Duration = Duration::from_millis(20);
+const POLL_WAITING: Duration = Duration::from_millis(4);
+/// Shortest time between two faults that are reported.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
 /// When a frame's first line was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +58,7 @@ pub struct MotorTracked {
     source: Box<dyn Live>,
     motor: BackgroundSweep,
     options: MotorTrackingOptions,
-    now: Option<Now>,
+    now: Option<Tracking>,
     /// Frames that came, without place, and when: the time of the first line on the motor's clock, and until when they wait.
     waiting: VecDeque<(f64, Instant, Frame)>,
     /// A frame whose lines are arriving.
@@ -69,13 +67,13 @@ pub struct MotorTracked {
     /// Why the source ended.
     ended: Option<Option<String>>,
     counts: TrackingCounts,
-    told: TrackingCounts,
-    told_at: Instant,
+    reported: TrackingCounts,
+    reported_at: Instant,
     over: bool,
 }
 
 /// What follows from the geometry.
-struct Now {
+struct Tracking {
     passes: Passes,
     /// That sound needs for a frame, s.
     frame_time: f64,
@@ -94,8 +92,8 @@ impl MotorTracked {
             out: VecDeque::new(),
             ended: None,
             counts: TrackingCounts::default(),
-            told: TrackingCounts::default(),
-            told_at: Instant::now(),
+            reported: TrackingCounts::default(),
+            reported_at: Instant::now(),
             over: false,
         }
     }
@@ -135,12 +133,12 @@ impl MotorTracked {
             now.passes.end(&mut self.counts, &mut self.out);
         }
         self.lines = None;
-        match turned(header, self.motor.speed()) {
+        match motor_header(header, self.motor.speed()) {
             Ok((header, slices, frame_time)) => {
                 let frame_bytes = header.frame_bytes().unwrap_or(0) as usize;
                 self.out.push_back(Event::Begin(Box::new(header)));
                 self.warn_of_edges(&slices);
-                self.now = Some(Now { passes: Passes::new(slices), frame_time, frame_bytes });
+                self.now = Some(Tracking { passes: Passes::new(slices), frame_time, frame_bytes });
             }
             Err(fault) => self.ended = Some(Some(fault)),
         }
@@ -151,7 +149,7 @@ impl MotorTracked {
         let half = self.motor.angle().to_radians() / 2.0;
         let last = slices.len() as f64 - 1.0;
         let (before, behind) = (slices.index_of(-half), last - slices.index_of(half));
-        if before.max(behind) >= MOST_FILLED as f64 + 0.5 {
+        if before.max(behind) >= MAX_FILLED as f64 + 0.5 {
             let (angle, span) = (self.motor.angle(), (slices.last() - slices.first()).to_degrees());
             self.out.push_back(Event::Fault(format!(
                 "the motor sweeps {angle} deg and the probe's frames lie over {span:.1}: no volume will be whole"
@@ -160,17 +158,17 @@ impl MotorTracked {
     }
 
     fn arrived(&mut self, frame: Frame) {
-        let Some(Now { frame_time, .. }) = self.now else { return };
+        let Some(Tracking { frame_time, .. }) = self.now else { return };
         let (now, watch) = (Instant::now(), self.motor.watch());
         let time = match self.options.clock {
             Clock::Arrival { delay } => watch.time(now) - frame_time - delay,
             Clock::Stamp => frame.time.map_or(f64::NAN, |stamp| watch.time_of_stamp(stamp)),
         };
-        if self.waiting.len() == MOST_WAITING {
+        if self.waiting.len() == MAX_WAITING {
             self.waiting.pop_front();
             self.counts.unknown += 1;
         }
-        self.waiting.push_back((time, now + LONGEST_WAIT, frame));
+        self.waiting.push_back((time, now + MAX_WAIT, frame));
     }
 
     /// Places the frames that the positions cover by now; `all`: also gives up those that they do not.
@@ -194,13 +192,13 @@ impl MotorTracked {
         }
     }
 
-    fn tell(&mut self) {
-        if self.told_at.elapsed() < TELL {
+    fn report(&mut self) {
+        if self.reported_at.elapsed() < REPORT_INTERVAL {
             return;
         }
-        if let Some(fault) = self.counts.since(&self.told).fault() {
+        if let Some(fault) = self.counts.since(&self.reported).fault() {
             self.out.push_back(Event::Fault(fault));
-            (self.told, self.told_at) = (self.counts, Instant::now());
+            (self.reported, self.reported_at) = (self.counts, Instant::now());
         }
     }
 
@@ -234,7 +232,7 @@ impl Live for MotorTracked {
                 continue;
             }
             let left = until.saturating_duration_since(Instant::now());
-            let look = left.min(if self.waiting.is_empty() { LOOK } else { LOOK_SOON });
+            let look = left.min(if self.waiting.is_empty() { POLL } else { POLL_WAITING });
             if self.ended.is_some() || (self.options.holds && self.motor.watch().span().is_none()) {
                 std::thread::sleep(look);
             } else {
@@ -242,7 +240,7 @@ impl Live for MotorTracked {
                 self.take(event);
             }
             self.place_all(false);
-            self.tell();
+            self.report();
             if self.out.is_empty() && left.is_zero() {
                 return Event::Idle;
             }
@@ -259,7 +257,7 @@ impl Live for MotorTracked {
 ///
 /// # Errors
 /// In words, frames that no motor turns, or that it would turn too fast.
-fn turned(header: Header, speed: f64) -> Result<(Header, Axis, f64), String> {
+fn motor_header(header: Header, speed: f64) -> Result<(Header, Axis, f64), String> {
     let probe = match &header.forward {
         Geometry::Sweep(probe) if matches!(probe.motion, Motion::Fan { .. }) && probe.slices.len() > 1 => probe.clone(),
         _ => return Err("the motor can only place the frames of a probe that turns: [motion] kind = 'fan'".into()),

@@ -1,14 +1,13 @@
 //! Frames of known angle become the slices of a pass. Pure.
 
-use super::TrackingCounts;
 use crate::probe::Axis;
 use crate::probe::motor::{ArrayState, Direction};
-use crate::source::Frame;
+use crate::source::frame::Frame;
 use crate::source::live::Event;
 use std::collections::VecDeque;
 
 /// Missing slices in a row that are filled at most.
-pub(super) const MOST_FILLED: usize = 2;
+pub(super) const MAX_FILLED: usize = 2;
 
 /// The passes over a slice axis, in order of time.
 pub(super) struct Passes {
@@ -24,14 +23,14 @@ struct Pass {
     direction: Direction,
     /// The frame that is nearest so far to the slice that the array is at. The nearer counts and not the later, since
     /// it shows more nearly what lies there. It is given when a frame of the next slice shows that none can be nearer.
-    nearest: Option<Near>,
+    nearest: Option<Candidate>,
     /// The one that was given last.
-    given: Option<Near>,
+    given: Option<Candidate>,
     slices: usize,
 }
 
 #[derive(Clone)]
-struct Near {
+struct Candidate {
     /// ArrayState in the order of the pass.
     step: usize,
     /// rad.
@@ -60,7 +59,7 @@ impl Passes {
                 counts.turning += 1;
                 // At the far end of a pass it is over: nothing is gained by waiting for the next to begin.
                 let step = self.now.as_ref().map(|now| self.step(angle.to_radians(), now.direction));
-                if step.is_some_and(|step| step > (last - MOST_FILLED as f64).max(last / 2.0)) {
+                if step.is_some_and(|step| step > (last - MAX_FILLED as f64).max(last / 2.0)) {
                     self.end(counts, out);
                 }
             }
@@ -87,7 +86,7 @@ impl Passes {
                     }
                     return;
                 }
-                let near = Near { step: step.round().clamp(0.0, last) as usize, angle, frame };
+                let near = Candidate { step: step.round().clamp(0.0, last) as usize, angle, frame };
                 let mut now =
                     self.now.take().unwrap_or(Pass { number: pass, direction, nearest: None, given: None, slices: 0 });
                 match now.nearest.take() {
@@ -120,7 +119,7 @@ impl Passes {
         }
         if let Some(given) = now.given.take() {
             let missing = given.step + 1..self.slices.len();
-            if missing.len() <= MOST_FILLED {
+            if missing.len() <= MAX_FILLED {
                 for step in missing {
                     counts.filled += 1;
                     out.push_back(self.event(&mut now, step, given.frame.clone()));
@@ -134,10 +133,10 @@ impl Passes {
     }
 
     /// Gives a frame, and before it those that stand in for missing slices: each that of the neighbour whose angle is nearer.
-    fn give(&self, now: &mut Pass, near: Near, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
+    fn give(&self, now: &mut Pass, near: Candidate, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let before = now.given.take();
         let missing = before.as_ref().map_or(0, |given| given.step + 1)..near.step;
-        if missing.len() <= MOST_FILLED {
+        if missing.len() <= MAX_FILLED {
             for step in missing {
                 counts.filled += 1;
                 let at = self.slices.at(self.slice(step, now.direction) as f64);
@@ -169,8 +168,79 @@ impl Passes {
     }
 
     /// From the middle of its slice, rad.
-    fn distance(&self, near: &Near, now: &Pass) -> f64 {
+    fn distance(&self, near: &Candidate, now: &Pass) -> f64 {
         (near.angle - self.slices.at(self.slice(near.step, now.direction) as f64)).abs()
+    }
+}
+
+/// Of frames unless said otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TrackingCounts {
+    /// Were given a slice.
+    pub placed: u64,
+    /// Left out: before the sweep had begun.
+    pub early: u64,
+    /// Left out: near a turning point, where the direction is not known.
+    pub turning: u64,
+    /// Left out: more than half a pitch beyond the first or last slice.
+    pub beyond: u64,
+    /// Left out: another frame of the pass was nearer to the slice.
+    pub farther: u64,
+    /// Left out: without a time, or the motor's position was not known at theirs, or not soon enough.
+    pub unknown: u64,
+    /// Left out: of a pass or a slice before the newest.
+    pub late: u64,
+    /// Slices that no frame came nearest to, and that a neighbour's frame stands in for.
+    pub filled: u64,
+    /// Passes that became whole volumes.
+    pub whole: u64,
+    /// Passes that more was missing of.
+    pub incomplete: u64,
+}
+
+impl TrackingCounts {
+    /// What was counted since an earlier time.
+    pub fn since(&self, before: &TrackingCounts) -> TrackingCounts {
+        TrackingCounts {
+            placed: self.placed - before.placed,
+            early: self.early - before.early,
+            turning: self.turning - before.turning,
+            beyond: self.beyond - before.beyond,
+            farther: self.farther - before.farther,
+            unknown: self.unknown - before.unknown,
+            late: self.late - before.late,
+            filled: self.filled - before.filled,
+            whole: self.whole - before.whole,
+            incomplete: self.incomplete - before.incomplete,
+        }
+    }
+
+    /// What is worth telling, on one line. Frames that were left out because there were more than needed are not.
+    pub fn fault(&self) -> Option<String> {
+        let parts = [
+            (self.filled, "slices had no frame of their own and were given a neighbour's"),
+            (self.incomplete, "passes missed more than two slices in a row and stayed incomplete"),
+            (self.unknown, "frames were left out, the motor's position at their time not being known"),
+            (self.late, "frames were left out, coming after those of a later pass or slice"),
+        ];
+        let parts: Vec<String> =
+            parts.iter().filter(|(count, _)| *count > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        (!parts.is_empty()).then(|| format!("motor: {}", parts.join("; ")))
+    }
+}
+
+impl std::fmt::Display for TrackingCounts {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let TrackingCounts { placed, early, turning, beyond, farther, unknown, late, filled, whole, incomplete } = self;
+        write!(
+            f,
+            "{placed} frames in {whole} whole and {incomplete} incomplete passes, {filled} slices filled; left out: "
+        )?;
+        write!(
+            f,
+            "{early} before the sweep, {turning} at a turn, {beyond} beyond the slices, {farther} farther from "
+        )?;
+        write!(f, "their slice than others, {unknown} without a position, {late} too late")
     }
 }
 
@@ -189,7 +259,7 @@ mod tests {
     }
 
     /// Passes of these angles, deg, every second one backwards; frames are tagged by their place in the list.
-    fn swept(passes: &[&[f64]]) -> (Vec<Frame>, TrackingCounts) {
+    fn run_passes(passes: &[&[f64]]) -> (Vec<Frame>, TrackingCounts) {
         let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let mut tag = 0;
         for (pass, angles) in passes.iter().enumerate() {
@@ -212,7 +282,7 @@ mod tests {
     fn a_way_back_is_another_volume_and_its_slices_run_down() {
         let forth = [-6.1, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
         let back = forth.map(|a| -a);
-        let (frames, counts) = swept(&[&forth, &back]);
+        let (frames, counts) = run_passes(&[&forth, &back]);
         assert_eq!((frames.len(), counts.whole, counts.placed, counts.filled), (14, 2, 14, 0));
         for (n, frame) in frames.iter().enumerate() {
             let (volume, number) = (n / 7, n % 7);
@@ -224,20 +294,20 @@ mod tests {
 
     #[test]
     fn of_two_frames_at_a_slice_the_nearer_counts_whichever_comes_first() {
-        let (frames, counts) = swept(&[&[-6.0, -5.2, -4.4, -3.9, -2.0, -1.2, 0.0, 2.0, 4.0, 6.0, 6.9]]);
+        let (frames, counts) = run_passes(&[&[-6.0, -5.2, -4.4, -3.9, -2.0, -1.2, 0.0, 2.0, 4.0, 6.0, 6.9]]);
         assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 3), (2, 4), (3, 6), (4, 7), (5, 8), (6, 9)]);
         assert_eq!((counts.farther, counts.whole), (4, 1));
     }
 
     #[test]
     fn up_to_two_missing_slices_are_given_the_nearer_neighbours_frame_and_three_are_not() {
-        let (frames, counts) = swept(&[&[-4.0, -2.0, 3.7, 6.0]]);
+        let (frames, counts) = run_passes(&[&[-4.0, -2.0, 3.7, 6.0]]);
         assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2), (5, 2), (6, 3)]);
         assert_eq!((counts.filled, counts.placed, counts.whole, counts.incomplete), (3, 4, 1, 0));
-        let (frames, counts) = swept(&[&[-6.0, 2.0, 2.1]]);
+        let (frames, counts) = run_passes(&[&[-6.0, 2.0, 2.1]]);
         assert_eq!(slices_and_tags(&frames), [(0, 0), (4, 1), (5, 1), (6, 1)]);
         assert_eq!((counts.filled, counts.whole, counts.incomplete, counts.farther), (2, 0, 1, 1));
-        let (frames, counts) = swept(&[&[0.0, 2.0]]);
+        let (frames, counts) = run_passes(&[&[0.0, 2.0]]);
         assert_eq!(slices_and_tags(&frames), [(3, 0), (4, 1), (5, 1), (6, 1)], "three are missing at the start");
         assert_eq!(counts.incomplete, 1);
     }
@@ -290,5 +360,27 @@ mod tests {
                 before = Some((frame.volume, frame.number));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod count_tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_of_plenty_is_no_fault() {
+        let plenty = TrackingCounts {
+            placed: 9,
+            early: 3,
+            turning: 2,
+            beyond: 1,
+            farther: 7,
+            whole: 1,
+            ..TrackingCounts::default()
+        };
+        assert_eq!(plenty.fault(), None);
+        let one = TrackingCounts { filled: 2, ..plenty };
+        assert!(one.since(&plenty).fault().is_some_and(|f| f.starts_with("motor: 2 slices") && !f.contains(';')));
+        assert!(one.to_string().contains("2 slices filled") && one.to_string().lines().count() == 1);
     }
 }

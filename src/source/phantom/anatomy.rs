@@ -3,7 +3,6 @@
 //! The head has its own axes, mm: x to the right of the picture, y towards the crown, z out of the face; the origin lies
 //! between the eyes. Sizes follow usual biometry: outer orbital distance 50 mm, biparietal diameter 78 mm.
 
-use super::shape::{ball, carve, ellipsoid, join, rod};
 use glam::{Vec3, vec3};
 
 /// Skin of the head. `mouth` is how far the jaw is lowered, mm.
@@ -162,4 +161,42 @@ pub(super) fn shoulders(p: Vec3) -> f32 {
     let q = vec3(p.x.abs(), p.y, p.z);
     let shoulder = rod(q, vec3(8.0, -62.0, -44.0), vec3(40.0, -68.0, -46.0), [15.0, 13.0]);
     join(shoulder, ellipsoid(p, vec3(0.0, -82.0, -42.0), vec3(36.0, 26.0, 24.0)), 10.0)
+}
+
+pub(super) fn ball(p: Vec3, centre: Vec3, radius: f32) -> f32 {
+    (p - centre).length() - radius
+}
+
+pub(super) fn ellipsoid(p: Vec3, centre: Vec3, radii: Vec3) -> f32 {
+    let scaled = (p - centre) / radii;
+    let slope = (scaled / radii).length();
+    let k = scaled.length();
+    // In the very middle the slope vanishes; there the smallest radius is the distance.
+    if slope < 1e-6 { -radii.min_element() } else { k * (k - 1.0) / slope }
+}
+
+/// A rod with round ends whose radius goes from one value to the other.
+pub(super) fn rod(p: Vec3, from: Vec3, to: Vec3, radii: [f32; 2]) -> f32 {
+    let along = to - from;
+    let share = ((p - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    (p - from - along * share).length() - radii[0] - (radii[1] - radii[0]) * share
+}
+
+/// Union that fills the crease between two shapes over `width` mm.
+pub(super) fn join(a: f32, b: f32, width: f32) -> f32 {
+    let overlap = (width - (a - b).abs()).max(0.0) / width;
+    a.min(b) - overlap * overlap * width / 4.0
+}
+
+/// `a` without `b`, its edge rounded over `width` mm.
+pub(super) fn carve(a: f32, b: f32, width: f32) -> f32 {
+    -join(-a, b, width)
+}
+
+/// Unit normal of a distance field, by four samples on the corners of a tetrahedron.
+pub(super) fn normal(p: Vec3, field: impl Fn(Vec3) -> f32) -> Vec3 {
+    const REACH: f32 = 0.3;
+    const CORNERS: [Vec3; 4] =
+        [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
+    CORNERS.iter().map(|corner| *corner * field(p + *corner * REACH)).sum::<Vec3>().normalize_or_zero()
 }

@@ -1,7 +1,10 @@
-//! One scan line as a straight line in space.
+//! One scan line as a straight line in space, and the echoes along it.
 
 use crate::probe::{Indices, Probe};
 use glam::{DVec3, Vec3};
+
+/// The grey scale: 255 is 0 dB, 0 is this far below. dB.
+pub const DYNAMIC_RANGE: f64 = 50.0;
 
 /// Where and when one scan line looks. Space is that of [`Probe`], mm.
 pub(super) struct Beam {
@@ -52,4 +55,32 @@ impl Beam {
     pub fn direction(&self) -> Vec3 {
         (self.step / self.pitch).as_vec3()
     }
+}
+
+/// What a place sends back, dB re full scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Echo {
+    /// From scatterers too many to tell apart: they give speckle.
+    pub diffuse: f32,
+    /// From a surface or wire as a whole: it gives none.
+    pub mirror: f32,
+}
+
+impl Echo {
+    /// Far below anything shown.
+    pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
+
+    /// Without speckle: the sum of both powers, dB.
+    pub fn bare(self) -> f32 {
+        if self.mirror <= Echo::SILENT.mirror {
+            return self.diffuse;
+        }
+        10.0 * (10f32.powf(self.diffuse / 10.0) + 10f32.powf(self.mirror / 10.0)).log10()
+    }
+}
+
+/// Grey value of an echo in dB re full scale.
+pub(super) fn grey(level: f32) -> u8 {
+    // A float turns into the nearest end of u8 where it lies outside.
+    ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
 }

@@ -1,13 +1,12 @@
 //! The bodies: which there are, what they send back, and the exact answers of those that have any.
 
-use super::DYNAMIC_RANGE;
-use super::beam::Beam;
+use super::beam::{Beam, DYNAMIC_RANGE, Echo};
 use super::head::Head;
-use super::refusal;
+use crate::files::InputError;
 use crate::probe::Probe;
-use crate::source::InputError;
 use glam::DVec3;
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 
 /// What the probe looks at.
@@ -127,28 +126,6 @@ pub enum Truth {
     Ramp(RampTruth),
 }
 
-/// What a place sends back, dB re full scale.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Echo {
-    /// From scatterers too many to tell apart: they give speckle.
-    pub diffuse: f32,
-    /// From a surface or wire as a whole: it gives none.
-    pub mirror: f32,
-}
-
-impl Echo {
-    /// Far below anything shown.
-    pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
-
-    /// Without speckle: the sum of both powers, dB.
-    pub fn bare(self) -> f32 {
-        if self.mirror <= Echo::SILENT.mirror {
-            return self.diffuse;
-        }
-        10.0 * (10f32.powf(self.diffuse / 10.0) + 10f32.powf(self.mirror / 10.0)).log10()
-    }
-}
-
 /// Greys of the bodies with exact answers. The constant one is 15 dB below full scale, where neither end of the scale clips.
 const BRIGHT: f64 = 204.0;
 const DARK: f64 = 25.5;
@@ -257,4 +234,9 @@ fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
         Truth::Head => return Echo::SILENT,
     };
     Echo { diffuse: level(diffuse), ..Echo::SILENT }
+}
+
+/// An option of the phantom that is out of its range.
+pub(super) fn refusal(field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
+    InputError::new(Path::new("phantom"), field, fault)
 }

@@ -1,9 +1,7 @@
 //! The fetal head in its fluid: what a beam meets on its way, what it sends back and what it loses.
 
-use super::anatomy;
-use super::beam::Beam;
-use super::body::Echo;
-use super::shape::normal;
+use super::anatomy::{self, normal};
+use super::beam::{Beam, Echo};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
 
@@ -36,7 +34,7 @@ const BONE_THICKNESS: f32 = 1.6;
 /// mm of the world for one of the anatomy's.
 const SCALE: f32 = 1.0;
 /// The anatomy's distances may grow faster than the place moves: shares of them are safe to leap over.
-const LEAP: f32 = 0.6;
+const SAFE_STEP: f32 = 0.6;
 
 pub(super) struct Head {
     /// Between the eyes, in the space of the probe.
@@ -118,7 +116,7 @@ impl Head {
                 Tissue::Fluid(away) if wall < 0.0 => {
                     facing = None;
                     // Up to the next thing that may be met it is all the same.
-                    let clear = (away.min(-wall) * LEAP / pitch) as usize;
+                    let clear = (away.min(-wall) * SAFE_STEP / pitch) as usize;
                     let end = (sample + clear).min(out.len() - 1);
                     for (i, echo) in out[sample..end].iter_mut().enumerate() {
                         *echo = received(FLUID, loss, depth + i as f32 * pitch);

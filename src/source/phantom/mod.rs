@@ -8,17 +8,21 @@ mod anatomy;
 mod beam;
 mod body;
 mod head;
-mod shape;
 mod speckle;
-mod write;
 
+pub use beam::DYNAMIC_RANGE;
 pub use body::{Body, RampTruth, Truth, Wire};
 
+use crate::files::InputError;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
-use crate::source::{Frame, InputError};
-use beam::Beam;
-use body::Scatterers;
+use crate::source::frame::Frame;
+use crate::source::samples::SampleType;
+use crate::source::sequence::{self, MAX_FRAMES};
+use beam::{Beam, Echo, grey};
+use body::{Scatterers, refusal};
 use rayon::prelude::*;
+use std::fmt::Write as _;
+use std::io::Write;
 use std::path::Path;
 
 /// Geometry of an abdominal wobbler: Ra 40..42 mm, Rw 22..27 mm, 70..77 deg, are common.
@@ -32,11 +36,8 @@ const END_DEPTH: f64 = 120.0;
 /// m/s.
 const SOUND_SPEED: f64 = 1540.0;
 
-/// The grey scale: 255 is 0 dB, 0 is this far below. dB.
-pub const DYNAMIC_RANGE: f64 = 50.0;
-
 /// Most samples of one volume; its complex field takes eight bytes a sample.
-const LARGEST_VOLUME: usize = 1 << 25;
+const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
 /// What is to be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,8 +98,8 @@ impl Phantom {
         whole("lines", options.lines, 2, 1024)?;
         whole("samples", options.samples, 16, 8192)?;
         // Cannot overflow: 2^10 frames of 2^10 lines of 2^13 samples.
-        if options.frames * options.lines * options.samples > LARGEST_VOLUME {
-            return Err(refusal("samples", format!("more than {LARGEST_VOLUME} in a volume")));
+        if options.frames * options.lines * options.samples > MAX_VOLUME_SAMPLES {
+            return Err(refusal("samples", format!("more than {MAX_VOLUME_SAMPLES} in a volume")));
         }
         if !(0.0..=1.0).contains(&options.speed_ratio) {
             return Err(refusal("speed_ratio", format!("is {}, must lie in 0..=1", options.speed_ratio)));
@@ -156,10 +157,10 @@ impl Phantom {
         let line_time = probe.acquisition_time() / (frames * self.options.lines) as f64;
         let time_of = |slice: usize| ((volume * frames + number_of(slice)) * self.options.lines) as f64 * line_time;
 
-        let echoes: Vec<Vec<body::Echo>> = (0..frames)
+        let echoes: Vec<Vec<Echo>> = (0..frames)
             .into_par_iter()
             .map(|slice| {
-                let mut echoes = vec![body::Echo::SILENT; self.options.lines * self.options.samples];
+                let mut echoes = vec![Echo::SILENT; self.options.lines * self.options.samples];
                 for (line, out) in echoes.chunks_exact_mut(self.options.samples).enumerate() {
                     let time = time_of(slice) + line as f64 * line_time;
                     self.scatterers.along(&Beam::new(&probe, line, slice, time), out);
@@ -192,16 +193,70 @@ impl Phantom {
     /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml` beside it. Both appear whole or
     /// not at all.
     pub fn write(&self, path: &Path) -> Result<(), InputError> {
-        write::sweep(self, path)
+        write_sequence(self, path)
     }
 }
 
-/// Grey value of an echo in dB re full scale.
-fn grey(level: f32) -> u8 {
-    // A float turns into the nearest end of u8 where it lies outside.
-    ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
+fn write_sequence(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
+    let frames = phantom.options().frames * phantom.volumes();
+    if frames > MAX_FRAMES {
+        return Err(InputError::new(
+            path,
+            "volumes",
+            format!("make {frames} frames, a file holds at most {MAX_FRAMES}"),
+        ));
+    }
+    sequence::write_both(path, &header(phantom), &probe_file(phantom), |file| {
+        for volume in 0..phantom.volumes() {
+            for frame in phantom.volume(volume) {
+                file.write_all(&frame.bytes).map_err(|e| InputError::unwritable(path, &e))?;
+            }
+        }
+        Ok(())
+    })
 }
 
-fn refusal(field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
-    InputError::new(Path::new("phantom"), field, fault)
+/// The keys of a pre-scan sweep where those can say all, so that the file stands alone.
+fn header(phantom: &Phantom) -> String {
+    let options = phantom.options();
+    let probe = phantom.probe(0);
+    let frames = options.frames * phantom.volumes();
+    let mut more = String::new();
+    if phantom.volumes() == 1 && options.speed_ratio == 0.0 {
+        // Metres and radians. Writing to a String cannot fail.
+        let _ = write!(
+            more,
+            "IsTransducerConvex = True\nTransducerRadius = {}\nScanLinePitch = {}\nAxialResolution = {}\n\
+             MotorType = TiltingMotor\nMotorRadius = {}\nFramePitch = {}\n",
+            ARRAY_RADIUS / 1e3,
+            probe.lines.pitch(),
+            probe.sample_pitch / 1e3,
+            WOBBLE_RADIUS / 1e3,
+            probe.slices.pitch()
+        );
+    }
+    let frame_time = probe.acquisition_time() / options.frames as f64;
+    let times = (0..frames).map(|n| (n, format!("{:.6}", n as f64 * frame_time)));
+    sequence::header([options.samples, options.lines, frames], SampleType::U8, &more, times)
+}
+
+fn probe_file(phantom: &Phantom) -> String {
+    let options = phantom.options();
+    let mut text = format!(
+        "# Probe of a phantom sweep: body {}, seed {}, speckle {}. Lengths in mm, angles in degrees.\n",
+        options.body, options.seed, options.speckle
+    );
+    let probe = phantom.probe(0);
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "[array]\nkind = \"curved\"\nradius_mm = {ARRAY_RADIUS:?}\n\n\
+         [lines]\nsector_angle_deg = {SECTOR_ANGLE_DEG:?}\n\n\
+         [depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n\n\
+         [motion]\nkind = \"fan\"\nwobble_radius_mm = {WOBBLE_RADIUS:?}\nfan_angle_deg = {FAN_ANGLE_DEG:?}\n\
+         frames_per_volume = {}\nboth_ways = {}\nspeed_ratio = {:?}\n\n\
+         [sound]\nspeed_m_per_s = {SOUND_SPEED:?}\n",
+        probe.start_depth, probe.sample_pitch, options.frames, options.both_ways, options.speed_ratio
+    );
+    text
 }

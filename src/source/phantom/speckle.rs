@@ -4,8 +4,7 @@
 //! function; its magnitude is the envelope. Where the medium is constant that is fully developed speckle: Rayleigh in
 //! amplitude (mean / sd 1.913), Fisher-Tippett in dB (sd 5.57 dB).
 
-use super::body::Echo;
-use super::grey;
+use super::beam::{Echo, grey};
 use crate::probe::Probe;
 use rayon::prelude::*;
 

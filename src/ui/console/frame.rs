@@ -1,313 +1,323 @@
-//! One iteration of the console: inputs go in, what is due is drawn, and what was drawn is shown. Nothing is shown that did not change.
+//! One update of the console: polls the source, draws what is due, and presents it. Nothing is presented unless something changed.
 
-use super::{Console, ConsoleError, Next};
+use super::{Console, ConsoleError, FAULT_CHECK_INTERVAL, LoopRequest};
+use crate::gpu;
 use crate::gpu::window::PresentOutcome;
 use crate::live::{Feed, FinishedPicture, Step, StreamError};
-use crate::ui::panels::{Banner, Facts};
-use crate::ui::source_supervisor::Condition;
-use crate::ui::times::Last;
+use crate::ui::panels::{Banner, PanelState};
+use crate::ui::source_supervisor::SourceState;
+use crate::ui::times::RecentTimes;
 use std::time::{Duration, Instant};
 
-/// The stream has so long at a time before hands are asked again.
-const SHARE: Duration = Duration::from_millis(4);
-/// Faults of a device without a picture in between, after which it is opened anew.
-const FAULTS: u32 = 5;
-/// Between two looks at the statistics.
-const SECOND: Duration = Duration::from_secs(1);
-/// A source that says nothing for so long is said to.
+/// Time for the stream in one update, so that inputs are handled between.
+const STREAM_SLICE: Duration = Duration::from_millis(4);
+/// The device is opened again after so many faults without a picture in between.
+const MAX_DEVICE_FAULTS: u32 = 5;
+/// Interval of the statistics.
+const STATISTICS_INTERVAL: Duration = Duration::from_secs(1);
+/// A warning is shown if no frame comes for so long.
 const SILENCE: Duration = Duration::from_secs(3);
+/// While the next picture is not ready, the window keeps the old content for so long: less disturbing than a black moment.
+const BLANK_DELAY: Duration = Duration::from_millis(400);
+/// Interval of the attempts to present while there is no surface.
+const PRESENT_RETRY: Duration = Duration::from_millis(100);
+/// Interval of the updates while there is no picture to show.
+const BLANK_INTERVAL: Duration = Duration::from_millis(20);
+/// The help needs a window of this height, points.
+const MIN_HELP_HEIGHT: f32 = 200.0;
+/// Lines of a shader compiler's message that are shown.
+const MAX_SHADER_LINES: usize = 12;
 
 impl Console {
-    /// Does what is due, and says when to come again.
+    /// Does what is due and returns what the event loop does next.
     ///
     /// # Errors
-    /// A device or a screen that is gone.
-    pub fn tick(&mut self, now: Instant) -> Result<Next, ConsoleError> {
-        if let Some((amiss, at)) = &mut self.amiss
+    /// The device or the screen is lost.
+    pub fn update(&mut self, now: Instant) -> Result<LoopRequest, ConsoleError> {
+        if let Some((fault, at)) = &mut self.startup_fault
             && now >= *at
         {
-            *at = now + super::LOOK;
-            self.next.renews |= (amiss.is_mended)();
+            *at = now + FAULT_CHECK_INTERVAL;
+            self.request.restart |= (fault.is_resolved)();
         }
-        if let Some(feed) = self.supply.poll(now).filter(|_| self.amiss.is_none()) {
+        if let Some(feed) = self.source.poll(now).filter(|_| self.startup_fault.is_none()) {
             self.stream.replace_source(feed);
-            (self.heard, self.stale) = (now, true);
+            (self.last_arrival, self.needs_redraw) = (now, true);
         }
-        while let Some(saved) = self.keep.poll() {
+        while let Some(saved) = self.exporter.poll() {
             match saved {
-                Ok(file) => self.say(&format!("saved {}", file.display()), false),
-                Err(fault) => self.say(&format!("not saved: {fault}"), true),
+                Ok(file) => self.notify(&format!("Saved {}", file.display()), false),
+                Err(fault) => self.notify(&format!("Not saved: {fault}"), true),
             }
         }
-        self.play(now);
-        self.adjust(now);
-        self.run(now)?;
+        self.advance_cine(now);
+        self.send_settings(now);
+        self.run_stream(now)?;
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
-        self.stale |= shader_fault != self.shader_fault;
+        self.needs_redraw |= shader_fault != self.shader_fault;
         self.shader_fault = shader_fault;
-        self.count(now);
+        self.take_statistics(now);
         let before = self.notes.len();
         self.notes.retain(|(until, _)| *until > now);
-        self.stale |= self.notes.len() != before || self.again.is_some_and(|at| at <= now);
-        self.show(now)?;
-        Ok(Next { at: self.due(now), ..std::mem::take(&mut self.next) })
+        self.needs_redraw |= self.notes.len() != before || self.repaint_at.is_some_and(|at| at <= now);
+        self.present(now)?;
+        Ok(LoopRequest { wake_at: self.next_wake(now), ..std::mem::take(&mut self.request) })
     }
 
-    /// Gives the stream the settings as they are to be drawn now.
-    fn adjust(&mut self, now: Instant) {
-        let (rung, wanted) = self.wanted(now);
-        if self.sent.as_ref() == Some(&wanted) || self.refused.as_ref() == Some(&wanted) {
+    /// Gives the stream the settings that are to be drawn now.
+    fn send_settings(&mut self, now: Instant) {
+        let (rung, settings) = self.effective_settings(now);
+        if self.sent_settings.as_ref() == Some(&settings) || self.rejected_settings.as_ref() == Some(&settings) {
             return;
         }
-        self.stale |= rung != self.rung;
+        self.needs_redraw |= rung != self.rung;
         self.rung = rung;
-        match self.stream.change(wanted.clone()) {
+        match self.stream.change(settings.clone()) {
             Ok(()) => {
-                self.sent = Some(wanted);
-                self.awaited =
-                    self.touched.take().or(self.awaited.map(|a| a.0)).map(|touched| (touched, Instant::now()));
+                self.sent_settings = Some(settings);
+                let first_input = self.unsent_input.take().or(self.unshown_input.map(|(input, _)| input));
+                self.unshown_input = first_input.map(|input| (input, Instant::now()));
             }
             Err(fault) => {
-                self.refused = Some(wanted);
-                self.say(&fault.to_string(), true);
+                self.rejected_settings = Some(settings);
+                self.notify(&fault.to_string(), true);
             }
         }
     }
 
-    fn run(&mut self, now: Instant) -> Result<(), ConsoleError> {
+    /// Runs the stream until a picture is finished, it has nothing to do, or its time slice ends.
+    fn run_stream(&mut self, now: Instant) -> Result<(), ConsoleError> {
         let begun = Instant::now();
         loop {
             match self.stream.step(Duration::ZERO) {
-                Ok(Step::Picture(shown)) => {
-                    self.drew(&shown);
-                    self.faults = 0;
-                    // Shown before the next one begins, which would take its place.
+                Ok(Step::Picture(picture)) => {
+                    self.picture_finished(&picture);
+                    self.device_faults = 0;
+                    // It is presented before the next picture begins, which would replace it.
                     break;
                 }
-                Ok(Step::Fault(fault)) => self.say(&fault, true),
+                Ok(Step::Fault(fault)) => self.notify(&fault, true),
                 Ok(Step::Progress) => {}
-                Ok(Step::End(why)) => self.ended(why, now),
+                Ok(Step::End(why)) => self.source_ended(why, now),
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
-                // One that fails whatever comes is as good as lost.
-                Err(StreamError::Gpu(fault)) if self.faults >= FAULTS => {
-                    self.faults = 0;
+                // A device that fails every time is treated as lost.
+                Err(StreamError::Gpu(fault)) if self.device_faults >= MAX_DEVICE_FAULTS => {
+                    self.device_faults = 0;
                     return Err(ConsoleError::DeviceLost(fault));
                 }
-                // What came cannot be drawn: too large, or beyond what settings allow.
+                // What came cannot be drawn: it is too large, or beyond what the settings allow.
                 Err(fault) => {
-                    self.faults += u32::from(matches!(fault, StreamError::Gpu(_)));
-                    self.ended(Some(fault.to_string()), now);
+                    self.device_faults += u32::from(matches!(fault, StreamError::Gpu(_)));
+                    self.source_ended(Some(fault.to_string()), now);
                     break;
                 }
             }
             let waits = self.stream.is_drawing() && !self.stream.has_waiting();
-            if begun.elapsed() >= SHARE || waits || self.stream.is_idle() {
+            if begun.elapsed() >= STREAM_SLICE || waits || self.stream.is_idle() {
                 break;
             }
         }
         let frames = self.stream.frames();
         if frames != self.frames {
-            (self.frames, self.heard) = (frames, now);
+            (self.frames, self.last_arrival) = (frames, now);
         }
         Ok(())
     }
 
-    pub(super) fn ended(&mut self, why: Option<String>, now: Instant) {
+    /// Handles the end of the source. `why`: the fault, if it ended unexpectedly.
+    pub(super) fn source_ended(&mut self, why: Option<String>, now: Instant) {
         if let Some(why) = &why {
             tracing::warn!("source: {why}");
         }
-        self.supply.ended(why, now);
+        self.source.ended(why, now);
         self.stream.replace_source(Feed::none());
-        self.stale = true;
+        self.needs_redraw = true;
     }
 
-    fn drew(&mut self, shown: &FinishedPicture) {
-        self.fresh = true;
-        self.pace.took(self.rung, shown.took);
-        self.times.pictures.add(shown.took);
+    fn picture_finished(&mut self, picture: &FinishedPicture) {
+        self.has_new_picture = true;
+        self.frame_budget.picture_took(self.rung, picture.took);
+        self.times.pictures.add(picture.took);
     }
 
-    /// The statistics of a second in which anything happened.
-    fn count(&mut self, now: Instant) {
-        if now.saturating_duration_since(self.counted) < SECOND {
+    /// Takes the statistics of the last second.
+    fn take_statistics(&mut self, now: Instant) {
+        if now.saturating_duration_since(self.statistics_at) < STATISTICS_INTERVAL {
             return;
         }
-        self.counted = now;
-        let floor = self.stream.acquisition_time();
-        // Without a picture or a frame they cannot fail, and nothing is worth more than going on.
-        if let Ok(since) = self.stream.take_statistics() {
-            self.stale |= self.hud && (since.pictures > 0 || since.frames > 0);
-            if since.pictures > 0 || since.frames > 0 {
-                tracing::debug!("{}", since.line(floor));
+        self.statistics_at = now;
+        let acquisition_time = self.stream.acquisition_time();
+        // Without a picture or a frame they cannot fail; a fault here must not stop the view.
+        if let Ok(statistics) = self.stream.take_statistics() {
+            let is_active = statistics.pictures > 0 || statistics.frames > 0;
+            self.needs_redraw |= self.shows_times && is_active;
+            if is_active {
+                tracing::debug!("{}", statistics.line(acquisition_time));
             }
-            self.times.second(&since, floor);
+            self.times.add(&statistics, acquisition_time);
         }
     }
 
-    /// When something is due that nothing brings.
-    fn due(&self, now: Instant) -> Option<Instant> {
+    /// When to update again without an event.
+    fn next_wake(&self, now: Instant) -> Option<Instant> {
         if self.stream.is_drawing() && !self.stream.has_waiting() {
-            // It is asked for, not waited for; a device that is a CPU needs the core that would ask all the time.
+            // Poll the picture at intervals: on a CPU device, polling all the time would take a core from the rendering.
             return Some(now + Duration::from_millis(1));
         }
-        let shows = self.stale && self.screen.is_some() && self.blank.is_none() && self.nowhere.is_none();
-        if !self.stream.is_idle() || shows {
+        let can_present = self.screen.is_some() && self.blank_since.is_none() && self.present_retry_at.is_none();
+        if !self.stream.is_idle() || (self.needs_redraw && can_present) {
             return Some(now);
         }
         let notes = self.notes.iter().map(|(until, _)| *until);
-        let listens = matches!(self.supply.condition(), Condition::Open);
-        let silence = Some(self.heard + SILENCE).filter(|at| listens && !self.stream.is_frozen() && *at > now);
-        let counts = self.hud.then_some(self.counted + SECOND).filter(|_| self.times.pictures.newest().is_some());
-        let looks = self.amiss.as_ref().map(|(_, at)| *at);
+        let is_listening = matches!(self.source.state(), SourceState::Open) && !self.stream.is_frozen();
+        let silence = Some(self.last_arrival + SILENCE).filter(|at| is_listening && *at > now);
+        let has_pictures = self.times.pictures.newest().is_some();
+        let statistics = self.shows_times.then_some(self.statistics_at + STATISTICS_INTERVAL).filter(|_| has_pictures);
+        let fault_check = self.startup_fault.as_ref().map(|(_, at)| *at);
         [
-            looks,
-            self.nowhere,
-            self.supply.wakes_at(),
-            self.pace.rests_at(now),
-            self.again,
-            self.playing,
+            fault_check,
+            self.present_retry_at,
+            self.source.wakes_at(),
+            self.frame_budget.rests_at(now),
+            self.repaint_at,
+            self.next_cine_step,
             silence,
-            counts,
+            statistics,
         ]
         .into_iter()
         .flatten()
         .chain(notes)
-        .chain(self.blank.map(|_| now + Duration::from_millis(20)))
+        .chain(self.blank_since.map(|_| now + BLANK_INTERVAL))
         .min()
     }
-}
 
-/// So long what was seen stays, while what is shown is made anew: less disturbing than a black moment.
-const PATIENCE: Duration = Duration::from_millis(400);
-/// Between two attempts to show something where there was nothing to show it on.
-const NOWHERE: Duration = Duration::from_millis(100);
-/// The help is shown in windows that are higher, points.
-const HELP: f32 = 200.0;
-/// Of a compiler's message, at most.
-const SHADER_LINES: usize = 12;
-
-impl Console {
-    pub(super) fn show(&mut self, now: Instant) -> Result<(), ConsoleError> {
-        // A picture that is on its way would be waited for: it and the panels are then shown together.
-        if !(self.fresh || self.stale) || self.stream.is_drawing() || self.nowhere.is_some_and(|until| now < until) {
+    /// Presents the picture and the panels, if either is new.
+    fn present(&mut self, now: Instant) -> Result<(), ConsoleError> {
+        let is_new = self.has_new_picture || self.needs_redraw;
+        // While a picture is being drawn, presenting would wait for it: both are then presented together.
+        if !is_new || self.stream.is_drawing() || self.present_retry_at.is_some_and(|until| now < until) {
             return Ok(());
         }
         let has_drawn = self.stream.renderer().is_some_and(|renderer| renderer.has_drawn());
         if !has_drawn && !self.stream.is_idle() {
-            let since = *self.blank.get_or_insert(now);
-            if now.saturating_duration_since(since) < PATIENCE {
+            let since = *self.blank_since.get_or_insert(now);
+            if now.saturating_duration_since(since) < BLANK_DELAY {
                 return Ok(());
             }
         }
-        self.blank = None;
-        let panels = self.options.overlay.then(|| self.lay_out(now, has_drawn));
-        if !self.options.overlay && !has_drawn && self.screen.as_ref().is_some_and(|s| s.shown() > 0) {
-            self.stale = false;
+        self.blank_since = None;
+        let panels = self.fixed.overlay.then(|| self.lay_out_panels(now, has_drawn));
+        if !self.fixed.overlay && !has_drawn && self.screen.as_ref().is_some_and(|s| s.shown() > 0) {
+            self.needs_redraw = false;
             return Ok(());
         }
-        let at = self.place().0;
+        let corner = self.picture_area().0;
         let Some(screen) = &mut self.screen else {
-            (self.fresh, self.stale) = (false, false);
+            (self.has_new_picture, self.needs_redraw) = (false, false);
             return Ok(());
         };
-        let seen = match self.stream.renderer().filter(|_| has_drawn) {
-            Some(renderer) => renderer.present(screen, at, panels),
+        let presented = match self.stream.renderer().filter(|_| has_drawn) {
+            Some(renderer) => renderer.present(screen, corner, panels),
             None => screen.show(panels),
         };
-        match seen {
-            Ok(PresentOutcome::Shown) => {
-                (self.fresh, self.stale, self.nowhere) = (false, self.panels.is_waiting(), None);
-                self.answered();
+        match presented {
+            Ok(PresentOutcome::Presented) => {
+                (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
+                self.present_retry_at = None;
+                self.measure_input_latency();
             }
-            // Asked again when the window says so, or in a moment.
-            Ok(PresentOutcome::Nowhere) => self.nowhere = Some(now + NOWHERE),
+            // Try again when the window asks for it, or after a moment.
+            Ok(PresentOutcome::NotPresentable) => self.present_retry_at = Some(now + PRESENT_RETRY),
             Err(lost) if lost.is_device_lost() => return Err(ConsoleError::DeviceLost(lost)),
             Err(fault) => return Err(ConsoleError::Screen(fault)),
         }
         Ok(())
     }
 
-    /// The picture that was shown answers what a hand did before it was begun.
-    fn answered(&mut self) {
-        let drawn = self.stream.last_begun();
-        if let Some((touched, _)) = self.awaited.take_if(|(_, sent)| drawn.is_some_and(|begun| begun >= *sent)) {
-            self.times.hands.add(touched.elapsed());
+    /// Records the input latency if the presented picture was begun after the settings of the input were sent.
+    fn measure_input_latency(&mut self) {
+        let last_begun = self.stream.last_begun();
+        let answered = self.unshown_input.take_if(|(_, sent)| last_begun.is_some_and(|begun| begun >= *sent));
+        if let Some((input, _)) = answered {
+            self.times.input_latency.add(input.elapsed());
         }
     }
 
-    /// What came of it, in a line.
+    /// A summary of the run in one line.
     pub fn summary(&mut self) -> String {
         let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1}"));
-        let of = |last: &Last| format!("p50 {} p95 {}", ms(last.percentile(0.5)), ms(last.percentile(0.95)));
+        let percentiles =
+            |times: &RecentTimes| format!("p50 {} p95 {}", ms(times.percentile(0.5)), ms(times.percentile(0.95)));
         let (shown, dispatched) = (self.screen.as_ref().map_or(0, |s| s.shown()), self.stream.dispatches());
         let still = self.stream.last_begun().map_or(0.0, |begun| begun.elapsed().as_secs_f64());
         format!(
             "{:.1} s: {} volumes, {} shown on the window, {dispatched} dispatches, none in the last {still:.1} s; ms: picture {}, \
-             hand to picture {}",
-            self.began.elapsed().as_secs_f64(),
+             input to picture {}",
+            self.started.elapsed().as_secs_f64(),
             self.stream.volumes_shown(),
             shown,
-            of(&self.times.pictures),
-            of(&self.times.hands),
+            percentiles(&self.times.pictures),
+            percentiles(&self.times.input_latency),
         )
     }
 
-    fn lay_out(&mut self, now: Instant, is_drawn: bool) -> crate::gpu::window::Panels {
+    /// Lays out the panels and executes the commands that they give.
+    fn lay_out_panels(&mut self, now: Instant, has_drawn: bool) -> gpu::window::Panels {
         let notes: Vec<_> = self.notes.iter().map(|(_, note)| note.clone()).collect();
-        let quality = self.rungs.get(self.rung).map_or("full quality", |rung| rung.words.as_str());
-        let exit_key = match (&self.options.exit, self.options.is_kiosk) {
+        let quality = self.rungs.get(self.rung).map_or("full quality", |rung| rung.label.as_str());
+        let exit_key = match (&self.fixed.exit, self.fixed.is_kiosk) {
             (Some(chord), true) => chord.to_string(),
             (None, true) => String::new(),
             (_, false) => "Escape, Q".into(),
         };
-        let facts = Facts {
+        let state = PanelState {
             controls: &self.controls,
             scene: self.stream.scene(),
             times: &self.times,
-            picture: self.place(),
-            is_panelled: self.is_panelled,
-            // egui breaks at a list that has less than no room.
-            help: self.help && self.size[1] as f32 > HELP * self.panels.scale(),
-            hud: self.hud,
+            picture: self.picture_area(),
+            shows_panels: self.shows_panels,
+            // egui panics if a list has a negative height.
+            shows_help: self.shows_help && self.size[1] as f32 > MIN_HELP_HEIGHT * self.panels.scale(),
+            shows_times: self.shows_times,
             is_frozen: self.stream.is_frozen(),
-            is_playing: self.playing.is_some(),
+            is_playing: self.next_cine_step.is_some(),
             cine: (self.stream.cine().volumes().len(), self.stream.cine_position()),
-            is_drawn,
+            has_drawn,
             quality,
-            budget: self.pace.budget(),
+            budget: self.frame_budget.budget(),
             banner: self.banner(now),
             notes: &notes,
             exit_key: &exit_key,
             pointer: self.pointer,
         };
-        let laid = self.panels.lay_out(&facts, self.size, now.saturating_duration_since(self.began).as_secs_f64());
-        self.again = (laid.again < Duration::from_secs(3600)).then(|| now + laid.again);
-        for command in laid.commands {
-            self.command(&command, now);
+        let time = now.saturating_duration_since(self.started).as_secs_f64();
+        let output = self.panels.lay_out(&state, self.size, time);
+        self.repaint_at = (output.repaint_after < Duration::from_secs(3600)).then(|| now + output.repaint_after);
+        for command in output.commands {
+            self.execute(&command, now);
         }
-        laid.panels
+        output.panels
     }
 
-    /// What is amiss, while it is.
+    /// The message for a lasting fault.
     fn banner(&self, now: Instant) -> Option<Banner> {
         let banner = |title: &str, text: &str, is_fault| Banner { title: title.into(), text: text.into(), is_fault };
-        if let Some((amiss, _)) = &self.amiss {
-            return Some(banner(&amiss.title, &amiss.why, true));
+        if let Some((fault, _)) = &self.startup_fault {
+            return Some(banner(&fault.title, &fault.why, true));
         }
         if let Some(fault) = &self.shader_fault {
-            // A compiler may complain of every line.
-            let text: String = fault.lines().take(SHADER_LINES).map(|line| format!("{line}\n")).collect();
-            return Some(banner("A shader has a fault: the last good one is shown", text.trim_end(), true));
+            let lines: Vec<&str> = fault.lines().take(MAX_SHADER_LINES).collect();
+            return Some(banner("Shader error: the last good shader is shown", &lines.join("\n"), true));
         }
-        let silent = now.saturating_duration_since(self.heard) >= SILENCE && !self.stream.is_frozen();
-        match self.supply.condition() {
-            Condition::Opening => Some(banner("Connecting to the probe", "", false)),
-            Condition::Waiting(why) => Some(banner("No probe: trying again", why, true)),
-            Condition::Over(Some(why)) => Some(banner("The source ended", why, true)),
-            Condition::Open if silent => {
-                Some(banner("No frames from the probe", "It is connected and says nothing.", true))
+        let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
+        match self.source.state() {
+            SourceState::Opening => Some(banner("Connecting to the probe", "", false)),
+            SourceState::Retrying(why) => Some(banner("No probe: trying again", why, true)),
+            SourceState::Ended(Some(why)) => Some(banner("The source ended", why, true)),
+            SourceState::Open if is_silent => {
+                Some(banner("No frames from the probe", "It is connected but sends nothing.", true))
             }
-            Condition::Over(None) | Condition::Open => None,
+            SourceState::Ended(None) | SourceState::Open => None,
         }
     }
 }

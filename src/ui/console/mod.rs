@@ -1,5 +1,5 @@
-//! The console: the stream on one side, hands and eyes on the other. It knows no window, only inputs, the time, and a screen to show
-//! things on, which may be missing; so that whatever can be done in a window is tested without one.
+//! The console of the live view. It connects the stream with gestures, keys, panels and the screen. It depends on no window: inputs, the
+//! time and a screen (which may be missing) are passed in, so that everything a window can do is tested without one.
 
 mod frame;
 
@@ -9,11 +9,11 @@ use super::export::Exporter;
 use super::frame_budget::FrameBudget;
 use super::gestures::Gestures;
 use super::input::Input;
-use super::keys::Keys;
+use super::keys::HeldKeys;
 use super::panels::{self, Note, Panels};
-use super::picking::Picture;
-use super::quality_ladder::Rung;
-use super::source_supervisor::{Open, SourceSupervisor};
+use super::picking::Viewport;
+use super::quality_ladder::{self, Rung};
+use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
@@ -26,57 +26,61 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long a note stays.
-const NOTE: Duration = Duration::from_secs(5);
-/// Between two looks whether what is amiss is mended.
-const LOOK: Duration = Duration::from_secs(2);
-/// Notes at once, the newest.
-const NOTES: usize = 4;
+/// How long a note is shown.
+const NOTE_TIME: Duration = Duration::from_secs(5);
+/// Interval of the checks whether a startup fault is resolved.
+const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
+/// Largest number of notes that are shown at once; the newest ones win.
+const MAX_NOTES: usize = 4;
+/// Time between two volumes of a cine loop.
+const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
-pub struct Options {
+/// What a console is created with.
+pub struct ConsoleOptions {
     pub settings: Settings,
     pub update: Update,
-    /// Volume images that take turns, 2 or 3.
+    /// Number of volume images, 2 or 3.
     pub images: u32,
     pub queues: Option<usize>,
     pub cine: CineLimits,
-    /// Time of a picture that is held while the view moves.
+    /// The frame budget: longest time of a picture while the view moves.
     pub budget: Option<Duration>,
+    /// The quality ladder, from full quality down.
     pub rungs: Vec<Rung>,
-    /// How long to wait before a source that ended is opened again; none ends with it.
+    /// How long to wait before a source that ended is opened again. None: the end of the source is final.
     pub retry: Option<Duration>,
-    /// Every frame goes there too.
+    /// A file for all frames that arrive.
     pub record: Option<PathBuf>,
-    /// Where pictures and loops are saved.
+    /// The folder for saved pictures and loops.
     pub folder: PathBuf,
-    /// Anything besides the picture is drawn at all.
+    /// Draws panels, notes and marks over the picture.
     pub overlay: bool,
-    /// Sliders and buttons, to begin with.
+    /// Shows sliders and buttons at the start.
     pub panels: bool,
-    /// Pixels a point.
+    /// Pixels per point.
     pub scale: f32,
-    /// The only way out of a kiosk, if there is any.
+    /// The keys that end a kiosk, if any.
     pub exit: Option<Chord>,
     pub is_kiosk: bool,
-    /// Called when [`Console::tick`] has something to do.
+    /// Called when [`Console::update`] has something to do.
     pub wake: Wake,
-    /// Nothing of this can be right: only why is shown.
-    pub amiss: Option<Amiss>,
-    /// Shaders to use instead of the embedded ones; the folder is watched, and what changes there is shown.
+    /// A fault that prevents the view: only its message is shown.
+    pub startup_fault: Option<StartupFault>,
+    /// Shaders to use instead of the embedded ones. The folder is watched, and shaders that change are loaded again.
     pub shaders: Option<Arc<ShaderFolder>>,
 }
 
-impl Options {
-    /// Of a window that somebody looks into, full quality always, nothing kept; nobody is told when there is something to do.
-    pub fn usual() -> Options {
-        Options {
+impl Default for ConsoleOptions {
+    /// An interactive window at full quality, without recording. `wake` does nothing.
+    fn default() -> ConsoleOptions {
+        ConsoleOptions {
             settings: Settings::default(),
             update: Update::Whole,
             images: 3,
             queues: None,
             cine: CineLimits::default(),
             budget: None,
-            rungs: super::quality_ladder::built_in(),
+            rungs: quality_ladder::built_in(),
             retry: None,
             record: None,
             folder: ".".into(),
@@ -86,101 +90,107 @@ impl Options {
             exit: None,
             is_kiosk: false,
             wake: Arc::new(|| ()),
-            amiss: None,
+            startup_fault: None,
             shaders: None,
         }
     }
 }
 
-/// What keeps everything from being shown, and how to find out that it is gone.
-pub struct Amiss {
+/// A fault that prevents the view, such as a wrong configuration, and how to find out that it is resolved.
+pub struct StartupFault {
     pub title: String,
     pub why: String,
-    /// Asked every two seconds: when it is mended another console is asked for.
-    pub is_mended: Box<dyn Fn() -> bool>,
+    /// Called every two seconds. When it returns true, the console asks to be replaced.
+    pub is_resolved: Box<dyn Fn() -> bool>,
 }
 
-/// What whoever drives the console does next.
+/// What the event loop does after an update of the console.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Next {
-    /// When to tick again, whatever comes; none: when something does.
-    pub at: Option<Instant>,
+pub struct LoopRequest {
+    /// When to update again even if no event comes. None: wait for an event.
+    pub wake_at: Option<Instant>,
     pub exit: bool,
-    pub toggles_full_screen: bool,
-    /// Another console is to take the place of this one.
-    pub renews: bool,
+    pub toggle_full_screen: bool,
+    /// Replace this console with a new one.
+    pub restart: bool,
 }
 
-/// Why the console cannot go on by itself.
+/// Why the console cannot continue by itself.
 #[derive(Debug, thiserror::Error)]
 pub enum ConsoleError {
-    /// [`Console::revive`] goes on.
+    /// [`Console::revive`] continues on another device.
     #[error("{0}")]
     DeviceLost(GpuError),
-    /// The screen is gone; [`Console::set_screen`] goes on.
+    /// The screen is lost; [`Console::set_screen`] continues on another one.
     #[error("{0}")]
     Screen(GpuError),
 }
 
+/// The live view without its window.
 pub struct Console {
-    // Dropped in this order: what shows before what is shown.
+    // Fields are dropped in this order: the screen before the stream whose pictures it shows.
     screen: Option<Screen>,
     stream: Stream,
     context: Arc<Context>,
-    supply: SourceSupervisor,
+    source: SourceSupervisor,
     controls: Controls,
-    hand: Gestures,
-    keys: Keys,
-    keep: Exporter,
-    pace: FrameBudget,
+    gestures: Gestures,
+    keys: HeldKeys,
+    exporter: Exporter,
+    frame_budget: FrameBudget,
     rungs: Vec<Rung>,
     panels: Panels,
     times: Times,
-    options: Shape,
-    /// Of the window, pixels.
+    fixed: FixedOptions,
+    /// Size of the window, pixels.
     size: [u32; 2],
-    began: Instant,
-    /// The settings that the stream was given last, and the rung that they stand on.
-    sent: Option<Settings>,
+    started: Instant,
+    /// The settings that the stream was given last, and their rung of the quality ladder.
+    sent_settings: Option<Settings>,
     rung: usize,
-    /// Settings that could not be drawn are told once.
-    refused: Option<Settings>,
+    /// Settings that could not be drawn, to report them only once.
+    rejected_settings: Option<Settings>,
     notes: Vec<(Instant, Note)>,
-    /// Something besides the picture looks different.
-    stale: bool,
+    /// Something besides the picture changed.
+    needs_redraw: bool,
     /// A picture was drawn that has not been shown.
-    fresh: bool,
-    help: bool,
-    hud: bool,
-    is_panelled: bool,
-    /// Where it is to be drawn, pixels of the window.
+    has_new_picture: bool,
+    shows_help: bool,
+    shows_times: bool,
+    shows_panels: bool,
+    /// Where to draw the pointer, pixels of the window.
     pointer: Option<[f64; 2]>,
-    playing: Option<Instant>,
-    /// The first thing that a hand did which no settings have taken up yet, and which no picture has shown yet.
-    touched: Option<Instant>,
-    awaited: Option<(Instant, Instant)>,
-    /// When statistics were taken last, and when anything came last.
-    counted: Instant,
-    heard: Instant,
+    /// When the next volume of the cine loop is due, while it plays.
+    next_cine_step: Option<Instant>,
+    /// The first input whose settings the stream has not been given yet.
+    unsent_input: Option<Instant>,
+    /// The first input that no picture shows yet, and when its settings were given to the stream.
+    unshown_input: Option<(Instant, Instant)>,
+    /// When statistics were taken last.
+    statistics_at: Instant,
+    /// When a frame or a source came last.
+    last_arrival: Instant,
     frames: u64,
-    /// Of the device, since the last picture.
-    faults: u32,
-    /// Since when nothing that was drawn can be shown.
-    blank: Option<Instant>,
-    again: Option<Instant>,
-    /// There was nothing to show things on: not tried again before.
-    nowhere: Option<Instant>,
-    amiss: Option<(Amiss, Instant)>,
-    next: Next,
+    /// Faults of the device since the last picture.
+    device_faults: u32,
+    /// Since when there is no picture to show.
+    blank_since: Option<Instant>,
+    /// When the panels want to be drawn again.
+    repaint_at: Option<Instant>,
+    /// There was no surface to present to; do not try again before this time.
+    present_retry_at: Option<Instant>,
+    /// The startup fault, and when to check it next.
+    startup_fault: Option<(StartupFault, Instant)>,
+    request: LoopRequest,
     shaders: Option<Arc<ShaderFolder>>,
-    /// Why what is shown is not drawn with the shaders as they are written now.
+    /// Why the picture is not drawn with the shaders as they are in their folder now.
     shader_fault: Option<String>,
-    /// Keeps `shaders` up to date.
-    _watch: Option<Watch>,
+    /// Reloads `shaders`.
+    _shader_watch: Option<Watch>,
 }
 
-/// What stays as it was given.
-struct Shape {
+/// Options that never change.
+struct FixedOptions {
     overlay: bool,
     exit: Option<Chord>,
     is_kiosk: bool,
@@ -188,12 +198,12 @@ struct Shape {
 
 impl Console {
     /// `size`: of the window, pixels.
-    pub fn new(context: &Arc<Context>, open: Open, options: Options, size: [u32; 2]) -> Console {
+    pub fn new(context: &Arc<Context>, open: OpenSource, options: ConsoleOptions, size: [u32; 2]) -> Console {
         let now = Instant::now();
-        let is_panelled = options.panels && options.overlay;
+        let shows_panels = options.panels && options.overlay;
         let mut controls = Controls::new(options.settings);
-        controls.resize(panels::place(size, options.scale, is_panelled).1);
-        let streamed = live::StreamOptions {
+        controls.resize(panels::picture_area(size, options.scale, shows_panels).1);
+        let stream_options = live::StreamOptions {
             update: options.update,
             images: options.images,
             queues: options.queues,
@@ -202,92 +212,98 @@ impl Console {
             wake: Some(options.wake.clone()),
             shaders: options.shaders.clone(),
         };
-        let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone()));
-        let (watch, unwatched) = match watch.transpose() {
+        let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
+        let (shader_watch, watch_fault) = match watch {
             Ok(watch) => (watch, None),
             Err(fault) => (None, Some(fault)),
         };
-        let shares: Vec<f64> = options.rungs.iter().map(|rung| rung.share).collect();
+        let time_shares: Vec<f64> = options.rungs.iter().map(|rung| rung.time_share).collect();
         let mut console = Console {
             screen: None,
-            stream: Stream::new(context, Feed::none(), controls.settings().clone(), streamed),
+            stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
             context: context.clone(),
-            supply: SourceSupervisor::new(open, options.retry, options.record, options.wake.clone()),
+            source: SourceSupervisor::new(open, options.retry, options.record, options.wake.clone()),
             controls,
-            hand: Gestures::default(),
-            keys: Keys::default(),
-            keep: Exporter::new(options.folder, options.wake),
-            pace: FrameBudget::new(options.budget, &shares),
+            gestures: Gestures::default(),
+            keys: HeldKeys::default(),
+            exporter: Exporter::new(options.folder, options.wake),
+            frame_budget: FrameBudget::new(options.budget, &time_shares),
             rungs: options.rungs,
             panels: Panels::new(options.scale),
             times: Times::default(),
-            options: Shape { overlay: options.overlay, is_kiosk: options.is_kiosk, exit: options.exit },
+            fixed: FixedOptions { overlay: options.overlay, is_kiosk: options.is_kiosk, exit: options.exit },
             size,
-            began: now,
-            sent: None,
+            started: now,
+            sent_settings: None,
             rung: 0,
-            refused: None,
+            rejected_settings: None,
             notes: Vec::new(),
-            stale: true,
-            fresh: false,
-            help: false,
-            hud: false,
-            is_panelled,
+            needs_redraw: true,
+            has_new_picture: false,
+            shows_help: false,
+            shows_times: false,
+            shows_panels,
             pointer: None,
-            playing: None,
-            touched: None,
-            awaited: None,
-            counted: now,
-            heard: now,
+            next_cine_step: None,
+            unsent_input: None,
+            unshown_input: None,
+            statistics_at: now,
+            last_arrival: now,
             frames: 0,
-            faults: 0,
-            blank: None,
-            again: None,
-            nowhere: None,
-            amiss: options.amiss.map(|amiss| (amiss, now + LOOK)),
-            next: Next::default(),
+            device_faults: 0,
+            blank_since: None,
+            repaint_at: None,
+            present_retry_at: None,
+            startup_fault: options.startup_fault.map(|fault| (fault, now + FAULT_CHECK_INTERVAL)),
+            request: LoopRequest::default(),
             shaders: options.shaders,
             shader_fault: None,
-            _watch: watch,
+            _shader_watch: shader_watch,
         };
-        if let Some(fault) = unwatched {
-            console.say(&fault, true);
+        if let Some(fault) = watch_fault {
+            console.notify(&fault, true);
         }
         console
     }
 
-    /// What to show things on.
-    pub fn set_screen(&mut self, screen: Option<Screen>) {
-        // The old one goes first: a window has one surface at a time.
-        self.screen = None;
-        self.screen = screen;
-        self.panels.renew();
-        self.stale = true;
+    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    pub fn shader_fault(&self) -> Option<&str> {
+        self.shader_fault.as_deref()
     }
 
-    /// What it showed things on, for another.
-    pub fn into_screen(mut self) -> Option<Screen> {
+    /// Sets the screen to present to.
+    pub(super) fn set_screen(&mut self, screen: Option<Screen>) {
+        // Drop the old one first: a window has one surface at a time.
+        self.screen = None;
+        self.screen = screen;
+        self.panels.reset();
+        self.needs_redraw = true;
+    }
+
+    /// Ends the console and returns its screen for another one.
+    pub(super) fn into_screen(mut self) -> Option<Screen> {
         self.screen.take()
     }
 
-    /// Goes on with another device, or the same one anew: with what was kept, and the volume that comes next.
+    /// Continues on another device, or on the same one opened again. The cine loop is kept; the live picture continues with the next
+    /// volume.
     ///
     /// # Errors
-    /// A device that cannot hold what is shown.
+    /// The device cannot hold what is shown.
     pub fn revive(&mut self, context: &Arc<Context>, screen: Option<Screen>) -> Result<(), StreamError> {
         self.screen = None;
         self.context = context.clone();
         let revived = self.stream.revive(context);
         self.set_screen(screen);
         match &revived {
-            Ok(()) => self.say("the device was lost and opened anew", false),
-            // A source that is opened again tells its geometry, of which everything is made then.
-            Err(fault) => self.ended(Some(fault.to_string()), Instant::now()),
+            Ok(()) => self.notify("The device was lost and opened again", false),
+            // Opening the source again sends its geometry, from which everything is created.
+            Err(fault) => self.source_ended(Some(fault.to_string()), Instant::now()),
         }
         revived
     }
 
-    /// The window has this size from here on, pixels; 0 while it is minimised.
+    /// Sets the size of the window, pixels; 0 while it is minimised.
     pub fn resize(&mut self, size: [u32; 2]) {
         if let Some(screen) = &mut self.screen {
             screen.resize(size);
@@ -296,78 +312,79 @@ impl Console {
             return;
         }
         self.size = size;
-        self.fit();
+        self.resize_picture();
     }
 
-    /// What was on the window is gone.
-    pub fn expose(&mut self) {
-        (self.stale, self.nowhere) = (true, None);
+    /// Draws the window again: its content was lost.
+    pub fn redraw(&mut self) {
+        (self.needs_redraw, self.present_retry_at) = (true, None);
     }
 
-    /// The picture has the room that the panels leave.
-    fn fit(&mut self) {
-        self.controls.resize(self.place().1);
-        self.stale = true;
+    /// Fits the picture into the area that the panels leave.
+    fn resize_picture(&mut self) {
+        self.controls.resize(self.picture_area().1);
+        self.needs_redraw = true;
     }
 
-    /// Where the picture lies, pixels of the window.
-    fn place(&self) -> ([u32; 2], [u32; 2]) {
-        panels::place(self.size, self.panels.scale(), self.is_panelled)
+    /// Upper left corner and size of the picture, pixels of the window.
+    fn picture_area(&self) -> ([u32; 2], [u32; 2]) {
+        panels::picture_area(self.size, self.panels.scale(), self.shows_panels)
     }
 
-    /// What was done by hand.
+    /// Handles an input.
     pub fn input(&mut self, input: &Input) {
         let now = Instant::now();
-        // Panels break at places that are none.
-        let Some(input) = &input.believed() else { return };
-        if self.options.overlay {
+        // egui panics at coordinates that are not finite.
+        let Some(input) = &input.sanitized() else { return };
+        if self.fixed.overlay {
             self.panels.input(input);
-            self.stale = true;
+            self.needs_redraw = true;
         }
-        if let (Some(exit), Input::Key { key, pressed: true }) = (&self.options.exit, input)
+        if let (Some(exit), Input::Key { key, pressed: true }) = (&self.fixed.exit, input)
             && exit.is(*key, self.keys.modifiers())
         {
-            self.next.exit = true;
+            self.request.exit = true;
         }
         if let Some(command) = self.keys.input(input) {
-            self.command(&command, now);
+            self.execute(&command, now);
         }
-        let place = self.place();
+        let area = self.picture_area();
         let at = match input {
             Input::Moved(at) | Input::Touch { at, .. } => Some(*at),
             _ => None,
         };
-        let on = Picture {
-            corner: place.0.map(f64::from),
-            size: place.1.map(f64::from),
+        let is_over_panel = at.or(self.gestures.pointer()).is_some_and(|at| self.panels.covers(at));
+        let on = Viewport {
+            corner: area.0.map(f64::from),
+            size: area.1.map(f64::from),
             scene: self.stream.scene(),
-            taken: at.or(self.hand.pointer()).is_some_and(|at| self.panels.covers(at)) && self.options.overlay,
-            now: now.saturating_duration_since(self.began),
+            is_covered: is_over_panel && self.fixed.overlay,
+            now: now.saturating_duration_since(self.started),
         };
-        for command in self.hand.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
-            self.command(&command, now);
+        for command in self.gestures.input(input, &on, self.controls.tool(), self.keys.modifiers()) {
+            self.execute(&command, now);
         }
     }
 
-    /// Draws a pointer there, pixels, from here on: where no windowing system does.
-    pub fn point(&mut self, at: Option<[f64; 2]>) {
-        self.stale |= self.pointer != at;
+    /// Sets where to draw a pointer, pixels, if no windowing system draws one.
+    pub(super) fn set_pointer(&mut self, at: Option<[f64; 2]>) {
+        self.needs_redraw |= self.pointer != at;
         self.pointer = at;
     }
 
-    /// Something to be said, for a few seconds and in the log.
-    pub fn say(&mut self, text: &str, is_fault: bool) {
+    /// Shows a message for a few seconds and writes it to the log.
+    pub(super) fn notify(&mut self, text: &str, is_fault: bool) {
         match is_fault {
             true => tracing::warn!("{text}"),
             false => tracing::info!("{text}"),
         }
         let note = Note { text: text.into(), is_fault };
         self.notes.retain(|(_, known)| *known != note);
-        self.notes.push((Instant::now() + NOTE, note));
-        if self.notes.len() > NOTES {
+        self.notes.push((Instant::now() + NOTE_TIME, note));
+        if self.notes.len() > MAX_NOTES {
             self.notes.remove(0);
         }
-        self.stale = true;
+        self.needs_redraw = true;
     }
 
     pub fn controls(&self) -> &Controls {
@@ -378,106 +395,89 @@ impl Console {
         &mut self.stream
     }
 
-    pub fn times(&self) -> &Times {
-        &self.times
-    }
-
-    /// Why what is shown is not drawn with the shaders as they are written now.
-    pub fn shader_fault(&self) -> Option<&str> {
-        self.shader_fault.as_deref()
-    }
-
-    pub fn screen(&self) -> Option<&Screen> {
+    pub(super) fn screen(&self) -> Option<&Screen> {
         self.screen.as_ref()
     }
 
-    /// The rung of the ladder that the last settings stand on.
+    /// The rung of the quality ladder for the last settings that were sent to the stream.
     pub fn rung(&self) -> usize {
         self.rung
     }
 
-    /// Does what is asked for, by whomever.
-    pub fn command(&mut self, command: &Command, now: Instant) {
+    /// Executes a command.
+    pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
-        self.act(command, now);
-    }
-}
-
-/// Between two volumes of a loop that is played.
-pub(super) const LOOP: Duration = Duration::from_millis(200);
-
-impl Console {
-    pub(super) fn act(&mut self, command: &Command, now: Instant) {
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
             Change::Tool => {}
             Change::Settings => {
-                self.touched.get_or_insert(now);
-                if is_move(command) {
-                    self.pace.moves(now);
+                self.unsent_input.get_or_insert(now);
+                if is_continuous(command) {
+                    self.frame_budget.view_moved(now);
                 } else {
                     // Another scene takes another time.
-                    self.pace.forget();
+                    self.frame_budget.forget();
                 }
             }
-            Change::Screen(command) => self.on_screen(&command, now),
+            Change::Caller(command) => self.execute_own(&command, now),
         }
-        self.stale = true;
+        self.needs_redraw = true;
     }
 
-    fn on_screen(&mut self, command: &Command, now: Instant) {
+    /// Executes a command that does not concern settings.
+    fn execute_own(&mut self, command: &Command, now: Instant) {
         let count = self.stream.cine().volumes().len();
         match *command {
             Command::Freeze => {
-                self.playing = None;
+                self.next_cine_step = None;
                 self.stream.freeze(!self.stream.is_frozen());
             }
-            Command::Cine(by) => {
+            Command::StepCine(by) => {
                 let at = self.stream.cine_position().unwrap_or(count.saturating_sub(1)) as i64 + i64::from(by);
-                self.look_back(at.clamp(0, count.saturating_sub(1) as i64) as usize);
-                self.touched.get_or_insert(now);
+                self.show_cine_volume(at.clamp(0, count.saturating_sub(1) as i64) as usize);
+                self.unsent_input.get_or_insert(now);
             }
-            Command::CineAt(place) => {
-                self.look_back(place.min(count.saturating_sub(1)));
-                self.touched.get_or_insert(now);
+            Command::SeekCine(index) => {
+                self.show_cine_volume(index.min(count.saturating_sub(1)));
+                self.unsent_input.get_or_insert(now);
             }
-            Command::CinePlay => {
+            Command::PlayCine => {
                 self.stream.freeze(true);
-                self.playing = match self.playing {
+                self.next_cine_step = match self.next_cine_step {
                     None if count > 1 => Some(now),
                     _ => None,
                 };
             }
             Command::SavePicture => self.save_picture(),
             Command::SaveLoop => self.save_loop(),
-            Command::Help => self.help = !self.help,
-            Command::Hud => self.hud = !self.hud,
-            Command::Panels => {
-                self.is_panelled = !self.is_panelled && self.options.overlay;
-                self.fit();
+            Command::ToggleHelp => self.shows_help = !self.shows_help,
+            Command::ToggleTimes => self.shows_times = !self.shows_times,
+            Command::TogglePanels => {
+                self.shows_panels = !self.shows_panels && self.fixed.overlay;
+                self.resize_picture();
             }
-            Command::FullScreen => self.next.toggles_full_screen |= !self.options.is_kiosk,
-            // A kiosk has one way out, and it is not a key that a sleeve may press.
-            Command::Exit => self.next.exit |= !self.options.is_kiosk,
+            Command::ToggleFullScreen => self.request.toggle_full_screen |= !self.fixed.is_kiosk,
+            // A kiosk ends only with its exit keys: a sleeve may press Escape.
+            Command::Exit => self.request.exit |= !self.fixed.is_kiosk,
             _ => {}
         }
     }
 
-    fn look_back(&mut self, place: usize) {
-        self.playing = None;
+    fn show_cine_volume(&mut self, index: usize) {
+        self.next_cine_step = None;
         self.stream.freeze(true);
-        self.stream.show_cine_volume(place);
+        self.stream.show_cine_volume(index);
     }
 
-    /// The next volume of a loop that is played, when it is due.
-    pub(super) fn play(&mut self, now: Instant) {
-        let (Some(due), count) = (self.playing, self.stream.cine().volumes().len()) else { return };
+    /// Shows the next volume of the cine loop when it is due.
+    fn advance_cine(&mut self, now: Instant) {
+        let (Some(due), count) = (self.next_cine_step, self.stream.cine().volumes().len()) else { return };
         if count < 2 {
-            self.playing = None;
+            self.next_cine_step = None;
         } else if now >= due && !self.stream.is_replaying() {
-            let next = self.stream.cine_position().map_or(0, |place| (place + 1) % count);
+            let next = self.stream.cine_position().map_or(0, |index| (index + 1) % count);
             self.stream.show_cine_volume(next);
-            self.playing = Some((due + LOOP).max(now));
+            self.next_cine_step = Some((due + CINE_INTERVAL).max(now));
         }
     }
 
@@ -486,55 +486,55 @@ impl Console {
             Some(renderer) => renderer.end_picture().map_err(|e| e.to_string()),
             None => Err("there is no picture yet".into()),
         };
-        if let Err(fault) = picture.and_then(|picture| self.keep.picture(picture)) {
-            self.say(&format!("the picture was not saved: {fault}"), true);
+        if let Err(fault) = picture.and_then(|picture| self.exporter.picture(picture)) {
+            self.notify(&format!("The picture was not saved: {fault}"), true);
         }
     }
 
     fn save_loop(&mut self) {
-        let kept: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
+        let volumes: Vec<_> = self.stream.cine().volumes().iter().cloned().collect();
         let saved = match self.stream.header() {
-            Some(header) if !kept.is_empty() => {
+            Some(header) if !volumes.is_empty() => {
                 let header = header.clone();
-                self.keep.volumes(header, kept)
+                self.exporter.volumes(header, volumes)
             }
             _ => Err("there are no volumes yet".into()),
         };
         if let Err(fault) = saved {
-            self.say(&format!("the loop was not saved: {fault}"), true);
+            self.notify(&format!("The loop was not saved: {fault}"), true);
         }
     }
 
-    /// The settings as they are to be drawn now: the hand's, on the rung that holds the budget.
-    pub(super) fn wanted(&self, now: Instant) -> (usize, Settings) {
-        let rung = self.pace.rung(now).min(self.rungs.len().saturating_sub(1));
+    /// The rung that keeps the frame budget now, and the settings on it.
+    fn effective_settings(&self, now: Instant) -> (usize, Settings) {
+        let rung = self.frame_budget.rung(now).min(self.rungs.len().saturating_sub(1));
         let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
         let settings = self.controls.settings();
-        let mut wanted = match self.rungs.get(rung) {
-            Some(stands) => stands.apply(settings, voxel),
+        let mut effective = match self.rungs.get(rung) {
+            Some(rung) => rung.apply(settings, voxel),
             None => settings.clone(),
         };
-        // A region that grows shows what was left out: with all of it made, dragging a face needs no frame again.
-        wanted.slices.everything |= matches!(self.controls.tool(), Tool::Region | Tool::Clip);
-        (rung, wanted)
+        // A region that grows shows slices that were left out. With all of them processed, dragging a face needs no frame again.
+        effective.slices.everything |= matches!(self.controls.tool(), Tool::Region | Tool::Clip);
+        (rung, effective)
     }
 }
 
-/// Whether a command is one of many, as those of a drag are.
-fn is_move(command: &Command) -> bool {
+/// True for commands that a drag or a held key gives repeatedly.
+fn is_continuous(command: &Command) -> bool {
     matches!(
         command,
-        Command::Turn(_)
+        Command::Rotate(_)
             | Command::Roll(_)
             | Command::Zoom(_)
             | Command::Pan(_)
-            | Command::Light(_)
-            | Command::Face(..)
-            | Command::Clip(_)
-            | Command::PlaneBy(_)
-            | Command::Meet(_)
-            | Command::PlaneTurn(_)
-            | Command::Slide(..)
-            | Command::Nudge(..)
+            | Command::MoveLight(_)
+            | Command::MoveFace(..)
+            | Command::MoveClip(_)
+            | Command::StepPlane(_)
+            | Command::MoveCrossing(_)
+            | Command::RotatePlanes(_)
+            | Command::SetSlider(..)
+            | Command::StepSlider(..)
     )
 }

@@ -1,10 +1,11 @@
-//! What a key's code means: by its place on a US keyboard, whatever is printed on another country's. A number pad is always numbers.
+//! The meaning of key codes: by position on a US keyboard, independent of the layout in use. A number pad always gives numbers.
 
 use crate::ui::input::{Button, Key};
 use evdev::KeyCode;
 
+/// The meaning of a key code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Meaning {
+pub(super) enum Meaning {
     Key(Key),
     Button(Button),
     Shift,
@@ -13,12 +14,12 @@ pub enum Meaning {
 }
 
 impl Meaning {
-    pub fn is_modifier(self) -> bool {
+    pub(super) fn is_modifier(self) -> bool {
         matches!(self, Meaning::Shift | Meaning::Control | Meaning::Alt)
     }
 }
 
-/// Keys whose codes follow one another, from the first.
+/// Keys with consecutive codes, from the first code.
 const ROWS: [(KeyCode, &str); 5] = [
     (KeyCode::KEY_1, "1234567890-="),
     (KeyCode::KEY_Q, "qwertyuiop[]"),
@@ -27,8 +28,8 @@ const ROWS: [(KeyCode, &str); 5] = [
     (KeyCode::KEY_KP7, "789-456+1230."),
 ];
 
-/// What an event's code means, if anything to us.
-pub fn meaning(code: u16) -> Option<Meaning> {
+/// The meaning of a key code, if it has one here.
+pub(super) fn meaning(code: u16) -> Option<Meaning> {
     let in_row = |(first, keys): &(KeyCode, &str)| {
         let place = code.checked_sub(first.0)?;
         keys.chars().nth(usize::from(place)).map(Key::Char)
@@ -70,8 +71,8 @@ pub fn meaning(code: u16) -> Option<Meaning> {
     Some(Meaning::Key(key))
 }
 
-/// On a tablet, whose pen presses where a mouse has buttons.
-pub fn of_pen(code: u16) -> Option<Meaning> {
+/// The meaning of a key code on a tablet, where the pen has the buttons.
+pub(super) fn pen_meaning(code: u16) -> Option<Meaning> {
     match KeyCode(code) {
         KeyCode::BTN_TOUCH => Some(Meaning::Button(Button::Left)),
         KeyCode::BTN_STYLUS => Some(Meaning::Button(Button::Right)),
@@ -83,13 +84,13 @@ pub fn of_pen(code: u16) -> Option<Meaning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::keys::KEYS;
+    use crate::ui::keys::KEY_BINDINGS;
 
     #[test]
-    fn every_key_of_the_table_has_a_code() {
+    fn every_bound_key_has_a_code() {
         let known: Vec<Meaning> = (0..=u16::MAX).filter_map(meaning).collect();
-        for binding in KEYS {
-            // Plus lies on the number pad, and with shift on the key that is equal.
+        for binding in KEY_BINDINGS {
+            // Plus is on the number pad, and on the key of the equals sign with shift.
             assert!(known.contains(&Meaning::Key(binding.key)), "{:?}", binding.key);
         }
     }

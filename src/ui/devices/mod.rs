@@ -1,10 +1,9 @@
-//! Keyboards, mice and touch screens straight from the kernel (evdev), where there is no windowing system. [`translator`] makes inputs
-//! of what they say, [`profile`] knows what each is, [`reader`] reads them.
+//! Keyboards, mice and touch screens read from the kernel (evdev), for a machine without a windowing system. `reader` reads them,
+//! `profile` classifies them, and `translator` converts their events to inputs.
 //!
-//! One thread waits for all of them at once and for the clock, and hands on what they do through a channel of bounded length. Were it a
-//! thread for each, one that nobody touches could not be ended, and would hold its device as long as the program lives; were they read
-//! between pictures, the kernel would drop a gesture whenever one takes long. Where the channel is full the thread waits, and what the
-//! kernel then drops is known as lost.
+//! One thread waits for all devices and sends messages through a channel of bounded length. With a thread per device, the thread of an
+//! idle device could not be ended and would hold its device. If devices were read between pictures, the kernel would drop events during
+//! a slow picture. If the channel is full the thread waits; events that the kernel then drops are detected and resynchronised.
 
 mod keymap;
 mod profile;
@@ -14,11 +13,11 @@ mod tests;
 mod touch;
 mod translator;
 
-pub use reader::Told;
+pub(super) use reader::DeviceMessage;
 
 use super::input::Input;
 use crate::gpu::Wake;
-use reader::Opened;
+use reader::OpenDevices;
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use std::io;
 use std::os::fd::OwnedFd;
@@ -29,79 +28,82 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Between two looks for devices that came.
-const LOOK: Duration = Duration::from_secs(2);
-/// What may wait to be asked for: half a second of a quick mouse.
-const MOST: usize = 512;
+/// Interval of the scans for new devices.
+const SCAN_INTERVAL: Duration = Duration::from_secs(2);
+/// Capacity of the channel: half a second of a fast mouse.
+const MAX_QUEUED: usize = 512;
 
-/// All input devices of this machine, until it is dropped.
+/// All input devices of this machine. Dropping it releases them.
 pub struct Devices {
-    /// None once nobody listens any more, which ends a thread that waits for room.
-    told: Option<Receiver<Told>>,
-    sender: SyncSender<Told>,
-    is_woken: Arc<AtomicBool>,
+    /// None after the drop began, which ends a thread that waits for room in the channel.
+    receiver: Option<Receiver<DeviceMessage>>,
+    sender: SyncSender<DeviceMessage>,
+    wake_pending: Arc<AtomicBool>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the thread is told.
+/// State that is shared with the thread.
 struct Shared {
-    /// Of the screen, pixels.
+    /// Size of the screen, pixels.
     size: Mutex<[u32; 2]>,
     ends: AtomicBool,
-    /// Something of the above is new.
-    rouse: OwnedFd,
+    /// Wakes the thread after a change of the fields above.
+    wake_event: OwnedFd,
 }
 
 impl Devices {
-    /// Begins to listen. `size`: of the screen, pixels; `grab`: nobody else gets what they say, such as a text console behind.
+    /// Starts to read devices. `size`: of the screen, pixels; `grab`: other programs do not get the events, such as the text
+    /// console behind.
     ///
     /// # Errors
-    /// A machine that has no room for another thread. That there is no device, or none may be read, is no error: they may come.
-    pub fn listen(size: [u32; 2], grab: bool) -> io::Result<Devices> {
-        let (sender, told) = sync_channel(MOST);
-        let rouse = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
-        let shared = Arc::new(Shared { size: Mutex::new(size), ends: AtomicBool::new(false), rouse });
-        let (theirs, tells) = (shared.clone(), sender.clone());
-        let thread = std::thread::Builder::new().name("input".into()).spawn(move || serve(&theirs, grab, &tells))?;
-        Ok(Devices { told: Some(told), sender, is_woken: Arc::default(), shared, thread: Some(thread) })
+    /// The thread cannot be started. Missing or unreadable devices are no error: they may appear later.
+    pub fn open(size: [u32; 2], grab: bool) -> io::Result<Devices> {
+        let (sender, receiver) = sync_channel(MAX_QUEUED);
+        let wake_event = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?;
+        let shared = Arc::new(Shared { size: Mutex::new(size), ends: AtomicBool::new(false), wake_event });
+        let (thread_shared, thread_sender) = (shared.clone(), sender.clone());
+        let thread = std::thread::Builder::new()
+            .name("input".into())
+            .spawn(move || run_thread(&thread_shared, grab, &thread_sender))?;
+        Ok(Devices { receiver: Some(receiver), sender, wake_pending: Arc::default(), shared, thread: Some(thread) })
     }
 
-    /// Ends a [`Devices::wait`].
+    /// A function that ends a [`Devices::wait`].
     pub fn wake(&self) -> Wake {
-        let (sender, is_woken) = (self.sender.clone(), self.is_woken.clone());
+        let (sender, wake_pending) = (self.sender.clone(), self.wake_pending.clone());
         Arc::new(move || {
-            // One is as good as many, and where there is no room there is enough to wake for.
-            if !is_woken.swap(true, Ordering::AcqRel) {
-                let _ = sender.try_send(Told::Woken);
+            // One message is enough, and a full channel wakes the receiver anyway.
+            if !wake_pending.swap(true, Ordering::AcqRel) {
+                let _ = sender.try_send(DeviceMessage::Woken);
             }
         })
     }
 
-    /// What was told since the last time, waiting for anything until then; without a time as long as it takes.
-    pub fn wait(&self, until: Option<Instant>) -> Vec<Told> {
-        let Some(told) = &self.told else { return Vec::new() };
+    /// The messages since the last call. Waits for the first one until a time, or without limit.
+    pub fn wait(&self, until: Option<Instant>) -> Vec<DeviceMessage> {
+        let Some(receiver) = &self.receiver else { return Vec::new() };
         let first = match until {
-            Some(at) => told.recv_timeout(at.saturating_duration_since(Instant::now())),
-            None => told.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            Some(at) => receiver.recv_timeout(at.saturating_duration_since(Instant::now())),
+            None => receiver.recv().map_err(|_| RecvTimeoutError::Disconnected),
         };
-        // Before what it is about is looked at.
-        self.is_woken.swap(false, Ordering::AcqRel);
-        first.into_iter().chain(told.try_iter().take(MOST)).collect()
+        // Cleared before the messages are handled, so that no later wake is missed.
+        self.wake_pending.swap(false, Ordering::AcqRel);
+        first.into_iter().chain(receiver.try_iter().take(MAX_QUEUED)).collect()
     }
 
-    /// The screen has this size from here on, pixels.
+    /// Sets the size of the screen, pixels.
     pub fn resize(&self, size: [u32; 2]) {
         *self.shared.size.lock().unwrap_or_else(PoisonError::into_inner) = size;
-        self.shared.rouse();
+        self.shared.notify();
     }
 }
 
 impl Drop for Devices {
     fn drop(&mut self) {
         self.shared.ends.store(true, Ordering::Release);
-        self.told = None;
-        self.shared.rouse();
+        self.receiver = None;
+        self.shared.notify();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -109,69 +111,77 @@ impl Drop for Devices {
 }
 
 impl Shared {
-    fn rouse(&self) {
-        // A counter that is full rouses as well.
-        let _ = rustix::io::write(&self.rouse, &1u64.to_ne_bytes());
+    fn notify(&self) {
+        // A full counter also wakes the thread.
+        let _ = rustix::io::write(&self.wake_event, &1u64.to_ne_bytes());
     }
 }
 
-/// Nobody listens any more.
-struct Over;
+/// The receiver is gone.
+struct Stopped;
 
-/// The thread: a kiosk goes on without hands no longer than it must.
-fn serve(shared: &Shared, grab: bool, sender: &SyncSender<Told>) {
-    let tell = |told: Told| if sender.send(told).is_ok() { Ok(()) } else { Err(Over) };
+/// The thread. After a fault it starts again, so that a kiosk stays usable.
+fn run_thread(shared: &Shared, grab: bool, sender: &SyncSender<DeviceMessage>) {
+    let send = |message: DeviceMessage| if sender.send(message).is_ok() { Ok(()) } else { Err(Stopped) };
     while !shared.ends.load(Ordering::Acquire) {
-        let fault = match catch_unwind(AssertUnwindSafe(|| follow(shared, grab, &tell))) {
-            Ok(Ok(Over)) => return,
+        let fault = match catch_unwind(AssertUnwindSafe(|| read_devices(shared, grab, &send))) {
+            Ok(Ok(Stopped)) => return,
             Ok(Err(fault)) => fault.to_string(),
-            Err(_) => "what reads them broke down".into(),
+            Err(_) => "the reader panicked".into(),
         };
-        // All of them begin anew.
-        if tell(Told::Input(Input::Left)).and_then(|()| tell(Told::Note(format!("input devices: {fault}")))).is_err() {
+        // All devices are opened again.
+        if send(DeviceMessage::Input(Input::FocusLost))
+            .and_then(|()| send(DeviceMessage::Warning(format!("input devices: {fault}"))))
+            .is_err()
+        {
             return;
         }
-        let _ = wait(&mut [PollFd::new(&shared.rouse, PollFlags::IN)], LOOK);
+        let _ = wait(&mut [PollFd::new(&shared.wake_event, PollFlags::IN)], SCAN_INTERVAL);
     }
 }
 
-/// Follows all devices until it is over.
-fn follow(shared: &Shared, grab: bool, tell: &dyn Fn(Told) -> Result<(), Over>) -> io::Result<Over> {
+/// Reads all devices until the receiver is gone or the drop begins.
+fn read_devices(
+    shared: &Shared,
+    grab: bool,
+    send: &dyn Fn(DeviceMessage) -> Result<(), Stopped>,
+) -> io::Result<Stopped> {
     let size = || *shared.size.lock().unwrap_or_else(PoisonError::into_inner);
-    let (mut opened, mut known) = (Opened::new(size(), grab), size());
-    let (mut look, mut out) = (Instant::now(), Vec::new());
+    let (mut opened, mut current_size) = (OpenDevices::new(size(), grab), size());
+    let (mut next_scan, mut out) = (Instant::now(), Vec::new());
     while !shared.ends.load(Ordering::Acquire) {
-        if look <= Instant::now() {
-            look = Instant::now() + LOOK;
-            opened.look(&mut out);
+        if next_scan <= Instant::now() {
+            next_scan = Instant::now() + SCAN_INTERVAL;
+            opened.scan(&mut out);
         }
-        if size() != known {
-            known = size();
-            opened.resize(known);
+        if size() != current_size {
+            current_size = size();
+            opened.resize(current_size);
         }
         let ready: Vec<usize> = {
-            let rouse = PollFd::new(&shared.rouse, PollFlags::IN);
-            let devices = opened.waits().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN));
-            let mut all: Vec<PollFd> = std::iter::once(rouse).chain(devices).collect();
-            // What was found at the look has waited long enough.
-            let time = if out.is_empty() { look.saturating_duration_since(Instant::now()) } else { Duration::ZERO };
+            let wake_event = PollFd::new(&shared.wake_event, PollFlags::IN);
+            let devices = opened.descriptors().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN));
+            let mut all: Vec<PollFd> = std::iter::once(wake_event).chain(devices).collect();
+            // Messages of the scan are sent without waiting.
+            let time =
+                if out.is_empty() { next_scan.saturating_duration_since(Instant::now()) } else { Duration::ZERO };
             wait(&mut all, time)?;
             (0..all.len() - 1).filter(|n| !all[n + 1].revents().is_empty()).collect()
         };
-        // Until a counter that nobody adds to is empty; it never blocks.
-        let _ = rustix::io::read(&shared.rouse, &mut [0; 8]);
-        // From the last: one that is gone moves those behind it.
+        // Resets the counter; it never blocks.
+        let _ = rustix::io::read(&shared.wake_event, &mut [0; 8]);
+        // From the last one: removing a device shifts those behind it.
         ready.into_iter().rev().for_each(|place| opened.read(place, &mut out));
-        for told in out.drain(..) {
-            if tell(told).is_err() {
-                return Ok(Over);
+        for message in out.drain(..) {
+            if send(message).is_err() {
+                return Ok(Stopped);
             }
         }
     }
-    Ok(Over)
+    Ok(Stopped)
 }
 
-/// Waits so long at most for any of them.
+/// Waits for any of the descriptors, at most for this time.
 fn wait(all: &mut [PollFd], time: Duration) -> io::Result<()> {
     let time = Timespec { tv_sec: time.as_secs().min(3600) as i64, tv_nsec: time.subsec_nanos().into() };
     match poll(all, Some(&time)) {
@@ -184,21 +194,21 @@ fn wait(all: &mut [PollFd], time: Duration) -> io::Result<()> {
 mod thread_tests {
     use super::*;
 
-    /// Whatever devices this machine has, they are left to whom they belong.
+    /// No device of this machine is grabbed.
     #[test]
-    fn whoever_waits_is_woken_once_and_the_thread_ends() {
-        let devices = Devices::listen([100, 100], false).unwrap();
+    fn a_wait_is_woken_once_and_the_thread_ends() {
+        let devices = Devices::open([100, 100], false).unwrap();
         let wake = devices.wake();
         (0..5000).for_each(|_| wake());
-        let told = devices.wait(None);
-        assert_eq!(told.iter().filter(|told| **told == Told::Woken).count(), 1);
+        let messages = devices.wait(None);
+        assert_eq!(messages.iter().filter(|message| **message == DeviceMessage::Woken).count(), 1);
         wake();
-        assert!(devices.wait(Some(Instant::now() + Duration::from_secs(60))).contains(&Told::Woken));
+        assert!(devices.wait(Some(Instant::now() + Duration::from_secs(60))).contains(&DeviceMessage::Woken));
         devices.wait(Some(Instant::now()));
         devices.resize([50, 50]);
         let begun = Instant::now();
         drop(devices);
-        assert!(begun.elapsed() < LOOK, "it does not wait for the next look");
+        assert!(begun.elapsed() < SCAN_INTERVAL, "it does not wait for the next scan");
         wake();
     }
 }

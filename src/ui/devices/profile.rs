@@ -1,95 +1,96 @@
-//! What a device is, of what it says that it can do.
+//! Classifies a device by its abilities.
 
-use super::keymap::{meaning, of_pen};
+use super::keymap::{meaning, pen_meaning};
 use evdev::{AbsoluteAxisCode as Abs, KeyCode, RelativeAxisCode as Rel};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the values of an axis lie between.
+/// The range of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    pub low: i32,
-    pub high: i32,
+pub(super) struct Span {
+    pub(super) low: i32,
+    pub(super) high: i32,
 }
 
 impl Span {
-    /// Where a value lies in it, 0 to 1.
-    pub fn share(&self, value: i32) -> f64 {
+    /// The position of a value in the range, 0 to 1.
+    pub(super) fn fraction(&self, value: i32) -> f64 {
         ((f64::from(value) - f64::from(self.low)) / self.length()).clamp(0.0, 1.0)
     }
 
-    /// At least 1.
-    pub fn length(&self) -> f64 {
+    /// Length of the range, at least 1.
+    pub(super) fn length(&self) -> f64 {
         (f64::from(self.high) - f64::from(self.low)).max(1.0)
     }
 }
 
-/// What a device says that it can do, by the kernel's codes.
+/// The abilities of a device, by the kernel's codes.
 #[derive(Clone, Debug, Default)]
-pub struct Abilities {
-    pub keys: BTreeSet<u16>,
-    pub relative: BTreeSet<u16>,
-    pub absolute: BTreeMap<u16, Span>,
-    /// What is touched is what is shown there.
-    pub is_direct: bool,
-    pub is_accelerometer: bool,
+pub(super) struct Abilities {
+    pub(super) keys: BTreeSet<u16>,
+    pub(super) relative: BTreeSet<u16>,
+    pub(super) absolute: BTreeMap<u16, Span>,
+    /// A touch screen: what is touched is what is shown there.
+    pub(super) is_direct: bool,
+    pub(super) is_accelerometer: bool,
 }
 
-/// What its places are. Axes are across and down.
+/// How a device points. Axes are horizontal and vertical.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pointing {
-    /// None: it moves the pointer from where that is, if at all.
+pub(super) enum Pointing {
+    /// It moves the pointer relative to its position, if at all.
     Relative,
-    /// Of the pointer: a pen's, or those of the tablet that a virtual machine has for a mouse.
+    /// It sets the position of the pointer: a pen, or the tablet that a virtual machine uses as a mouse.
     Absolute([Span; 2]),
-    /// Of a finger on a pad, that moves the pointer from where it is.
+    /// A touch pad: a finger moves the pointer relative to its position.
     Pad([Span; 2]),
-    /// Of the only finger on the screen.
+    /// A touch screen for one finger.
     Finger([Span; 2]),
-    /// Of several fingers, each in a slot.
+    /// A touch screen for several fingers, each in a slot.
     Fingers([Span; 2]),
 }
 
+/// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Profile {
-    pub pointing: Pointing,
-    /// Its wheel says parts of notches too.
-    pub has_fine_wheel: bool,
+pub(super) struct Profile {
+    pub(super) pointing: Pointing,
+    /// Its wheel also reports fractions of notches.
+    pub(super) has_fine_wheel: bool,
 }
 
 impl Profile {
-    /// None of a device that means nothing to us, such as a joystick, a power button or a lid.
-    pub fn of(can: &Abilities) -> Option<Profile> {
-        if can.is_accelerometer {
+    /// Classifies a device. None if it gives no inputs, such as a joystick, a power button or a lid switch.
+    pub(super) fn of(abilities: &Abilities) -> Option<Profile> {
+        if abilities.is_accelerometer {
             return None;
         }
         let axes = |x: Abs, y: Abs| {
-            let spans = [*can.absolute.get(&x.0)?, *can.absolute.get(&y.0)?];
+            let spans = [*abilities.absolute.get(&x.0)?, *abilities.absolute.get(&y.0)?];
             spans.iter().all(|span| span.low < span.high).then_some(spans)
         };
-        let has = |key: KeyCode| can.keys.contains(&key.0);
-        let moves = |axis: Rel| can.relative.contains(&axis.0);
+        let has = |key: KeyCode| abilities.keys.contains(&key.0);
+        let moves = |axis: Rel| abilities.relative.contains(&axis.0);
         let is_pen = has(KeyCode::BTN_TOOL_PEN) || has(KeyCode::BTN_STYLUS);
-        let is_pad = has(KeyCode::BTN_TOOL_FINGER) && !is_pen && !can.is_direct;
-        let is_touched = can.is_direct || has(KeyCode::BTN_TOUCH);
+        let is_pad = has(KeyCode::BTN_TOOL_FINGER) && !is_pen && !abilities.is_direct;
+        let is_touched = abilities.is_direct || has(KeyCode::BTN_TOUCH);
         let one = axes(Abs::ABS_X, Abs::ABS_Y);
         let several = axes(Abs::ABS_MT_POSITION_X, Abs::ABS_MT_POSITION_Y)
-            .filter(|_| can.absolute.contains_key(&Abs::ABS_MT_SLOT.0));
+            .filter(|_| abilities.absolute.contains_key(&Abs::ABS_MT_SLOT.0));
         let pointing = match (one, several) {
             (Some(spans), _) if is_pen => Pointing::Absolute(spans),
             (Some(spans), _) if is_pad => Pointing::Pad(spans),
             (_, Some(spans)) if is_touched && !is_pen && !is_pad => Pointing::Fingers(spans),
-            (Some(spans), _) if can.is_direct => Pointing::Finger(spans),
+            (Some(spans), _) if abilities.is_direct => Pointing::Finger(spans),
             (Some(spans), _) if has(KeyCode::BTN_LEFT) => Pointing::Absolute(spans),
             (Some(spans), _) if is_touched => Pointing::Finger(spans),
             _ => Pointing::Relative,
         };
         let means = |code: &u16| match pointing {
-            Pointing::Absolute(_) => of_pen(*code).is_some(),
+            Pointing::Absolute(_) => pen_meaning(*code).is_some(),
             _ => meaning(*code).is_some(),
         };
-        let turns = moves(Rel::REL_WHEEL) || moves(Rel::REL_WHEEL_HI_RES);
-        let is_mouse = (moves(Rel::REL_X) && moves(Rel::REL_Y)) || turns;
-        let is_any = pointing != Pointing::Relative || is_mouse || can.keys.iter().any(means);
+        let has_wheel = moves(Rel::REL_WHEEL) || moves(Rel::REL_WHEEL_HI_RES);
+        let is_mouse = (moves(Rel::REL_X) && moves(Rel::REL_Y)) || has_wheel;
+        let is_any = pointing != Pointing::Relative || is_mouse || abilities.keys.iter().any(means);
         is_any.then_some(Profile { pointing, has_fine_wheel: moves(Rel::REL_WHEEL_HI_RES) })
     }
 }
@@ -109,14 +110,14 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_device_is_known_for_what_it_is() {
+    fn every_kind_of_device_is_classified() {
         use KeyCode as K;
         let spans = [Span { low: 0, high: 4095 }; 2];
         let (xy, slots) =
             ([Abs::ABS_X, Abs::ABS_Y], [Abs::ABS_MT_SLOT, Abs::ABS_MT_POSITION_X, Abs::ABS_MT_POSITION_Y]);
         let both = [&xy[..], &slots[..]].concat();
         let pad = [K::BTN_LEFT, K::BTN_TOUCH, K::BTN_TOOL_FINGER, K::BTN_TOOL_DOUBLETAP];
-        for (what, can, pointing) in [
+        for (what, abilities, pointing) in [
             ("keyboard", can(&[K::KEY_A, K::KEY_ENTER], &[], &[], false), Some(Pointing::Relative)),
             ("pedal", can(&[K::KEY_B], &[], &[], false), Some(Pointing::Relative)),
             ("mouse", can(&[K::BTN_LEFT], &[Rel::REL_X, Rel::REL_Y], &[], false), Some(Pointing::Relative)),
@@ -136,16 +137,16 @@ mod tests {
             ("nothing", Abilities::default(), None),
             ("accelerometer", Abilities { is_accelerometer: true, ..can(&[K::KEY_A], &[], &xy, false) }, None),
         ] {
-            assert_eq!(Profile::of(&can).map(|p| p.pointing), pointing, "{what}");
+            assert_eq!(Profile::of(&abilities).map(|p| p.pointing), pointing, "{what}");
         }
     }
 
     #[test]
-    fn an_axis_that_has_no_length_is_none() {
+    fn an_axis_without_length_is_ignored() {
         let mut flat = can(&[KeyCode::BTN_TOUCH], &[], &[Abs::ABS_X, Abs::ABS_Y], true);
         flat.absolute.insert(Abs::ABS_Y.0, Span { low: 7, high: 7 });
         assert_eq!(Profile::of(&flat), None);
         let odd = Span { low: i32::MAX, high: i32::MIN };
-        assert!((0.0..=1.0).contains(&odd.share(0)));
+        assert!((0.0..=1.0).contains(&odd.fraction(0)));
     }
 }

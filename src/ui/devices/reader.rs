@@ -1,4 +1,4 @@
-//! The devices that are open: those of /dev/input that mean something to us, as they come and go.
+//! Opens and reads the devices in /dev/input that give inputs, as they appear and disappear.
 
 use super::profile::{Abilities, Profile, Span};
 use super::translator::{Event, State, Translator};
@@ -12,15 +12,15 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 const FOLDER: &str = "/dev/input";
-/// More are not opened.
-const MOST: usize = 32;
+/// Largest number of open devices.
+const MAX_DEVICES: usize = 32;
 
-/// What comes from devices, or from whoever woke us.
+/// A message of the input devices, or a wake.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub(in crate::ui) enum DeviceMessage {
     Input(Input),
-    /// Something is amiss.
-    Note(String),
+    /// A fault to report to the user.
+    Warning(String),
     Woken,
 }
 
@@ -33,103 +33,103 @@ struct Reader {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Grab {
-    /// When no key of it is down: one that went down for the text console has to come up for it too, or it repeats there for ever.
-    Wanted,
-    Had,
-    NotWanted,
+    /// Waits until no key is down: a key that went down for the text console must also go up there, or it repeats for ever.
+    Pending,
+    Active,
+    Off,
 }
 
-/// All that are open, and what they say.
-pub struct Opened {
+/// All open devices.
+pub(super) struct OpenDevices {
     readers: Vec<Reader>,
     translator: Translator,
     grab: bool,
     number: u32,
-    /// Devices that mean nothing to us, by the number of their file: another may come under the same name.
-    passed: BTreeMap<PathBuf, u64>,
-    /// Those that could not be read the last time.
+    /// Devices without inputs, with the inode of their file: another device may appear under the same name.
+    ignored: BTreeMap<PathBuf, u64>,
+    /// Devices that could not be read at the last scan.
     refused: BTreeSet<PathBuf>,
-    is_refusal_told: bool,
+    refusal_is_reported: bool,
 }
 
-impl Opened {
-    pub fn new(size: [u32; 2], grab: bool) -> Opened {
-        Opened {
+impl OpenDevices {
+    pub(super) fn new(size: [u32; 2], grab: bool) -> OpenDevices {
+        OpenDevices {
             readers: Vec::new(),
             translator: Translator::new(size),
             grab,
             number: 0,
-            passed: BTreeMap::new(),
+            ignored: BTreeMap::new(),
             refused: BTreeSet::new(),
-            is_refusal_told: false,
+            refusal_is_reported: false,
         }
     }
 
-    pub fn resize(&mut self, size: [u32; 2]) {
+    pub(super) fn resize(&mut self, size: [u32; 2]) {
         self.translator.resize(size);
     }
 
-    /// What to wait for, in the order in which [`Opened::read`] numbers them.
-    pub fn waits(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+    /// The file descriptors to wait for, in the order of the indices of [`OpenDevices::read`].
+    pub(super) fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         self.readers.iter().map(|reader| reader.device.as_fd())
     }
 
-    /// Looks for devices that came. Those that went say so themselves.
-    pub fn look(&mut self, out: &mut Vec<Told>) {
-        // Without the folder there are none: a machine that nothing is plugged into.
+    /// Opens new devices. Unplugged ones are noticed when they are read.
+    pub(super) fn scan(&mut self, out: &mut Vec<DeviceMessage>) {
+        // Without the folder there are no devices.
         let listed = std::fs::read_dir(FOLDER).into_iter().flatten().flatten().map(|entry| entry.path());
         let is_event =
             |path: &PathBuf| path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"event"));
-        let there: BTreeSet<PathBuf> = listed.filter(is_event).take(8 * MOST).collect();
-        self.passed.retain(|path, _| there.contains(path));
+        let there: BTreeSet<PathBuf> = listed.filter(is_event).take(8 * MAX_DEVICES).collect();
+        self.ignored.retain(|path, _| there.contains(path));
         let mut refused = BTreeSet::new();
         for path in there {
-            if self.readers.len() >= MOST || self.readers.iter().any(|reader| reader.path == path) {
+            if self.readers.len() >= MAX_DEVICES || self.readers.iter().any(|reader| reader.path == path) {
                 continue;
             }
             let file = path.metadata().map_or(0, |file| file.ino());
-            if self.passed.get(&path) == Some(&file) {
+            if self.ignored.get(&path) == Some(&file) {
                 continue;
             }
             match self.open(&path, out) {
                 Ok(true) => {}
-                Ok(false) => drop(self.passed.insert(path, file)),
+                Ok(false) => drop(self.ignored.insert(path, file)),
                 Err(fault) if fault.kind() == ErrorKind::PermissionDenied => drop(refused.insert(path)),
                 Err(fault) => tracing::debug!("{}: {fault}", path.display()),
             }
         }
-        // A device that has just come belongs to nobody for a moment.
+        // A new device has no permissions for a moment: report it at the second scan.
         let still = refused.intersection(&self.refused).count();
-        if still > 0 && !self.is_refusal_told {
-            self.is_refusal_told = true;
+        if still > 0 && !self.refusal_is_reported {
+            self.refusal_is_reported = true;
             let text = format!(
                 "{still} input devices cannot be read: this user is not in the group input (as root: usermod -aG input USER)"
             );
-            out.push(Told::Note(text));
+            out.push(DeviceMessage::Warning(text));
         }
         self.refused = refused;
     }
 
-    /// False of a device that means nothing to us.
-    fn open(&mut self, path: &Path, out: &mut Vec<Told>) -> io::Result<bool> {
+    /// Opens a device. False if it gives no inputs.
+    fn open(&mut self, path: &Path, out: &mut Vec<DeviceMessage>) -> io::Result<bool> {
         let device = RawDevice::open(path)?;
         let Some(profile) = Profile::of(&abilities(&device)?) else { return Ok(false) };
         let state = state(&device)?;
         self.number += 1;
-        let name = device.name().unwrap_or("nameless").to_owned();
+        let name = device.name().unwrap_or("unnamed").to_owned();
         tracing::info!("input: {} ({name})", path.display());
-        let grab = if self.grab { Grab::Wanted } else { Grab::NotWanted };
+        let grab = if self.grab { Grab::Pending } else { Grab::Off };
         self.readers.push(Reader { path: path.to_owned(), number: self.number, device, grab });
-        self.tell(out, |translator, number, inputs| translator.add(number, profile, &state, inputs), self.number);
+        self.translate(out, |translator, number, inputs| translator.add(number, profile, &state, inputs), self.number);
         if let Some(reader) = self.readers.last_mut() {
-            reader.grab(out);
+            reader.try_grab(out);
         }
         Ok(true)
     }
 
-    /// Reads what the device of this number among [`Opened::waits`] has; one that is gone is let go.
-    pub fn read(&mut self, place: usize, out: &mut Vec<Told>) {
-        let Some(reader) = self.readers.get_mut(place) else { return };
+    /// Reads the pending events of the device with this index in [`OpenDevices::descriptors`]. Removes it if it is gone.
+    pub(super) fn read(&mut self, index: usize, out: &mut Vec<DeviceMessage>) {
+        let Some(reader) = self.readers.get_mut(index) else { return };
         let number = reader.number;
         let events: io::Result<Vec<Event>> = reader
             .device
@@ -137,49 +137,54 @@ impl Opened {
             .map(|events| events.map(|e| Event { kind: e.event_type().0, code: e.code(), value: e.value() }).collect());
         let read = events.and_then(|events| {
             for event in events {
-                self.tell(out, |translator, number, inputs| translator.event(number, event, inputs), number);
-                if self.translator.is_behind(number) {
-                    let state = self.readers.get(place).map(|reader| state(&reader.device)).transpose()?;
+                self.translate(out, |translator, number, inputs| translator.event(number, event, inputs), number);
+                if self.translator.needs_resync(number) {
+                    let state = self.readers.get(index).map(|reader| state(&reader.device)).transpose()?;
                     let state = state.unwrap_or_default();
-                    self.tell(out, |translator, number, inputs| translator.resync(number, &state, inputs), number);
+                    self.translate(out, |translator, number, inputs| translator.resync(number, &state, inputs), number);
                 }
             }
             Ok(())
         });
         match read {
-            Ok(()) => self.readers[place].grab(out),
+            Ok(()) => self.readers[index].try_grab(out),
             Err(fault) if matches!(fault.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
-            // Unplugged, mostly; what is there still is found again at the next look.
-            Err(fault) => self.let_go(place, &fault, out),
+            // Usually unplugged. If it is still there, the next scan opens it again.
+            Err(fault) => self.remove(index, &fault, out),
         }
     }
 
-    /// Lets go of a device: it was unplugged.
-    fn let_go(&mut self, place: usize, fault: &io::Error, out: &mut Vec<Told>) {
-        let reader = self.readers.remove(place);
+    /// Removes a device that was unplugged.
+    fn remove(&mut self, index: usize, fault: &io::Error, out: &mut Vec<DeviceMessage>) {
+        let reader = self.readers.remove(index);
         tracing::info!("input: {} is gone ({fault})", reader.path.display());
-        self.tell(out, |translator, number, inputs| translator.remove(number, inputs), reader.number);
+        self.translate(out, |translator, number, inputs| translator.remove(number, inputs), reader.number);
     }
 
-    fn tell(&mut self, out: &mut Vec<Told>, what: impl FnOnce(&mut Translator, u32, &mut Vec<Input>), number: u32) {
+    fn translate(
+        &mut self,
+        out: &mut Vec<DeviceMessage>,
+        what: impl FnOnce(&mut Translator, u32, &mut Vec<Input>),
+        number: u32,
+    ) {
         let mut inputs = Vec::new();
         what(&mut self.translator, number, &mut inputs);
-        out.extend(inputs.into_iter().map(Told::Input));
+        out.extend(inputs.into_iter().map(DeviceMessage::Input));
     }
 }
 
 impl Reader {
-    /// Has it for us alone, as soon as that does no harm.
-    fn grab(&mut self, out: &mut Vec<Told>) {
+    /// Grabs the device exclusively, as soon as no key is down.
+    fn try_grab(&mut self, out: &mut Vec<DeviceMessage>) {
         let is_free = || self.device.get_key_state().is_ok_and(|down| down.iter().next().is_none());
-        if self.grab != Grab::Wanted || !is_free() {
+        if self.grab != Grab::Pending || !is_free() {
             return;
         }
-        self.grab = Grab::Had;
+        self.grab = Grab::Active;
         if let Err(fault) = self.device.grab() {
-            self.grab = Grab::NotWanted;
-            let (name, path) = (self.device.name().unwrap_or("nameless"), self.path.display());
-            out.push(Told::Note(format!("{name} ({path}) cannot be had alone: {fault}")));
+            self.grab = Grab::Off;
+            let (name, path) = (self.device.name().unwrap_or("unnamed"), self.path.display());
+            out.push(DeviceMessage::Warning(format!("{name} ({path}) cannot be grabbed: {fault}")));
         }
     }
 }

@@ -10,15 +10,15 @@ use std::collections::BTreeSet;
 const SIZE: [u32; 2] = [1001, 501];
 const SPANS: [Span; 2] = [Span { low: 0, high: 2000 }, Span { low: -500, high: 500 }];
 
-/// Devices that are numbered as they come.
-struct Bench {
+/// A translator with devices that are numbered in order.
+struct FakeDevices {
     translator: Translator,
     count: u32,
 }
 
-impl Bench {
-    fn new() -> Bench {
-        Bench { translator: Translator::new(SIZE), count: 0 }
+impl FakeDevices {
+    fn new() -> FakeDevices {
+        FakeDevices { translator: Translator::new(SIZE), count: 0 }
     }
 
     fn plug(&mut self, pointing: Pointing) -> u32 {
@@ -32,8 +32,8 @@ impl Bench {
         self.count
     }
 
-    /// A report of these.
-    fn says(&mut self, number: u32, events: &[(EventType, u16, i32)]) -> Vec<Input> {
+    /// Sends a report of these events.
+    fn report(&mut self, number: u32, events: &[(EventType, u16, i32)]) -> Vec<Input> {
         let mut out = Vec::new();
         let report = (EventType::SYNCHRONIZATION, Sync::SYN_REPORT.0, 0);
         for (kind, code, value) in events.iter().chain([&report]) {
@@ -43,7 +43,7 @@ impl Bench {
     }
 
     fn key(&mut self, number: u32, code: KeyCode, value: i32) -> Vec<Input> {
-        self.says(number, &[(EventType::KEY, code.0, value)])
+        self.report(number, &[(EventType::KEY, code.0, value)])
     }
 
     fn unplug(&mut self, number: u32) -> Vec<Input> {
@@ -65,7 +65,7 @@ fn abs(code: Abs, value: i32) -> (EventType, u16, i32) {
     (EventType::ABSOLUTE, code.0, value)
 }
 
-/// A finger that comes to a slot, or leaves it.
+/// A finger that touches or leaves in a slot.
 fn tracked(slot: i32, number: i32) -> [(EventType, u16, i32); 2] {
     [abs(Abs::ABS_MT_SLOT, slot), abs(Abs::ABS_MT_TRACKING_ID, number)]
 }
@@ -87,193 +87,195 @@ const DROPPED: (EventType, u16, i32) = (EventType::SYNCHRONIZATION, Sync::SYN_DR
 
 #[test]
 fn a_mouse_moves_first_and_then_presses_and_stays_on_the_screen() {
-    let mut bench = Bench::new();
-    let mouse = bench.plug(Pointing::Relative);
-    let said = bench.says(mouse, &[key(KeyCode::BTN_LEFT, 1), rel(Rel::REL_X, 10), rel(Rel::REL_Y, -5)]);
+    let mut devices = FakeDevices::new();
+    let mouse = devices.plug(Pointing::Relative);
+    let inputs = devices.report(mouse, &[key(KeyCode::BTN_LEFT, 1), rel(Rel::REL_X, 10), rel(Rel::REL_Y, -5)]);
     let button = Input::Button { button: Button::Left, pressed: true };
-    assert_eq!(said, [Input::Moved([510.0, 245.0]), button]);
+    assert_eq!(inputs, [Input::Moved([510.0, 245.0]), button]);
     assert_eq!(
-        bench.says(mouse, &[rel(Rel::REL_X, i32::MAX), rel(Rel::REL_Y, i32::MIN)]),
+        devices.report(mouse, &[rel(Rel::REL_X, i32::MAX), rel(Rel::REL_Y, i32::MIN)]),
         [Input::Moved([1000.0, 0.0])]
     );
-    assert_eq!(bench.says(mouse, &[rel(Rel::REL_X, 1)]), [], "there is an edge");
-    bench.translator.resize([200, 100]);
-    let said = bench.key(mouse, KeyCode::BTN_RIGHT, 1);
-    assert_eq!(said[0], Input::Moved([199.0, 0.0]), "the press is where the pointer is");
+    assert_eq!(devices.report(mouse, &[rel(Rel::REL_X, 1)]), [], "the pointer stays on the screen");
+    devices.translator.resize([200, 100]);
+    let inputs = devices.key(mouse, KeyCode::BTN_RIGHT, 1);
+    assert_eq!(inputs[0], Input::Moved([199.0, 0.0]), "the press is where the pointer is");
 }
 
 #[test]
-fn a_wheel_that_says_parts_of_notches_is_not_counted_twice() {
-    let mut bench = Bench::new();
-    let (fine, plain) = (bench.plug(Pointing::Relative), bench.plug(Pointing::Relative));
+fn a_wheel_with_high_resolution_is_not_counted_twice() {
+    let mut devices = FakeDevices::new();
+    let (fine, plain) = (devices.plug(Pointing::Relative), devices.plug(Pointing::Relative));
     let middle = Input::Moved([500.0, 250.0]);
     let whole = [rel(Rel::REL_WHEEL, 1), rel(Rel::REL_WHEEL_HI_RES, 120)];
-    assert_eq!(bench.says(fine, &whole), [middle, Input::Scroll(1.0)]);
-    assert_eq!(bench.says(fine, &[rel(Rel::REL_WHEEL_HI_RES, -30)]), [Input::Scroll(-0.25)]);
-    assert_eq!(bench.says(plain, &[rel(Rel::REL_WHEEL, -2)]), [Input::Scroll(-2.0)]);
+    assert_eq!(devices.report(fine, &whole), [middle, Input::Scroll(1.0)]);
+    assert_eq!(devices.report(fine, &[rel(Rel::REL_WHEEL_HI_RES, -30)]), [Input::Scroll(-0.25)]);
+    assert_eq!(devices.report(plain, &[rel(Rel::REL_WHEEL, -2)]), [Input::Scroll(-2.0)]);
 }
 
 #[test]
 fn a_key_that_is_held_repeats_and_one_that_was_down_before_does_not() {
-    let mut bench = Bench::new();
-    let board = bench.plug_as(Pointing::Relative, &State { keys: [KeyCode::KEY_ENTER.0].into(), ..State::default() });
-    assert_eq!(bench.key(board, KeyCode::KEY_ENTER, 2), [], "it began what is running");
-    assert_eq!(bench.key(board, KeyCode::KEY_ENTER, 0), []);
+    let mut devices = FakeDevices::new();
+    let board = devices.plug_as(Pointing::Relative, &State { keys: [KeyCode::KEY_ENTER.0].into(), ..State::default() });
+    assert_eq!(devices.key(board, KeyCode::KEY_ENTER, 2), [], "it was down before the device was opened");
+    assert_eq!(devices.key(board, KeyCode::KEY_ENTER, 0), []);
     for value in [1, 2, 2] {
-        assert_eq!(bench.key(board, KeyCode::KEY_Q, value), [pressed('q')]);
+        assert_eq!(devices.key(board, KeyCode::KEY_Q, value), [pressed('q')]);
     }
-    assert_eq!(bench.key(board, KeyCode::KEY_Q, 0), [Input::Key { key: Key::Char('q'), pressed: false }]);
-    assert_eq!(bench.key(board, KeyCode::KEY_POWER, 1), []);
+    assert_eq!(devices.key(board, KeyCode::KEY_Q, 0), [Input::Key { key: Key::Char('q'), pressed: false }]);
+    assert_eq!(devices.key(board, KeyCode::KEY_POWER, 1), []);
 }
 
 #[test]
 fn shift_on_one_keyboard_counts_for_another() {
-    let mut bench = Bench::new();
-    let (left, right) = (bench.plug(Pointing::Relative), bench.plug(Pointing::Relative));
-    assert_eq!(bench.key(left, KeyCode::KEY_LEFTSHIFT, 1), [Input::Modifiers(SHIFT)]);
-    assert_eq!(bench.key(right, KeyCode::KEY_RIGHTSHIFT, 1), [], "it is held already");
-    assert_eq!(bench.key(right, KeyCode::KEY_X, 1), [pressed('x')]);
-    assert_eq!(bench.key(left, KeyCode::KEY_LEFTSHIFT, 0), [], "it is held still");
-    // All that it held is let go, and with it shift.
-    assert_eq!(bench.unplug(right), [Input::Left]);
-    let both = bench.says(left, &[key(KeyCode::KEY_RIGHTCTRL, 1), key(KeyCode::KEY_Z, 1)]);
+    let mut devices = FakeDevices::new();
+    let (left, right) = (devices.plug(Pointing::Relative), devices.plug(Pointing::Relative));
+    assert_eq!(devices.key(left, KeyCode::KEY_LEFTSHIFT, 1), [Input::Modifiers(SHIFT)]);
+    assert_eq!(devices.key(right, KeyCode::KEY_RIGHTSHIFT, 1), [], "shift is already held");
+    assert_eq!(devices.key(right, KeyCode::KEY_X, 1), [pressed('x')]);
+    assert_eq!(devices.key(left, KeyCode::KEY_LEFTSHIFT, 0), [], "shift is still held");
+    // Everything that it held is released, including shift.
+    assert_eq!(devices.unplug(right), [Input::FocusLost]);
+    let both = devices.report(left, &[key(KeyCode::KEY_RIGHTCTRL, 1), key(KeyCode::KEY_Z, 1)]);
     assert_eq!(both, [Input::Modifiers(Modifiers { control: true, ..Modifiers::default() }), pressed('z')]);
 }
 
 #[test]
 fn a_key_on_two_keyboards_is_up_when_both_are() {
-    let mut bench = Bench::new();
-    let (left, right) = (bench.plug(Pointing::Relative), bench.plug(Pointing::Relative));
+    let mut devices = FakeDevices::new();
+    let (left, right) = (devices.plug(Pointing::Relative), devices.plug(Pointing::Relative));
     let enter = |pressed| Input::Key { key: Key::Enter, pressed };
-    assert_eq!(bench.key(left, KeyCode::KEY_ENTER, 1), [enter(true)]);
-    assert_eq!(bench.key(right, KeyCode::KEY_KPENTER, 1), [enter(true)]);
-    assert_eq!(bench.key(left, KeyCode::KEY_ENTER, 0), []);
-    assert_eq!(bench.key(right, KeyCode::KEY_KPENTER, 0), [enter(false)]);
+    assert_eq!(devices.key(left, KeyCode::KEY_ENTER, 1), [enter(true)]);
+    assert_eq!(devices.key(right, KeyCode::KEY_KPENTER, 1), [enter(true)]);
+    assert_eq!(devices.key(left, KeyCode::KEY_ENTER, 0), []);
+    assert_eq!(devices.key(right, KeyCode::KEY_KPENTER, 0), [enter(false)]);
 }
 
 #[test]
-fn modifiers_outlast_what_another_device_held() {
-    let mut bench = Bench::new();
-    let (board, mouse) = (bench.plug(Pointing::Relative), bench.plug(Pointing::Relative));
-    bench.key(board, KeyCode::KEY_LEFTSHIFT, 1);
-    bench.key(mouse, KeyCode::BTN_LEFT, 1);
-    assert_eq!(bench.unplug(mouse), [Input::Left, Input::Modifiers(SHIFT)]);
-    assert_eq!(bench.unplug(board), [Input::Modifiers(Modifiers::default())]);
-    assert_eq!(bench.unplug(board), [], "it is gone");
+fn modifiers_survive_the_removal_of_another_device() {
+    let mut devices = FakeDevices::new();
+    let (board, mouse) = (devices.plug(Pointing::Relative), devices.plug(Pointing::Relative));
+    devices.key(board, KeyCode::KEY_LEFTSHIFT, 1);
+    devices.key(mouse, KeyCode::BTN_LEFT, 1);
+    assert_eq!(devices.unplug(mouse), [Input::FocusLost, Input::Modifiers(SHIFT)]);
+    assert_eq!(devices.unplug(board), [Input::Modifiers(Modifiers::default())]);
+    assert_eq!(devices.unplug(board), [], "it is removed");
 }
 
 #[test]
 fn two_fingers_pinch() {
-    let mut bench = Bench::new();
-    let screen = bench.plug(Pointing::Fingers(SPANS));
+    let mut devices = FakeDevices::new();
+    let screen = devices.plug(Pointing::Fingers(SPANS));
     let both = [tracked(0, 45), placed(400, 0), tracked(1, 46), placed(1600, 0)].concat();
     assert_eq!(
-        bench.says(screen, &both),
+        devices.report(screen, &both),
         [touch(1, Phase::Down, [200.0, 250.0]), touch(2, Phase::Down, [800.0, 250.0])]
     );
-    // Only what changes is said, and the slot only where it is another: slot 1 goes on.
+    // The kernel reports only changes: the values still belong to slot 1.
     let closer = [abs(Abs::ABS_MT_POSITION_X, 1400), abs(Abs::ABS_MT_SLOT, 0), abs(Abs::ABS_MT_POSITION_X, 600)];
     assert_eq!(
-        bench.says(screen, &closer),
+        devices.report(screen, &closer),
         [touch(1, Phase::Moved, [300.0, 250.0]), touch(2, Phase::Moved, [700.0, 250.0])]
     );
-    // Slot 0 is still the one that is spoken of.
-    assert_eq!(bench.says(screen, &[abs(Abs::ABS_MT_TRACKING_ID, -1)]), [touch(1, Phase::Up, [300.0, 250.0])]);
-    // A finger that comes to the same place is not said to be there again; with it the other one goes.
+    // Values still belong to slot 0.
+    assert_eq!(devices.report(screen, &[abs(Abs::ABS_MT_TRACKING_ID, -1)]), [touch(1, Phase::Up, [300.0, 250.0])]);
+    // A new finger at the same position has no new coordinates. The other finger leaves in the same report.
     let next = [&tracked(0, 47)[..], &tracked(1, -1)].concat();
-    assert_eq!(bench.says(screen, &next), [touch(3, Phase::Down, [300.0, 250.0]), touch(2, Phase::Up, [700.0, 250.0])]);
-    assert_eq!(bench.unplug(screen), [touch(3, Phase::Gone, [300.0, 250.0])]);
+    assert_eq!(
+        devices.report(screen, &next),
+        [touch(3, Phase::Down, [300.0, 250.0]), touch(2, Phase::Up, [700.0, 250.0])]
+    );
+    assert_eq!(devices.unplug(screen), [touch(3, Phase::Cancelled, [300.0, 250.0])]);
 }
 
 #[test]
-fn a_slot_may_change_its_finger_at_once_and_a_palm_is_none() {
-    let mut bench = Bench::new();
-    let screen = bench.plug(Pointing::Fingers(SPANS));
-    bench.says(screen, &[tracked(0, 1), placed(0, -500)].concat());
+fn a_slot_may_change_its_finger_in_one_report_and_a_palm_is_cancelled() {
+    let mut devices = FakeDevices::new();
+    let screen = devices.plug(Pointing::Fingers(SPANS));
+    devices.report(screen, &[tracked(0, 1), placed(0, -500)].concat());
     assert_eq!(
-        bench.says(screen, &[tracked(0, 2), placed(2000, 500)].concat()),
+        devices.report(screen, &[tracked(0, 2), placed(2000, 500)].concat()),
         [touch(1, Phase::Up, [0.0, 0.0]), touch(2, Phase::Down, [1000.0, 500.0])]
     );
     let palm = abs(Abs::ABS_MT_TOOL_TYPE, 2);
-    assert_eq!(bench.says(screen, &[palm]), [touch(2, Phase::Gone, [1000.0, 500.0])]);
-    assert_eq!(bench.says(screen, &placed(10, 10)), []);
-    assert_eq!(bench.says(screen, &[tracked(1, 3), tracked(99, 4)].concat()), [], "their places are not known");
+    assert_eq!(devices.report(screen, &[palm]), [touch(2, Phase::Cancelled, [1000.0, 500.0])]);
+    assert_eq!(devices.report(screen, &placed(10, 10)), []);
+    assert_eq!(devices.report(screen, &[tracked(1, 3), tracked(99, 4)].concat()), [], "their positions are unknown");
 }
 
 #[test]
-fn what_was_dropped_is_known_as_lost() {
-    let mut bench = Bench::new();
-    let screen = bench.plug(Pointing::Fingers(SPANS));
-    bench.says(screen, &[tracked(0, 1), placed(1000, 0)].concat());
-    assert_eq!(bench.says(screen, &[&[DROPPED], &tracked(1, 2)[..], &placed(3, 3)].concat()), []);
-    assert!(bench.translator.is_behind(screen));
+fn dropped_events_are_detected_and_resynchronised() {
+    let mut devices = FakeDevices::new();
+    let screen = devices.plug(Pointing::Fingers(SPANS));
+    devices.report(screen, &[tracked(0, 1), placed(1000, 0)].concat());
+    assert_eq!(devices.report(screen, &[&[DROPPED], &tracked(1, 2)[..], &placed(3, 3)].concat()), []);
+    assert!(devices.translator.needs_resync(screen));
     let mut out = Vec::new();
-    bench.translator.resync(screen, &State { slot: 1, ..State::default() }, &mut out);
-    assert_eq!(out, [touch(1, Phase::Gone, [500.0, 250.0])]);
-    assert!(!bench.translator.is_behind(screen));
-    // The first finger is still there, and means nothing before it is lifted.
-    assert_eq!(bench.says(screen, &[&[abs(Abs::ABS_MT_SLOT, 0)], &placed(7, 7)[..]].concat()), []);
+    devices.translator.resync(screen, &State { slot: 1, ..State::default() }, &mut out);
+    assert_eq!(out, [touch(1, Phase::Cancelled, [500.0, 250.0])]);
+    assert!(!devices.translator.needs_resync(screen));
+    // The first finger still touches and is ignored until it is lifted.
+    assert_eq!(devices.report(screen, &[&[abs(Abs::ABS_MT_SLOT, 0)], &placed(7, 7)[..]].concat()), []);
     let down = [tracked(0, -1), tracked(0, 5), placed(2000, 500)].concat();
-    assert_eq!(bench.says(screen, &down), [touch(2, Phase::Down, [1000.0, 500.0])]);
-    // Of keys those are let go that are up by now; shift counts, whoever saw it go down.
-    let board = bench.plug(Pointing::Relative);
-    bench.says(board, &[key(KeyCode::KEY_A, 1), key(KeyCode::KEY_B, 1)]);
-    bench.says(board, &[DROPPED, key(KeyCode::KEY_A, 0)]);
+    assert_eq!(devices.report(screen, &down), [touch(2, Phase::Down, [1000.0, 500.0])]);
+    // Keys that are up now are released. Shift counts even without its event.
+    let board = devices.plug(Pointing::Relative);
+    devices.report(board, &[key(KeyCode::KEY_A, 1), key(KeyCode::KEY_B, 1)]);
+    devices.report(board, &[DROPPED, key(KeyCode::KEY_A, 0)]);
     let keys = [KeyCode::KEY_B.0, KeyCode::KEY_C.0, KeyCode::KEY_LEFTSHIFT.0].into();
     let mut out = Vec::new();
-    bench.translator.resync(board, &State { keys, ..State::default() }, &mut out);
+    devices.translator.resync(board, &State { keys, ..State::default() }, &mut out);
     assert_eq!(out, [Input::Key { key: Key::Char('a'), pressed: false }, Input::Modifiers(SHIFT)]);
 }
 
 #[test]
-fn a_screen_that_knows_one_finger_and_a_tablet_that_is_a_mouse() {
-    let mut bench = Bench::new();
+fn a_touch_screen_for_one_finger_and_a_tablet_as_a_mouse() {
+    let mut devices = FakeDevices::new();
     let state = State { place: [Some(1000), Some(0)], ..State::default() };
-    let screen = bench.plug_as(Pointing::Finger(SPANS), &state);
-    assert_eq!(bench.key(screen, KeyCode::BTN_TOUCH, 1), [touch(1, Phase::Down, [500.0, 250.0])]);
-    assert_eq!(bench.says(screen, &[abs(Abs::ABS_X, 0)]), [touch(1, Phase::Moved, [0.0, 250.0])]);
-    assert_eq!(bench.key(screen, KeyCode::BTN_TOUCH, 0), [touch(1, Phase::Up, [0.0, 250.0])]);
-    let tablet = bench.plug_as(Pointing::Absolute(SPANS), &state);
-    assert_eq!(bench.says(tablet, &[abs(Abs::ABS_X, 2000)]), [Input::Moved([1000.0, 250.0])]);
-    let pen = bench.says(tablet, &[key(KeyCode::BTN_TOUCH, 1), abs(Abs::ABS_Y, 500)]);
+    let screen = devices.plug_as(Pointing::Finger(SPANS), &state);
+    assert_eq!(devices.key(screen, KeyCode::BTN_TOUCH, 1), [touch(1, Phase::Down, [500.0, 250.0])]);
+    assert_eq!(devices.report(screen, &[abs(Abs::ABS_X, 0)]), [touch(1, Phase::Moved, [0.0, 250.0])]);
+    assert_eq!(devices.key(screen, KeyCode::BTN_TOUCH, 0), [touch(1, Phase::Up, [0.0, 250.0])]);
+    let tablet = devices.plug_as(Pointing::Absolute(SPANS), &state);
+    assert_eq!(devices.report(tablet, &[abs(Abs::ABS_X, 2000)]), [Input::Moved([1000.0, 250.0])]);
+    let pen = devices.report(tablet, &[key(KeyCode::BTN_TOUCH, 1), abs(Abs::ABS_Y, 500)]);
     let button = Input::Button { button: Button::Left, pressed: true };
     assert_eq!(pen, [Input::Moved([1000.0, 500.0]), button]);
 }
 
 #[test]
-fn a_pad_moves_the_pointer_from_where_it_is() {
-    let mut bench = Bench::new();
-    let pad = bench.plug(Pointing::Pad(SPANS));
+fn a_pad_moves_the_pointer_relative_to_its_position() {
+    let mut devices = FakeDevices::new();
+    let pad = devices.plug(Pointing::Pad(SPANS));
     let at = |x, y| [abs(Abs::ABS_X, x), abs(Abs::ABS_Y, y)];
     let finger = [key(KeyCode::BTN_TOUCH, 1), key(KeyCode::BTN_TOOL_FINGER, 1)];
-    assert_eq!(bench.says(pad, &[&finger[..], &at(200, 100)].concat()), [], "it came");
-    // As wide as the screen, in both directions.
+    assert_eq!(devices.report(pad, &[&finger[..], &at(200, 100)].concat()), [], "it touched");
+    // The width of the pad is the width of the screen, for both axes.
     let by = [20.0, -40.0].map(|n| n / 2000.0 * 1001.0);
-    assert_eq!(bench.says(pad, &at(220, 60)), [Input::Moved([500.0 + by[0], 250.0 + by[1]])]);
+    assert_eq!(devices.report(pad, &at(220, 60)), [Input::Moved([500.0 + by[0], 250.0 + by[1]])]);
     let two = [key(KeyCode::BTN_TOOL_FINGER, 0), key(KeyCode::BTN_TOOL_DOUBLETAP, 1)];
-    assert_eq!(bench.says(pad, &[&two[..], &at(900, 60)].concat()), [], "another finger is elsewhere");
-    assert!(matches!(bench.says(pad, &at(900, -140))[..], [Input::Scroll(by)] if by > 0.0));
+    assert_eq!(devices.report(pad, &[&two[..], &at(900, 60)].concat()), [], "the second finger is elsewhere");
+    assert!(matches!(devices.report(pad, &at(900, -140))[..], [Input::Scroll(by)] if by > 0.0));
 }
 
-const MOST: u32 = 4;
+const DEVICE_COUNT: u32 = 4;
 
-/// What may happen.
+/// An action of the property test.
 #[derive(Clone, Debug)]
 enum Step {
-    Says(u32, Event),
-    /// In several of the ways in which a driver may.
+    Event(u32, Event),
     Plug(u32, Profile, State),
     Unplug(u32),
     Resync(u32, State),
     Resize([u32; 2]),
 }
 
-/// Numbers as devices give them, and as broken ones do.
+/// Values of devices, including broken ones.
 fn number() -> impl Strategy<Value = i32> {
     prop_oneof![4 => -2..4, 4 => -600..2200, 1 => any::<i32>(), 1 => Just(i32::MIN), 1 => Just(i32::MAX)]
 }
 
-/// Codes that mean something, mostly.
+/// Events, mostly with codes that have a meaning.
 fn event() -> impl Strategy<Value = Event> {
     let keys = [
         KeyCode::KEY_A,
@@ -318,15 +320,15 @@ fn profile() -> impl Strategy<Value = Profile> {
 
 fn step() -> impl Strategy<Value = Step> {
     prop_oneof![
-        40 => (0..MOST, event()).prop_map(|(device, event)| Step::Says(device, event)),
-        3 => (0..MOST, profile(), state()).prop_map(|(device, profile, state)| Step::Plug(device, profile, state)),
-        1 => (0..MOST).prop_map(Step::Unplug),
-        1 => (0..MOST, state()).prop_map(|(device, state)| Step::Resync(device, state)),
+        40 => (0..DEVICE_COUNT, event()).prop_map(|(device, event)| Step::Event(device, event)),
+        3 => (0..DEVICE_COUNT, profile(), state()).prop_map(|(device, profile, state)| Step::Plug(device, profile, state)),
+        1 => (0..DEVICE_COUNT).prop_map(Step::Unplug),
+        1 => (0..DEVICE_COUNT, state()).prop_map(|(device, state)| Step::Resync(device, state)),
         1 => prop_oneof![Just([1001, 501]), Just([0, 0]), any::<[u32; 2]>()].prop_map(Step::Resize),
     ]
 }
 
-/// What whoever listens takes to be held.
+/// What is held according to the inputs.
 #[derive(Default)]
 struct Held {
     buttons: Vec<Button>,
@@ -336,7 +338,7 @@ struct Held {
 }
 
 impl Held {
-    fn hear(&mut self, input: &Input, size: [u32; 2]) {
+    fn apply(&mut self, input: &Input, size: [u32; 2]) {
         let is_inside = |at: [f64; 2]| (0..2).all(|n| (0.0..=f64::from(size[n].max(1)) - 1.0).contains(&at[n]));
         match *input {
             Input::Moved(at) => assert!(is_inside(at), "{at:?}"),
@@ -357,19 +359,19 @@ impl Held {
                 let is_right = match phase {
                     Phase::Down => self.fingers.insert(finger),
                     Phase::Moved => self.fingers.contains(&finger),
-                    Phase::Up | Phase::Gone => self.fingers.remove(&finger),
+                    Phase::Up | Phase::Cancelled => self.fingers.remove(&finger),
                 };
                 assert!(is_right, "{finger} {phase:?}");
             }
-            // Fingers are told of one by one, whatever else is let go.
-            Input::Left => *self = Held { fingers: std::mem::take(&mut self.fingers), ..Held::default() },
+            // Fingers are cancelled one by one.
+            Input::FocusLost => *self = Held { fingers: std::mem::take(&mut self.fingers), ..Held::default() },
         }
     }
 }
 
 proptest! {
     #[test]
-    fn nothing_that_devices_say_leaves_the_screen_or_is_held_when_they_are_gone(
+    fn positions_stay_on_the_screen_and_nothing_is_held_after_all_devices_are_removed(
         steps in prop::collection::vec(step(), 1..400),
     ) {
         let (mut translator, mut size, mut held) = (Translator::new(SIZE), SIZE, Held::default());
@@ -380,7 +382,7 @@ proptest! {
         for step in steps {
             let mut out = Vec::new();
             match step {
-                Step::Says(device, event) => translator.event(device, event, &mut out),
+                Step::Event(device, event) => translator.event(device, event, &mut out),
                 Step::Plug(device, profile, state) => translator.add(device, profile, &state, &mut out),
                 Step::Unplug(device) => translator.remove(device, &mut out),
                 Step::Resync(device, state) => translator.resync(device, &state, &mut out),
@@ -389,12 +391,12 @@ proptest! {
                     translator.resize(to);
                 }
             }
-            out.iter().for_each(|input| held.hear(input, size));
+            out.iter().for_each(|input| held.apply(input, size));
         }
-        for device in 0..MOST {
+        for device in 0..DEVICE_COUNT {
             let mut out = Vec::new();
             translator.remove(device, &mut out);
-            out.iter().for_each(|input| held.hear(input, size));
+            out.iter().for_each(|input| held.apply(input, size));
         }
         prop_assert!(held.buttons.is_empty() && held.keys.is_empty() && held.fingers.is_empty());
         prop_assert_eq!(held.modifiers, Modifiers::default());

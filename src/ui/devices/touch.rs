@@ -5,92 +5,94 @@ use super::profile::Span;
 use crate::ui::input::{Input, Phase};
 use evdev::KeyCode;
 
-/// More fingers than this are not looked at.
-const SLOTS: usize = 16;
+/// Largest number of fingers.
+const MAX_SLOTS: usize = 16;
 
-/// The screen that is touched, pixels.
+/// Size of the screen, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Area(pub [u32; 2]);
+pub(super) struct Area(pub [u32; 2]);
 
 impl Area {
-    /// The place itself, or the nearest on the screen.
-    pub fn inside(&self, at: [f64; 2]) -> [f64; 2] {
+    /// The nearest position on the screen.
+    pub(super) fn clamp(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|n| at[n].clamp(0.0, f64::from(self.0[n].max(1)) - 1.0))
     }
 
-    pub fn scaled(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
-        self.inside([0, 1].map(|n| spans[n].share(raw[n]) * (f64::from(self.0[n].max(1)) - 1.0)))
+    /// Converts values of the axes to a position on the screen.
+    pub(super) fn from_raw(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
+        self.clamp([0, 1].map(|n| spans[n].fraction(raw[n]) * (f64::from(self.0[n].max(1)) - 1.0)))
     }
 
-    pub fn middle(&self) -> [f64; 2] {
+    pub(super) fn centre(&self) -> [f64; 2] {
         self.0.map(|n| f64::from(n / 2))
     }
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Slot {
-    /// The kernel's number of the finger.
-    tracked: Option<i32>,
-    /// Another finger than the one that was told of.
-    is_other: bool,
+    /// The kernel's tracking ID of the finger.
+    tracking_id: Option<i32>,
+    /// The finger is another one than that reported.
+    is_replaced: bool,
     is_palm: bool,
-    /// Kept when the finger is lifted: what is the same for the next one is not said again.
+    /// Kept when the finger is lifted: the kernel does not repeat a value that is the same for the next finger.
     raw: [Option<i32>; 2],
-    /// Our number of the finger, and where it was said to be.
-    told: Option<(u64, [f64; 2])>,
+    /// The reported finger: its number in our inputs, and its position.
+    reported: Option<(u64, [f64; 2])>,
 }
 
+/// The fingers on a touch screen.
 #[derive(Clone, Debug, Default)]
-pub struct Fingers {
-    slots: [Slot; SLOTS],
-    /// The one that values belong to.
+pub(super) struct Fingers {
+    slots: [Slot; MAX_SLOTS],
+    /// The slot that values belong to.
     current: usize,
 }
 
 impl Fingers {
-    /// Which slot values belong to from here on; one that is none takes them nowhere.
-    pub fn choose(&mut self, slot: i32) {
-        self.current = usize::try_from(slot).unwrap_or(SLOTS);
+    /// Selects the slot that values belong to from now on. Values for an invalid slot are ignored.
+    pub(super) fn select_slot(&mut self, slot: i32) {
+        self.current = usize::try_from(slot).unwrap_or(MAX_SLOTS);
     }
 
-    /// A finger comes to the slot, or leaves it (negative).
-    pub fn track(&mut self, number: i32) {
+    /// Sets the tracking ID of the slot; negative: the finger is lifted.
+    pub(super) fn set_tracking_id(&mut self, number: i32) {
         let Some(slot) = self.slots.get_mut(self.current) else { return };
-        let tracked = (number >= 0).then_some(number);
-        if tracked != slot.tracked {
-            (slot.tracked, slot.is_other, slot.is_palm) = (tracked, true, false);
+        let tracking_id = (number >= 0).then_some(number);
+        if tracking_id != slot.tracking_id {
+            (slot.tracking_id, slot.is_replaced, slot.is_palm) = (tracking_id, true, false);
         }
     }
 
-    /// `axis`: 0 across, 1 down.
-    pub fn place(&mut self, axis: usize, value: i32) {
+    /// Sets a coordinate. `axis`: 0 horizontal, 1 vertical.
+    pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         let raw = self.slots.get_mut(self.current).and_then(|slot| slot.raw.get_mut(axis));
         if let Some(raw) = raw {
             *raw = Some(value);
         }
     }
 
-    pub fn palm(&mut self, is_palm: bool) {
+    pub(super) fn set_palm(&mut self, is_palm: bool) {
         if let Some(slot) = self.slots.get_mut(self.current) {
             slot.is_palm = is_palm;
         }
     }
 
-    /// What the values since the last time come to. `count`: fingers so far, of all devices.
-    pub fn tell(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
+    /// Appends the inputs of the values since the last call. `count`: number of fingers so far, of all devices.
+    pub(super) fn report(&mut self, area: &Area, spans: &[Span; 2], count: &mut u64, out: &mut Vec<Input>) {
         for slot in &mut self.slots {
-            if let Some((finger, at)) = slot.told.take_if(|_| slot.is_other || slot.is_palm) {
-                let phase = if slot.is_palm { Phase::Gone } else { Phase::Up };
-                out.push(Input::Touch { finger, phase, at: area.inside(at) });
+            if let Some((finger, at)) = slot.reported.take_if(|_| slot.is_replaced || slot.is_palm) {
+                let phase = if slot.is_palm { Phase::Cancelled } else { Phase::Up };
+                out.push(Input::Touch { finger, phase, at: area.clamp(at) });
             }
-            slot.is_other = false;
-            // A finger whose place is not known yet comes when it is: at its first movement.
-            let (Some(_), false, [Some(x), Some(y)]) = (slot.tracked, slot.is_palm, slot.raw) else { continue };
-            let at = area.scaled([x, y], spans);
-            match &mut slot.told {
+            slot.is_replaced = false;
+            // A finger without a position is reported once it moves.
+            let (Some(_), false, [Some(x), Some(y)]) = (slot.tracking_id, slot.is_palm, slot.raw) else { continue };
+            let at = area.from_raw([x, y], spans);
+            match &mut slot.reported {
                 None => {
                     *count += 1;
-                    slot.told = Some((*count, at));
+                    slot.reported = Some((*count, at));
                     out.push(Input::Touch { finger: *count, phase: Phase::Down, at });
                 }
                 Some((finger, last)) if *last != at => {
@@ -102,71 +104,74 @@ impl Fingers {
         }
     }
 
-    /// All of them are gone, whatever they did. Those that still touch are not known again before they are lifted.
-    pub fn drop(&mut self, area: &Area, out: &mut Vec<Input>) {
-        for (finger, at) in self.slots.iter().filter_map(|slot| slot.told) {
-            out.push(Input::Touch { finger, phase: Phase::Gone, at: area.inside(at) });
+    /// Cancels all fingers. Those that still touch are ignored until they are lifted.
+    pub(super) fn cancel_all(&mut self, area: &Area, out: &mut Vec<Input>) {
+        for (finger, at) in self.slots.iter().filter_map(|slot| slot.reported) {
+            out.push(Input::Touch { finger, phase: Phase::Cancelled, at: area.clamp(at) });
         }
         *self = Fingers { current: self.current, ..Fingers::default() };
     }
 }
 
-/// Notches of the wheel for two fingers all the way down.
-const NOTCHES: f64 = 30.0;
+/// Notches of the wheel for two fingers from top to bottom.
+const NOTCHES_PER_HEIGHT: f64 = 30.0;
 
+/// A motion on a touch pad.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Moved {
-    /// The pointer, in widths of the pad.
-    By([f64; 2]),
+pub(super) enum PadMotion {
+    /// Motion of the pointer, in widths of the pad.
+    Pointer([f64; 2]),
     /// Notches of the wheel.
-    Scrolled(f64),
+    Scroll(f64),
 }
 
+/// A touch pad. Its buttons are pressed, not tapped.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pad {
+pub(super) struct Pad {
     raw: [Option<i32>; 2],
-    /// Where the fingers were before.
+    /// The previous position.
     last: Option<[i32; 2]>,
     is_touched: bool,
-    /// More than one finger.
-    are_several: bool,
+    has_several_fingers: bool,
 }
 
 impl Pad {
-    pub fn place(&mut self, axis: usize, value: i32) {
+    pub(super) fn set_position(&mut self, axis: usize, value: i32) {
         if let Some(raw) = self.raw.get_mut(axis) {
             *raw = Some(value);
         }
     }
 
-    /// Whether something touches it, and how many.
-    pub fn key(&mut self, code: u16, is_down: bool) {
+    /// Records whether fingers touch the pad, and how many.
+    pub(super) fn set_key(&mut self, code: u16, is_down: bool) {
         match KeyCode(code) {
             KeyCode::BTN_TOUCH => self.is_touched = is_down,
             KeyCode::BTN_TOOL_DOUBLETAP
             | KeyCode::BTN_TOOL_TRIPLETAP
             | KeyCode::BTN_TOOL_QUADTAP
-            | KeyCode::BTN_TOOL_QUINTTAP => self.are_several = is_down,
+            | KeyCode::BTN_TOOL_QUINTTAP => self.has_several_fingers = is_down,
             KeyCode::BTN_TOOL_FINGER => {}
             _ => return,
         }
-        // With another finger the place is another's.
+        // With another number of fingers the position jumps.
         self.last = None;
     }
 
-    /// What the values since the last time come to.
-    pub fn tell(&mut self, spans: &[Span; 2]) -> Option<Moved> {
+    /// The motion since the last call.
+    pub(super) fn report(&mut self, spans: &[Span; 2]) -> Option<PadMotion> {
         let [Some(x), Some(y)] = self.raw else { return None };
         if !self.is_touched {
             return None;
         }
         let [from_x, from_y] = self.last.replace([x, y])?;
-        // Both by the width: pads have square counts, and a circle has to stay one.
+        // Both axes are divided by the width: counts are square, and a circle must stay a circle.
         let by = [[x, from_x], [y, from_y]].map(|[to, from]| (f64::from(to) - f64::from(from)) / spans[0].length());
-        match (self.are_several, by) {
+        match (self.has_several_fingers, by) {
             (_, [0.0, 0.0]) => None,
-            (false, by) => Some(Moved::By(by)),
-            (true, [_, down]) => Some(Moved::Scrolled((-down * NOTCHES).clamp(-NOTCHES, NOTCHES))),
+            (false, by) => Some(PadMotion::Pointer(by)),
+            (true, [_, down]) => {
+                Some(PadMotion::Scroll((-down * NOTCHES_PER_HEIGHT).clamp(-NOTCHES_PER_HEIGHT, NOTCHES_PER_HEIGHT)))
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
-//! What a picture is read by: a scale in every tile, which way the volume is turned, and what its colours mean.
+//! Annotations of the picture: a scale in every tile, the orientation of the axes, and a colour bar.
 
-use super::state::{Facts, rect};
-use super::theme::{FAINT, SMALL, TEXT};
+use super::state::{PanelState, picture_rect};
+use super::theme::{SMALL_TEXT, TEXT, WEAK_TEXT};
 use crate::passes::postprocess::tone;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
@@ -10,11 +10,11 @@ use glam::DVec3;
 /// Lengths that a scale bar may have, mm.
 const LENGTHS: [f64; 9] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
 
-pub fn paint(ui: &Ui, facts: &Facts, scale: f32) {
-    let Some(scene) = facts.scene else { return };
-    let picture = rect(facts, scale);
-    // While the window is being resized the scene has another size for a moment.
-    if scene.picture_size() != facts.picture.1 {
+pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
+    let Some(scene) = state.scene else { return };
+    let picture = picture_rect(state, scale);
+    // During a resize the scene has another size for a moment.
+    if scene.picture_size() != state.picture.1 {
         return;
     }
     let painter = ui.ctx().layer_painter(egui::LayerId::background()).with_clip_rect(picture);
@@ -25,9 +25,9 @@ pub fn paint(ui: &Ui, facts: &Facts, scale: f32) {
     };
     if scene.cuts_planes() {
         let sheet = scene.sheet();
-        // The tiles of tomography all have the same scale, and the first one says it.
-        let told = if scene.settings.mode == Mode::Tomography { 1 } else { sheet.tiles.len() };
-        for shown in sheet.tiles.iter().take(told) {
+        // All tiles of a tomography have the same scale: only the first one shows it.
+        let scaled_tiles = if scene.settings.mode == Mode::Tomography { 1 } else { sheet.tiles.len() };
+        for shown in sheet.tiles.iter().take(scaled_tiles) {
             let area = tile(shown.corner.map(f64::from), shown.size.map(f64::from));
             let per_point = sheet.pixel * f64::from(scale);
             match shown.plane.down.y > 0.99 {
@@ -49,12 +49,12 @@ pub fn paint(ui: &Ui, facts: &Facts, scale: f32) {
     colours(&painter, picture, scene);
 }
 
-/// What has to be taken from a place's depth to get it from the probe's face, mm.
+/// The difference between Y in space and the depth below the probe's face, mm.
 fn depth_offset(scene: &Scene) -> f64 {
     scene.probe().map_or(0.0, |probe| probe.array_radius())
 }
 
-/// mm of a picture's pixel where the camera looks; `width`: of the rendered tile.
+/// Size of a pixel at the camera's target, mm. `width`: of the rendered tile, pixels.
 fn rendered_pixel(scene: &Scene, width: f64) -> f64 {
     let rays = &scene.rays;
     let apart = match rays.is_perspective {
@@ -65,24 +65,24 @@ fn rendered_pixel(scene: &Scene, width: f64) -> f64 {
 }
 
 fn line(painter: &Painter, from: Pos2, to: Pos2) {
-    // Dark beside bright: to be seen on any echo.
+    // A dark edge along the bright line is visible on any picture.
     painter.line_segment([from, to], Stroke::new(4.0, Color32::from_black_alpha(150)));
     painter.line_segment([from, to], Stroke::new(1.5, TEXT));
 }
 
-fn text(painter: &Painter, at: Pos2, align: Align2, words: &str, colour: Color32) {
-    let font = FontId::proportional(SMALL);
-    painter.text(at + vec2(1.0, 1.0), align, words, font.clone(), Color32::from_black_alpha(200));
-    painter.text(at, align, words, font, colour);
+fn text(painter: &Painter, at: Pos2, align: Align2, label: &str, colour: Color32) {
+    let font = FontId::proportional(SMALL_TEXT);
+    painter.text(at + vec2(1.0, 1.0), align, label, font.clone(), Color32::from_black_alpha(200));
+    painter.text(at, align, label, font, colour);
 }
 
-/// Depth below the probe's face along the left edge: a tick each cm, a number each other one. `top`: depth at the upper edge, mm.
+/// A ruler along the left edge with numbered ticks of the depth below the probe's face. `top`: depth at the upper edge, mm.
 fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
     let bottom = top + f64::from(area.height()) * per_point;
     if !(per_point > 0.0 && bottom > top && bottom - top < 1e4) {
         return;
     }
-    // So far apart that numbers have room.
+    // The ticks are far enough apart for their numbers.
     let step = LENGTHS.into_iter().find(|mm| mm / per_point >= 34.0).unwrap_or(200.0);
     let x = area.left() + 6.0;
     let at = |depth: f64| area.top() + ((depth - top) / per_point) as f32;
@@ -99,13 +99,13 @@ fn ruler(painter: &Painter, area: Rect, top: f64, per_point: f64) {
     }
 }
 
-/// A length in the lower right corner.
+/// A scale bar in the lower right corner.
 fn bar(painter: &Painter, area: Rect, per_point: f64) {
     if !(per_point > 0.0 && per_point.is_finite()) {
         return;
     }
-    let room = f64::from(area.width()) * 0.3 * per_point;
-    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= room) else { return };
+    let max_length = f64::from(area.width()) * 0.3 * per_point;
+    let Some(mm) = LENGTHS.into_iter().rev().find(|mm| *mm <= max_length) else { return };
     let width = (mm / per_point) as f32;
     let right = pos2(area.right() - 16.0, area.bottom() - 16.0);
     let left = right - vec2(width, 0.0);
@@ -116,7 +116,7 @@ fn bar(painter: &Painter, area: Rect, per_point: f64) {
     text(painter, left + vec2(width / 2.0, -8.0), Align2::CENTER_BOTTOM, &format!("{mm} mm"), TEXT);
 }
 
-/// The volume's axes as the camera sees them, in the lower left corner.
+/// The axes of the volume in camera view, in the lower left corner.
 fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     const ARM: f64 = 34.0;
     let centre = area.left_bottom() + vec2(58.0, -58.0);
@@ -130,17 +130,17 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     let mut arms: Vec<(f64, Vec2, &str, Color32)> = named
         .iter()
         .map(|(axis, name, colour)| {
-            let seen = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
-            (axis.dot(rays.forward), seen, *name, *colour)
+            let projected = vec2((axis.dot(rays.right) * ARM) as f32, (-axis.dot(rays.up) * ARM) as f32);
+            (axis.dot(rays.forward), projected, *name, *colour)
         })
         .collect();
-    // Those that point away first, and fainter.
+    // Axes that point away are drawn first, and weaker.
     arms.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (away, arm, name, colour) in arms {
         let colour = colour.gamma_multiply((1.0 - 0.45 * away.max(0.0)) as f32);
         painter.line_segment([centre, centre + arm], Stroke::new(3.5, colour));
         painter.circle_filled(centre + arm, 4.0, colour);
-        // Seen from its end an arm has no length, and no room for a name.
+        // An axis along the view is too short for a name.
         if arm.length() > 9.0 {
             let out = arm.normalized() * 11.0;
             text(painter, centre + arm + out, Align2::CENTER_CENTER, &name[..1].to_uppercase(), colour);
@@ -148,11 +148,11 @@ fn axes(painter: &Painter, area: Rect, scene: &Scene) {
     }
 }
 
-/// What the values are shown as, from the lowest to the highest of the window.
+/// A bar of the colours of all values, with the limits of the window.
 fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
     let settings = &scene.settings;
     let window = match settings.mode {
-        // A lit surface has the light's colours, which mean nothing else.
+        // The colours of a lit surface do not stand for values.
         Mode::Surface if settings.layout == Layout::Single => return,
         Mode::Volume | Mode::Mixed => settings.volume.window,
         Mode::Mip | Mode::MinIp | Mode::Mean => settings.projection.window,
@@ -164,7 +164,7 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
         let Some(table) = &table else { return [value; 3] };
         let last = table.len() - 1;
         let [r, g, b, absorption] = table[((value * last as f64).round() as usize).min(last)];
-        // What is never seen is shown faintly: the bar says that it is left out.
+        // Transparent values are shown dark.
         [r, g, b].map(|c| if absorption > 0.0 { c } else { 0.15 * c })
     };
     const STEPS: usize = 64;
@@ -177,7 +177,7 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
         let part = Rect::from_min_max(pos2(area.left(), low - height / STEPS as f32 - 0.5), pos2(area.right(), low));
         painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
     }
-    painter.rect_stroke(area, 0.0, Stroke::new(1.0, FAINT), egui::StrokeKind::Outside);
+    painter.rect_stroke(area, 0.0, Stroke::new(1.0, WEAK_TEXT), egui::StrokeKind::Outside);
     for (value, y, align) in
         [(window[1], area.top(), Align2::RIGHT_TOP), (window[0], area.bottom(), Align2::RIGHT_BOTTOM)]
     {

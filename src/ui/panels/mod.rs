@@ -1,5 +1,5 @@
-//! Panels around and over the picture, laid out by egui: what they show comes in as [`Facts`], what is asked of them goes out as
-//! commands. Their places follow from the size of the window alone, so that the picture's size is known before anything is drawn.
+//! The panels around and over the picture, laid out by egui. They show a [`PanelState`] and return commands. Their positions depend only on
+//! the size of the window, so that the size of the picture is known before anything is drawn.
 
 mod annotations;
 mod controls;
@@ -7,65 +7,66 @@ mod overlays;
 mod state;
 mod theme;
 
-pub use state::{Banner, Facts, Note, place};
+pub use state::picture_area;
+pub(super) use state::{Banner, Note, PanelState};
 
 use super::command::Command;
 use super::input::{Button, Input, Modifiers, Phase};
 use crate::gpu;
-use egui::{Event, Modifiers as Held, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
+use egui::{Event, Modifiers as EguiModifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
 use std::time::Duration;
 
-/// What became of laying them out.
-pub struct Laid {
-    pub panels: gpu::window::Panels,
-    pub commands: Vec<Command>,
-    /// When they look different again without anything happening.
-    pub again: Duration,
+/// The result of a layout.
+pub(super) struct PanelOutput {
+    pub(super) panels: gpu::window::Panels,
+    pub(super) commands: Vec<Command>,
+    /// When the panels need another layout without an event.
+    pub(super) repaint_after: Duration,
 }
 
 /// The panels of one window.
-pub struct Panels {
+pub(super) struct Panels {
     context: egui::Context,
-    hands: Hands,
-    /// Pixels a point.
+    egui_input: EguiInput,
+    /// Pixels per point.
     scale: f32,
 }
 
 impl Panels {
-    /// `scale`: pixels a point; above 1 everything is larger.
-    pub fn new(scale: f32) -> Panels {
+    /// `scale`: pixels per point, limited to 0.5..=4; above 1 everything is larger.
+    pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
-        theme::dress(&context);
-        Panels { context, hands: Hands::default(), scale: scale.clamp(0.5, 4.0) }
+        theme::apply(&context);
+        Panels { context, egui_input: EguiInput::default(), scale: scale.clamp(0.5, 4.0) }
     }
 
-    pub fn scale(&self) -> f32 {
+    pub(super) fn scale(&self) -> f32 {
         self.scale
     }
 
-    /// The device that held their images is gone: everything will be told again.
-    pub fn renew(&mut self) {
+    /// Starts again after the device with the textures was lost: all textures are sent again.
+    pub(super) fn reset(&mut self) {
         *self = Panels::new(self.scale);
     }
 
-    pub fn input(&mut self, input: &Input) {
-        self.hands.input(input, self.scale);
+    pub(super) fn input(&mut self, input: &Input) {
+        self.egui_input.input(input, self.scale);
     }
 
-    /// Whether a press there is theirs: something of them lies over the picture.
-    pub fn covers(&self, at: [f64; 2]) -> bool {
+    /// True if a panel covers this position, pixels: a press there belongs to the panel.
+    pub(super) fn covers(&self, at: [f64; 2]) -> bool {
         let point = pos2(at[0] as f32 / self.scale, at[1] as f32 / self.scale);
         self.context.layer_id_at(point).is_some_and(|layer| layer.order != egui::Order::Background)
     }
 
-    /// Whether they have been told of something that they did not show yet.
-    pub fn is_waiting(&self) -> bool {
-        self.hands.is_waiting()
+    /// True if there is input that no layout has handled yet.
+    pub(super) fn has_pending_input(&self) -> bool {
+        self.egui_input.has_pending_input()
     }
 
-    /// Lays them out on a window of this size, pixels, at a time, s.
-    pub fn lay_out(&mut self, facts: &Facts, size: [u32; 2], time: f64) -> Laid {
-        let (events, modifiers) = self.hands.take();
+    /// Lays out the panels in a window of this size, pixels, at a time in s.
+    pub(super) fn lay_out(&mut self, state: &PanelState, size: [u32; 2], time: f64) -> PanelOutput {
+        let (events, modifiers) = self.egui_input.take();
         let points = vec2(size[0] as f32, size[1] as f32) / self.scale;
         let mut input = egui::RawInput {
             screen_rect: Some(Rect::from_min_size(pos2(0.0, 0.0), points)),
@@ -73,7 +74,7 @@ impl Panels {
             events,
             ..Default::default()
         };
-        // An event of any kind has egui lay out once more.
+        // Any event makes egui lay out twice, so the modifiers are sent only with other events.
         if !input.events.is_empty() {
             input.events.insert(0, Event::ModifiersChanged(modifiers));
         }
@@ -83,44 +84,44 @@ impl Panels {
         let mut commands = Vec::new();
         let output = self.context.run_ui(input, |ui| {
             commands.clear();
-            let ask = &mut |command| commands.push(command);
-            let is_panelled = facts.is_panelled && facts.picture.1 != size;
-            if is_panelled {
-                controls::show_cine_bar(ui, facts, ask);
-                controls::show_modes(ui, facts, ask);
-                controls::show_sliders(ui, facts, ask);
+            let execute = &mut |command| commands.push(command);
+            let shows_panels = state.shows_panels && state.picture.1 != size;
+            if shows_panels {
+                controls::show_cine_bar(ui, state, execute);
+                controls::show_modes(ui, state, execute);
+                controls::show_sliders(ui, state, execute);
             }
-            if facts.is_drawn && facts.is_panelled {
-                annotations::paint(ui, facts, self.scale);
+            if state.has_drawn && state.shows_panels {
+                annotations::paint(ui, state, self.scale);
             }
-            if facts.hud {
-                overlays::show_times(ui, facts, self.scale);
+            if state.shows_times {
+                overlays::show_times(ui, state, self.scale);
             }
-            overlays::show_notes(ui, facts, self.scale);
-            if facts.help {
-                overlays::show_help(ui, facts, ask);
+            overlays::show_notes(ui, state, self.scale);
+            if state.shows_help {
+                overlays::show_help(ui, state, execute);
             }
-            overlays::paint_pointer(ui, facts, self.scale);
+            overlays::paint_pointer(ui, state, self.scale);
         });
-        let again = output.viewport_output.values().map(|v| v.repaint_delay).min().unwrap_or(Duration::MAX);
+        let repaint_after = output.viewport_output.values().map(|v| v.repaint_delay).min().unwrap_or(Duration::MAX);
         let shapes = self.context.tessellate(output.shapes, output.pixels_per_point);
         let panels = gpu::window::Panels { shapes, textures: output.textures_delta, scale: output.pixels_per_point };
-        Laid { panels, commands, again }
+        PanelOutput { panels, commands, repaint_after }
     }
 }
 
-/// Between our inputs and egui's events: places in points, and fingers that press like a pointer.
+/// Converts inputs to egui's events: positions in points, and one finger as the pointer.
 #[derive(Default)]
-struct Hands {
+struct EguiInput {
     events: Vec<Event>,
     pointer: Pos2,
-    held: Held,
-    /// The finger that is taken for the pointer.
+    modifiers: EguiModifiers,
+    /// The finger that acts as the pointer.
     finger: Option<u64>,
 }
 
-impl Hands {
-    /// `scale`: pixels a point.
+impl EguiInput {
+    /// `scale`: pixels per point.
     fn input(&mut self, input: &Input, scale: f32) {
         let at = |[x, y]: [f64; 2]| pos2(x as f32 / scale, y as f32 / scale);
         match *input {
@@ -130,15 +131,15 @@ impl Hands {
                 unit: MouseWheelUnit::Line,
                 delta: vec2(0.0, notches as f32),
                 phase: TouchPhase::Move,
-                modifiers: self.held,
+                modifiers: self.modifiers,
             }),
-            // Keys are the kiosk's own: no panel has a field to type into.
+            // Keys have their own bindings: no panel has a text field.
             Input::Key { .. } => {}
             Input::Modifiers(Modifiers { shift, control, alt }) => {
-                self.held = Held { alt, ctrl: control, shift, mac_cmd: false, command: control };
+                self.modifiers = EguiModifiers { alt, ctrl: control, shift, mac_cmd: false, command: control };
             }
             Input::Touch { finger, phase, at: place } => self.touch(finger, phase, at(place)),
-            Input::Left => {
+            Input::FocusLost => {
                 self.finger = None;
                 self.events.push(Event::PointerGone);
             }
@@ -156,7 +157,7 @@ impl Hands {
             Button::Right => PointerButton::Secondary,
             Button::Middle => PointerButton::Middle,
         };
-        self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.held });
+        self.events.push(Event::PointerButton { pos: self.pointer, button, pressed, modifiers: self.modifiers });
     }
 
     fn touch(&mut self, finger: u64, phase: Phase, at: Pos2) {
@@ -168,9 +169,9 @@ impl Hands {
             }
             _ if self.finger != Some(finger) => {}
             Phase::Down | Phase::Moved => self.moved(at),
-            Phase::Up | Phase::Gone => {
+            Phase::Up | Phase::Cancelled => {
                 self.finger = None;
-                // A finger that is taken for something else presses nothing.
+                // A cancelled touch clicks nothing.
                 if phase == Phase::Up {
                     self.moved(at);
                     self.button(Button::Left, false);
@@ -180,12 +181,12 @@ impl Hands {
         }
     }
 
-    /// Whether egui has not been told of something.
-    fn is_waiting(&self) -> bool {
+    /// True if egui has not received all events.
+    fn has_pending_input(&self) -> bool {
         !self.events.is_empty()
     }
 
-    fn take(&mut self) -> (Vec<Event>, Held) {
-        (std::mem::take(&mut self.events), self.held)
+    fn take(&mut self) -> (Vec<Event>, EguiModifiers) {
+        (std::mem::take(&mut self.events), self.modifiers)
     }
 }

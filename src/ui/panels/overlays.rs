@@ -1,7 +1,9 @@
 //! What is drawn over the picture: banner and notes, times, help, and the pointer where no windowing system draws one.
 
-use super::state::{Facts, rect};
-use super::theme::{ACCENT, BACKGROUND, FAINT, FAULT, GOOD, LARGE, LETTERS, PANEL, SMALL, TEXT, WARNING};
+use super::state::{PanelState, picture_rect};
+use super::theme::{
+    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, SMALL_TEXT, TEXT, TEXT_SIZE, WARNING, WEAK_TEXT,
+};
 use crate::ui::command::Command;
 use crate::ui::keys;
 use egui::{
@@ -9,11 +11,11 @@ use egui::{
     Vec2, pos2, vec2,
 };
 
-pub fn show_notes(ui: &mut Ui, facts: &Facts, scale: f32) {
-    let picture = rect(facts, scale);
-    if let Some(banner) = &facts.banner {
-        // In the middle where there is no picture, above it where there is one.
-        let (align, at) = match facts.is_drawn {
+pub(super) fn show_notes(ui: &mut Ui, state: &PanelState, scale: f32) {
+    let picture = picture_rect(state, scale);
+    if let Some(banner) = &state.banner {
+        // In the centre without a picture, at the top over one.
+        let (align, at) = match state.has_drawn {
             true => (Align2::CENTER_TOP, picture.center_top() + vec2(0.0, 12.0)),
             false => (Align2::CENTER_CENTER, picture.center()),
         };
@@ -21,17 +23,17 @@ pub fn show_notes(ui: &mut Ui, facts: &Facts, scale: f32) {
         Area::new(Id::new("banner")).order(Order::Middle).pivot(align).fixed_pos(at).interactable(false).show(
             ui.ctx(),
             |ui| {
-                boxed(colour).show(ui, |ui| {
+                message_frame(colour).show(ui, |ui| {
                     ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
-                    ui.label(RichText::new(&banner.title).size(LARGE).color(colour));
+                    ui.label(RichText::new(&banner.title).size(LARGE_TEXT).color(colour));
                     if !banner.text.is_empty() {
-                        ui.label(RichText::new(&banner.text).size(LETTERS));
+                        ui.label(RichText::new(&banner.text).size(TEXT_SIZE));
                     }
                 });
             },
         );
     }
-    if facts.notes.is_empty() {
+    if state.notes.is_empty() {
         return;
     }
     let at = picture.center_bottom() - vec2(0.0, 14.0);
@@ -41,16 +43,16 @@ pub fn show_notes(ui: &mut Ui, facts: &Facts, scale: f32) {
         .fixed_pos(at)
         .interactable(false)
         .show(ui.ctx(), |ui| {
-            for note in facts.notes {
-                boxed(if note.is_fault { FAULT } else { ACCENT }).show(ui, |ui| {
+            for note in state.notes {
+                message_frame(if note.is_fault { FAULT } else { ACCENT }).show(ui, |ui| {
                     ui.set_max_width((picture.width() - 60.0).clamp(120.0, 760.0));
-                    ui.label(RichText::new(&note.text).size(LETTERS));
+                    ui.label(RichText::new(&note.text).size(TEXT_SIZE));
                 });
             }
         });
 }
 
-fn boxed(edge: Color32) -> Frame {
+fn message_frame(edge: Color32) -> Frame {
     Frame::new()
         .fill(BACKGROUND.gamma_multiply(0.92))
         .inner_margin(Margin::symmetric(16, 10))
@@ -59,110 +61,118 @@ fn boxed(edge: Color32) -> Frame {
 }
 
 const WIDTH: f32 = 316.0;
-/// Passes that are listed; the rest is one line.
-const MOST: usize = 9;
+/// Largest number of passes that are listed; the others share one line.
+const MAX_PASSES: usize = 9;
 
-pub fn show_times(ui: &mut Ui, facts: &Facts, scale: f32) {
-    let at = rect(facts, scale).left_top() + vec2(12.0, 12.0);
+pub(super) fn show_times(ui: &mut Ui, state: &PanelState, scale: f32) {
+    let at = picture_rect(state, scale).left_top() + vec2(12.0, 12.0);
     Area::new(Id::new("times")).order(Order::Middle).fixed_pos(at).interactable(false).show(ui.ctx(), |ui| {
         let frame = Frame::new().fill(BACKGROUND.gamma_multiply(0.82)).inner_margin(Margin::same(12)).corner_radius(8);
         frame.show(ui, |ui| {
             ui.set_width(WIDTH);
             ui.spacing_mut().item_spacing.y = 3.0;
-            figures(ui, facts);
+            figures(ui, state);
             ui.add_space(4.0);
-            bars(ui, facts);
+            bars(ui, state);
         });
     });
 }
 
-fn figures(ui: &mut Ui, facts: &Facts) {
-    let times = facts.times;
+fn figures(ui: &mut Ui, state: &PanelState) {
+    let times = state.times;
     let ms = |value: Option<f64>| value.map_or("-".into(), |ms| format!("{ms:.1} ms"));
-    let held = match (facts.budget, times.pictures.percentile(0.95)) {
+    let colour_of_time = match (state.budget, times.pictures.percentile(0.95)) {
         (Some(budget), Some(p95)) if p95 > budget.as_secs_f64() * 1e3 => WARNING,
         (Some(_), Some(_)) => GOOD,
         _ => TEXT,
     };
-    ui.label(RichText::new(format!("picture {}", ms(times.pictures.newest()))).size(LARGE).color(held));
-    let budget = facts.budget.map_or("no budget".into(), |b| format!("budget {:.0} ms", b.as_secs_f64() * 1e3));
+    ui.label(RichText::new(format!("picture {}", ms(times.pictures.newest()))).size(LARGE_TEXT).color(colour_of_time));
+    let budget = state.budget.map_or("no budget".into(), |b| format!("budget {:.0} ms", b.as_secs_f64() * 1e3));
     small(
         ui,
         format!("p50 {}  p95 {}  {budget}", ms(times.pictures.percentile(0.5)), ms(times.pictures.percentile(0.95))),
-        FAINT,
+        WEAK_TEXT,
     );
-    small(ui, facts.quality.to_string(), ACCENT);
+    small(ui, state.quality.to_string(), ACCENT);
     small(
         ui,
         format!("{:.2} volumes/s   {:.0} frames/s   {:.1} pictures/s", times.volumes, times.frames, times.shown),
         TEXT,
     );
-    if let Some(floor) = times.floor.filter(|f| *f > 0.0) {
-        let share = 100.0 * times.volumes * floor;
-        small(ui, format!("sound: {:.0} ms a volume; {share:.0} % of that rate", floor * 1e3), FAINT);
+    if let Some(acquisition_time) = times.acquisition_time.filter(|f| *f > 0.0) {
+        let share = 100.0 * times.volumes * acquisition_time;
+        small(
+            ui,
+            format!("acquisition: {:.0} ms a volume; {share:.0} % of that rate", acquisition_time * 1e3),
+            WEAK_TEXT,
+        );
     }
     small(ui, format!("frame to picture p95 {}", ms(times.latency)), TEXT);
     small(
         ui,
-        format!("hand to picture p50 {}  p95 {}", ms(times.hands.percentile(0.5)), ms(times.hands.percentile(0.95))),
+        format!(
+            "input to picture p50 {}  p95 {}",
+            ms(times.input_latency.percentile(0.5)),
+            ms(times.input_latency.percentile(0.95))
+        ),
         TEXT,
     );
-    let colour = if times.dropped + times.lost > 0 { WARNING } else { FAINT };
+    let colour = if times.dropped + times.lost > 0 { WARNING } else { WEAK_TEXT };
     small(ui, format!("{} volumes dropped, {} frames lost", times.dropped, times.lost), colour);
 }
 
-fn bars(ui: &mut Ui, facts: &Facts) {
+fn bars(ui: &mut Ui, state: &PanelState) {
     let mut passes: Vec<(&str, f64)> =
-        facts.times.passes.iter().map(|(name, mean, runs)| (*name, mean * *runs as f64)).collect();
+        state.times.passes.iter().map(|(name, mean, runs)| (*name, mean * *runs as f64)).collect();
     let all: f64 = passes.iter().map(|p| p.1).sum();
     if all <= 0.0 {
-        small(ui, "no times: the device has no time stamps, or nothing ran".into(), FAINT);
+        small(ui, "no times: the device has no time stamps, or no pass ran".into(), WEAK_TEXT);
         return;
     }
     passes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let rest: f64 = passes.iter().skip(MOST).map(|p| p.1).sum();
-    let more = passes.len().saturating_sub(MOST);
-    passes.truncate(MOST);
+    let rest: f64 = passes.iter().skip(MAX_PASSES).map(|p| p.1).sum();
+    let more = passes.len().saturating_sub(MAX_PASSES);
+    passes.truncate(MAX_PASSES);
     for (name, time) in &passes {
-        let mean = facts.times.passes.iter().find(|(n, ..)| n == name).map_or(0.0, |p| p.1);
+        let mean = state.times.passes.iter().find(|(n, ..)| n == name).map_or(0.0, |p| p.1);
         bar(ui, name, time / all, format!("{mean:.2}"));
     }
     if more > 0 {
         bar(ui, &format!("{more} more"), rest / all, String::new());
     }
-    small(ui, "ms of a run; bars: share of the device's time".into(), FAINT);
+    small(ui, "ms per run; bars: share of the device time".into(), WEAK_TEXT);
 }
 
 fn bar(ui: &mut Ui, name: &str, share: f64, figure: String) {
-    let (area, _) = ui.allocate_exact_size(vec2(WIDTH, SMALL + 5.0), egui::Sense::hover());
+    let (area, _) = ui.allocate_exact_size(vec2(WIDTH, SMALL_TEXT + 5.0), egui::Sense::hover());
     let filled = Rect::from_min_size(area.min, vec2((area.width() * share as f32).max(1.0), area.height()));
     let painter = ui.painter();
     painter.rect_filled(area, 2.0, Color32::from_white_alpha(8));
     painter.rect_filled(filled, 2.0, ACCENT.gamma_multiply(0.4));
-    let font = egui::FontId::proportional(SMALL);
+    let font = egui::FontId::proportional(SMALL_TEXT);
     let middle = area.center().y;
     painter.text(pos2(area.left() + 6.0, middle), egui::Align2::LEFT_CENTER, name, font.clone(), TEXT);
     painter.text(pos2(area.right() - 6.0, middle), egui::Align2::RIGHT_CENTER, figure, font, TEXT);
 }
 
 fn small(ui: &mut Ui, text: String, colour: Color32) {
-    ui.label(RichText::new(text).size(SMALL).color(colour));
+    ui.label(RichText::new(text).size(SMALL_TEXT).color(colour));
 }
 
-/// What hands do on the picture itself.
-const HANDS: [(&str, &str); 9] = [
-    ("drag", "what the tool says: turn, light, region, clip, planes"),
+/// Gestures on the picture, for the help.
+const GESTURES: [(&str, &str); 9] = [
+    ("drag", "use the tool: turn, light, region, clip, planes"),
     ("Shift + drag, middle drag", "move the picture"),
     ("Ctrl + drag", "move the light"),
-    ("wheel", "closer, further; over a plane: step it"),
-    ("two fingers", "pinch closer, twist, move"),
-    ("double click on a tile", "that tile alone, and back"),
-    ("Region, then drag", "the face of the box that is nearest"),
-    ("Clip, then drag up", "cut away what is nearer to you"),
-    ("Planes, then click", "where the three planes meet"),
+    ("wheel", "zoom; over a plane: step it"),
+    ("two fingers", "pinch to zoom, twist to roll, move to pan"),
+    ("double click on a tile", "show that tile alone, and back"),
+    ("Region, then drag", "move the nearest face of the box"),
+    ("Clip, then drag up", "cut away what is nearer to the viewer"),
+    ("Planes, then click", "move the point where the three planes cross"),
 ];
 
-pub fn show_help(ui: &mut Ui, facts: &Facts, ask: &mut dyn FnMut(Command)) {
+pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut(Command)) {
     let screen = ui.ctx().content_rect();
     let mut is_closed = false;
     Area::new(Id::new("help")).order(Order::Foreground).anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0)).show(
@@ -172,12 +182,12 @@ pub fn show_help(ui: &mut Ui, facts: &Facts, ask: &mut dyn FnMut(Command)) {
                 .fill(PANEL.gamma_multiply(0.97))
                 .inner_margin(Margin::same(18))
                 .corner_radius(10)
-                .stroke(Stroke::new(1.0, FAINT));
+                .stroke(Stroke::new(1.0, WEAK_TEXT));
             frame.show(ui, |ui| {
                 let width = (screen.width() - 80.0).clamp(100.0, 1080.0);
                 ui.set_width(width);
                 ui.horizontal(|ui| {
-                    ui.heading("Keys and hands");
+                    ui.heading("Keys and gestures");
                     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                         is_closed = ui.button("Close").clicked();
                     });
@@ -187,8 +197,8 @@ pub fn show_help(ui: &mut Ui, facts: &Facts, ask: &mut dyn FnMut(Command)) {
                     let keys: Vec<(String, &str)> = keys::help().collect();
                     let half = keys.len().div_ceil(2);
                     let rows = |ui: &mut Ui, rows: &[(String, &str)]| {
-                        for (key, words) in rows {
-                            row(ui, key, words);
+                        for (key, label) in rows {
+                            row(ui, key, label);
                         }
                     };
                     match width > 760.0 {
@@ -198,32 +208,32 @@ pub fn show_help(ui: &mut Ui, facts: &Facts, ask: &mut dyn FnMut(Command)) {
                         }),
                         false => rows(ui, &keys),
                     }
-                    if !facts.exit_key.is_empty() {
-                        row(ui, facts.exit_key, "leave");
+                    if !state.exit_key.is_empty() {
+                        row(ui, state.exit_key, "quit");
                     }
                     ui.separator();
-                    for (hand, words) in HANDS {
-                        row(ui, hand, words);
+                    for (gesture, label) in GESTURES {
+                        row(ui, gesture, label);
                     }
                     ui.add_space(8.0);
-                    ui.label(RichText::new("Echolume is not a medical device.").size(SMALL).color(FAINT));
+                    ui.label(RichText::new("Echolume is not a medical device.").size(SMALL_TEXT).color(WEAK_TEXT));
                 });
             });
         },
     );
     if is_closed {
-        ask(Command::Help);
+        execute(Command::ToggleHelp);
     }
 }
 
-fn row(ui: &mut Ui, key: &str, words: &str) {
+fn row(ui: &mut Ui, key: &str, label: &str) {
     ui.horizontal(|ui| {
-        ui.add_sized([150.0, LETTERS], egui::Label::new(RichText::new(key).color(ACCENT).size(LETTERS - 2.0)));
-        ui.label(RichText::new(words).size(LETTERS - 2.0));
+        ui.add_sized([150.0, TEXT_SIZE], egui::Label::new(RichText::new(key).color(ACCENT).size(TEXT_SIZE - 2.0)));
+        ui.label(RichText::new(label).size(TEXT_SIZE - 2.0));
     });
 }
 
-/// Its corners from the tip on, points: a head, and a tail between its two halves.
+/// The corners of the pointer relative to its tip, points: the head, and the tail between its two halves.
 const CORNERS: [Vec2; 7] = [
     vec2(0.0, 0.0),
     vec2(0.0, 24.0),
@@ -233,20 +243,20 @@ const CORNERS: [Vec2; 7] = [
     vec2(9.4, 17.4),
     vec2(17.0, 17.4),
 ];
-/// The triangles that fill it: it is not convex.
+/// The triangles that fill the pointer: it is not convex.
 const TRIANGLES: [[u32; 3]; 5] = [[0, 1, 2], [0, 2, 5], [0, 5, 6], [2, 3, 4], [2, 4, 5]];
 
-pub fn paint_pointer(ui: &Ui, facts: &Facts, scale: f32) {
-    let Some([x, y]) = facts.pointer else { return };
+pub(super) fn paint_pointer(ui: &Ui, state: &PanelState, scale: f32) {
+    let Some([x, y]) = state.pointer else { return };
     let tip = pos2(x as f32 / scale, y as f32 / scale);
-    // Over everything, and no layer that could be pressed.
+    // On top of everything, in a layer that receives no clicks.
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Debug, Id::new("pointer")));
     let corners = CORNERS.map(|corner| tip + corner);
     let mut mesh = Mesh::default();
     corners.iter().for_each(|corner| mesh.colored_vertex(*corner, Color32::WHITE));
     TRIANGLES.iter().for_each(|[a, b, c]| mesh.add_triangle(*a, *b, *c));
     painter.add(mesh);
-    // Dark round bright: to be seen on any echo.
+    // A dark outline around a bright arrow is visible on any picture.
     painter.add(Shape::closed_line(corners.to_vec(), Stroke::new(1.5, Color32::BLACK)));
 }
 
@@ -255,14 +265,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_triangles_fill_what_the_corners_surround() {
-        let twice = |corners: &[Vec2]| -> f32 {
+    fn the_triangles_fill_the_outline() {
+        let doubled_area = |corners: &[Vec2]| -> f32 {
             let next = corners.iter().cycle().skip(1);
             corners.iter().zip(next).map(|(a, b)| a.x * b.y - a.y * b.x).sum()
         };
-        let filled = TRIANGLES.map(|corners| twice(&corners.map(|n| CORNERS[n as usize])));
-        // All of them turn the same way round: none covers another.
+        let filled = TRIANGLES.map(|corners| doubled_area(&corners.map(|n| CORNERS[n as usize])));
+        // All have the same orientation, so none covers another.
         assert!(filled.iter().all(|area| *area < 0.0), "{filled:?}");
-        assert!((filled.iter().sum::<f32>() - twice(&CORNERS)).abs() < 1e-3);
+        assert!((filled.iter().sum::<f32>() - doubled_area(&CORNERS)).abs() < 1e-3);
     }
 }

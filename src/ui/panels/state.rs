@@ -6,68 +6,68 @@ use crate::ui::times::Times;
 use egui::{Rect, pos2, vec2};
 use std::time::Duration;
 
-/// Points: of the buttons on the left, the sliders on the right, the cine loop below.
-pub const RAIL: f32 = 208.0;
-pub const COLUMN: f32 = 330.0;
-pub const BAR: f32 = 76.0;
-/// Below this the window shows the picture alone, whatever is asked for.
-const LEAST: [f32; 2] = [760.0, 420.0];
+/// Sizes of the panels, points: buttons on the left, sliders on the right, cine loop below.
+pub(in crate::ui) const MODES_WIDTH: f32 = 208.0;
+pub(in crate::ui) const SLIDERS_WIDTH: f32 = 330.0;
+pub(in crate::ui) const CINE_BAR_HEIGHT: f32 = 76.0;
+/// A smaller window shows the picture without panels, points.
+const MIN_WINDOW: [f32; 2] = [760.0, 420.0];
 
-/// What panels show.
-pub struct Facts<'a> {
-    pub controls: &'a Controls,
-    pub scene: Option<&'a Scene>,
-    pub times: &'a Times,
+/// What the panels show.
+pub(in crate::ui) struct PanelState<'a> {
+    pub(in crate::ui) controls: &'a Controls,
+    pub(in crate::ui) scene: Option<&'a Scene>,
+    pub(in crate::ui) times: &'a Times,
     /// Upper left corner and size of the picture, pixels.
-    pub picture: ([u32; 2], [u32; 2]),
-    pub is_panelled: bool,
-    pub help: bool,
-    pub hud: bool,
-    pub is_frozen: bool,
-    pub is_playing: bool,
-    /// Volumes in the cine loop, and the place of the one that is shown.
-    pub cine: (usize, Option<usize>),
-    /// A picture has been drawn.
-    pub is_drawn: bool,
-    /// The dials that the view stands on, and its budget.
-    pub quality: &'a str,
-    pub budget: Option<Duration>,
-    pub banner: Option<Banner>,
-    pub notes: &'a [Note],
-    /// Keys that are said in the help besides those of the table.
-    pub exit_key: &'a str,
-    /// Where a pointer is drawn, pixels of the window: none where a windowing system has its own.
-    pub pointer: Option<[f64; 2]>,
+    pub(in crate::ui) picture: ([u32; 2], [u32; 2]),
+    pub(in crate::ui) shows_panels: bool,
+    pub(in crate::ui) shows_help: bool,
+    pub(in crate::ui) shows_times: bool,
+    pub(in crate::ui) is_frozen: bool,
+    pub(in crate::ui) is_playing: bool,
+    /// Number of volumes in the cine loop, and the index of the one that is shown.
+    pub(in crate::ui) cine: (usize, Option<usize>),
+    /// True after the first picture.
+    pub(in crate::ui) has_drawn: bool,
+    /// The current rung of the quality ladder, and the frame budget.
+    pub(in crate::ui) quality: &'a str,
+    pub(in crate::ui) budget: Option<Duration>,
+    pub(in crate::ui) banner: Option<Banner>,
+    pub(in crate::ui) notes: &'a [Note],
+    /// The keys that end the program, for the help.
+    pub(in crate::ui) exit_key: &'a str,
+    /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
+    pub(in crate::ui) pointer: Option<[f64; 2]>,
 }
 
-/// Something that lasts.
+/// A message that lasts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Banner {
-    pub title: String,
-    pub text: String,
-    pub is_fault: bool,
+pub(in crate::ui) struct Banner {
+    pub(in crate::ui) title: String,
+    pub(in crate::ui) text: String,
+    pub(in crate::ui) is_fault: bool,
 }
 
-/// Something that happened.
+/// A message about an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Note {
-    pub text: String,
-    pub is_fault: bool,
+pub(in crate::ui) struct Note {
+    pub(in crate::ui) text: String,
+    pub(in crate::ui) is_fault: bool,
 }
 
-/// Where the picture lies on a window of this size: its upper left corner and its size, pixels.
-pub fn place(size: [u32; 2], scale: f32, is_panelled: bool) -> ([u32; 2], [u32; 2]) {
+/// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
+pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
     let points = size.map(|n| n as f32 / scale);
-    if !is_panelled || points[0] < LEAST[0] || points[1] < LEAST[1] {
+    if !shows_panels || points[0] < MIN_WINDOW[0] || points[1] < MIN_WINDOW[1] {
         return ([0, 0], size.map(|n| n.max(1)));
     }
-    let [left, right, below] = [RAIL, COLUMN, BAR].map(|edge| (edge * scale).round() as u32);
+    let [left, right, below] = [MODES_WIDTH, SLIDERS_WIDTH, CINE_BAR_HEIGHT].map(|edge| (edge * scale).round() as u32);
     ([left, 0], [(size[0] - left - right).max(1), (size[1] - below).max(1)])
 }
 
-/// The picture's place in points.
-pub fn rect(facts: &Facts, scale: f32) -> Rect {
-    let ([x, y], [w, h]) = facts.picture;
+/// The area of the picture in points.
+pub(in crate::ui) fn picture_rect(state: &PanelState, scale: f32) -> Rect {
+    let ([x, y], [w, h]) = state.picture;
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))
 }

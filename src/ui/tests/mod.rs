@@ -1,4 +1,4 @@
-//! Hands, keys and settings together, without a window.
+//! Gestures, keys and settings together, without a window; and known answers for what commands change.
 
 mod gestures;
 mod sequences;
@@ -7,7 +7,7 @@ use super::command::{Command, Face, Tool};
 use super::controls::{Change, Controls};
 use super::gestures::Gestures;
 use super::input::{Button, Input, Modifiers};
-use super::picking::Picture;
+use super::picking::Viewport;
 use super::sliders::{GAIN, PLANES_ZOOM, SLIDERS, THRESHOLD};
 use crate::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use crate::scene::load::{Layers, PRESETS};
@@ -55,7 +55,7 @@ fn geometries() -> Vec<Geometry> {
     ]
 }
 
-/// Settings by the name of a preset and lines of TOML over it.
+/// Settings of a preset, with lines of TOML over it.
 fn settings(preset: &str, toml: &str) -> Settings {
     let mut layers = Layers::default();
     if !preset.is_empty() {
@@ -73,24 +73,24 @@ fn scene(geometry: &Geometry, settings: &Settings) -> Scene {
     Scene::new(geometry.clone(), BYTES, settings.clone()).unwrap()
 }
 
-/// A window that shows a picture at some place in it, and a hand.
-struct Desk {
+/// A window with a picture in it, and gestures on that.
+struct TestWindow {
     geometry: Geometry,
     controls: Controls,
-    hand: Gestures,
+    gestures: Gestures,
     corner: [f64; 2],
-    /// Pixels of the window for one of the picture.
+    /// Pixels of the window per pixel of the picture.
     enlarged: f64,
     held: Modifiers,
     now: Duration,
 }
 
-impl Desk {
-    fn new(toml: &str) -> Desk {
-        Desk {
+impl TestWindow {
+    fn new(toml: &str) -> TestWindow {
+        TestWindow {
             geometry: Geometry::Sweep(wobbler()),
             controls: Controls::new(settings("", toml)),
-            hand: Gestures::default(),
+            gestures: Gestures::default(),
             corner: [100.0, 30.0],
             enlarged: 2.0,
             held: Modifiers::default(),
@@ -102,7 +102,7 @@ impl Desk {
         scene(&self.geometry, self.controls.settings())
     }
 
-    /// A place of the picture in the window.
+    /// Converts a position on the picture to the window.
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.corner[0] + x * self.enlarged, self.corner[1] + y * self.enlarged]
     }
@@ -111,12 +111,12 @@ impl Desk {
         self.controls.apply(&Command::Tool(tool), None);
     }
 
-    /// Does it and what comes of it.
+    /// Handles an input and applies its commands.
     fn input(&mut self, input: Input) -> Vec<Command> {
         let scene = self.scene();
         let size = scene.picture_size().map(|n| f64::from(n) * self.enlarged);
-        let on = Picture { corner: self.corner, size, scene: Some(&scene), taken: false, now: self.now };
-        let commands = self.hand.input(&input, &on, self.controls.tool(), self.held);
+        let on = Viewport { corner: self.corner, size, scene: Some(&scene), is_covered: false, now: self.now };
+        let commands = self.gestures.input(&input, &on, self.controls.tool(), self.held);
         for command in &commands {
             self.controls.apply(command, Some(&scene));
         }
@@ -124,7 +124,7 @@ impl Desk {
         commands
     }
 
-    /// From one place of the picture to another, in steps; presses, moves and lets go.
+    /// Drags from one position on the picture to another, in steps.
     fn drag(&mut self, button: Button, from: [f64; 2], to: [f64; 2]) {
         self.input(Input::Moved(self.at(from)));
         self.input(Input::Button { button, pressed: true });
@@ -143,13 +143,13 @@ impl Desk {
     }
 }
 
-fn ask(desk: &mut Desk, command: Command) -> Change {
-    let scene = desk.scene();
-    desk.controls.apply(&command, Some(&scene))
+fn apply(window: &mut TestWindow, command: Command) -> Change {
+    let scene = window.scene();
+    window.controls.apply(&command, Some(&scene))
 }
 
 #[test]
-fn names_of_sliders_are_where_keys_look_for_them_and_none_is_twice() {
+fn sliders_have_unique_names_and_the_indices_that_keys_use() {
     assert_eq!([GAIN, THRESHOLD, PLANES_ZOOM].map(|n| SLIDERS[n].name), ["Gain", "Threshold", "Planes zoom"]);
     for (i, slider) in SLIDERS.iter().enumerate() {
         assert!(SLIDERS[..i].iter().all(|other| other.name != slider.name), "{}", slider.name);
@@ -158,21 +158,21 @@ fn names_of_sliders_are_where_keys_look_for_them_and_none_is_twice() {
 }
 
 #[test]
-fn a_slider_shows_what_it_was_set_to() {
+fn a_slider_shows_the_value_that_was_set() {
     for mode in ["surface", "volume", "mixed", "mip", "plane", "tomography", "cube"] {
         for preset in ["phantom", "thesis", "bmode"] {
-            let desk = settings(preset, &format!("mode='{mode}'"));
-            for slider in SLIDERS.iter().filter(|s| s.applies(&desk)) {
+            let window = settings(preset, &format!("mode='{mode}'"));
+            for slider in SLIDERS.iter().filter(|s| s.applies(&window)) {
                 for share in [0.3, 0.8] {
-                    let mut set = desk.clone();
+                    let mut set = window.clone();
                     let value = slider.range[0] + share * (slider.range[1] - slider.range[0]);
                     slider.set(&mut set, value);
-                    // Windows keep their order, and some values are whole.
+                    // Windows keep their order, and some values are integers.
                     let is_window = slider.name.contains("indow");
                     assert!(is_window || (slider.get(&set) - value).abs() <= 1.0, "{} {mode} {value}", slider.name);
-                    let mut same = desk.clone();
+                    let mut same = window.clone();
                     slider.set(&mut same, f64::NAN);
-                    assert_eq!(same, desk, "{}", slider.name);
+                    assert_eq!(same, window, "{}", slider.name);
                 }
             }
         }
@@ -180,7 +180,7 @@ fn a_slider_shows_what_it_was_set_to() {
 }
 
 #[test]
-fn no_slider_is_dead_within_its_range_in_a_volume() {
+fn every_value_in_the_range_of_a_slider_can_be_set() {
     use Mode::*;
     let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube];
     for (geometry, mode) in geometries().iter().flat_map(|g| modes.map(|mode| (g, mode))) {
@@ -190,17 +190,17 @@ fn no_slider_is_dead_within_its_range_in_a_volume() {
             let [low, high] = slider.range_in(&shown);
             for value in [low, low + 0.37 * (high - low), high] {
                 let mut controls = Controls::new(start.clone());
-                controls.apply(&Command::Slide(n, value), Some(&shown));
-                let mut asked = start.clone();
-                slider.set(&mut asked, value);
-                assert_eq!(controls.settings(), &asked, "{} at {value} {mode:?}: {:?}", slider.name, shown.geometry);
+                controls.apply(&Command::SetSlider(n, value), Some(&shown));
+                let mut expected = start.clone();
+                slider.set(&mut expected, value);
+                assert_eq!(controls.settings(), &expected, "{} at {value} {mode:?}: {:?}", slider.name, shown.geometry);
             }
         }
     }
 }
 
 #[test]
-fn threshold_window_and_start_depth_are_those_of_the_mode_that_is_shown() {
+fn threshold_window_and_start_depth_belong_to_the_current_mode() {
     let named = |name: &str| SLIDERS.iter().find(|s| s.name == name).unwrap();
     let mut s = settings("", "mode='mixed'");
     named("Threshold").set(&mut s, 0.4);
@@ -223,107 +223,108 @@ fn threshold_window_and_start_depth_are_those_of_the_mode_that_is_shown() {
 }
 
 #[test]
-fn planes_and_four_pictures_lead_to_one_another() {
-    let mut desk = Desk::new("mode='volume'");
-    let shows = |desk: &Desk| (desk.controls.settings().mode, desk.controls.settings().layout);
-    ask(&mut desk, Command::Layout(Layout::Four));
-    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
-    ask(&mut desk, Command::Plane(PlaneName::C));
-    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
-    ask(&mut desk, Command::Mode(Mode::Tomography));
-    assert_eq!(shows(&desk), (Mode::Tomography, Layout::Single));
-    ask(&mut desk, Command::Layout(Layout::Four));
-    assert_eq!(shows(&desk), (Mode::Volume, Layout::Four));
-    ask(&mut desk, Command::Layout(Layout::Single));
-    ask(&mut desk, Command::Plane(PlaneName::B));
-    assert_eq!(shows(&desk), (Mode::Plane, Layout::Single));
+fn planes_and_the_4_up_layout_lead_to_each_other() {
+    let mut window = TestWindow::new("mode='volume'");
+    let shows = |window: &TestWindow| (window.controls.settings().mode, window.controls.settings().layout);
+    apply(&mut window, Command::Layout(Layout::Four));
+    assert_eq!(shows(&window), (Mode::Volume, Layout::Four));
+    apply(&mut window, Command::Plane(PlaneName::C));
+    assert_eq!(shows(&window), (Mode::Volume, Layout::Four));
+    apply(&mut window, Command::Mode(Mode::Tomography));
+    assert_eq!(shows(&window), (Mode::Tomography, Layout::Single));
+    apply(&mut window, Command::Layout(Layout::Four));
+    assert_eq!(shows(&window), (Mode::Volume, Layout::Four));
+    apply(&mut window, Command::Layout(Layout::Single));
+    apply(&mut window, Command::Plane(PlaneName::B));
+    assert_eq!(shows(&window), (Mode::Plane, Layout::Single));
 }
 
 #[test]
-fn a_key_that_shows_a_mode_is_not_dead_for_what_the_mode_alone_asks() {
-    let mut desk = Desk::new("projection.start_depth=500\ncube.inset.near=900\nplanes.columns=64\nplanes.rows=64");
+fn values_of_a_mode_that_do_not_fit_do_not_block_its_key() {
+    let mut window =
+        TestWindow::new("projection.start_depth=500\ncube.inset.near=900\nplanes.columns=64\nplanes.rows=64");
     for mode in [Mode::Mip, Mode::Cube, Mode::Tomography] {
-        assert_eq!(ask(&mut desk, Command::Mode(mode)), Change::Settings);
-        assert_eq!(desk.scene().settings.mode, mode);
+        assert_eq!(apply(&mut window, Command::Mode(mode)), Change::Settings);
+        assert_eq!(window.scene().settings.mode, mode);
     }
 }
 
 #[test]
-fn the_region_is_never_thin_nor_beyond_the_echoes() {
-    let mut desk = Desk::new("surface.start_depth=30");
-    let (low, high) = crate::scene::insonified_box(&desk.geometry);
+fn the_region_is_never_too_thin_nor_outside_of_the_insonified_box() {
+    let mut window = TestWindow::new("surface.start_depth=30");
+    let (low, high) = crate::scene::insonified_box(&window.geometry);
     for axis in 0..3 {
         for is_high in [true, false] {
-            ask(&mut desk, Command::Face(Face { axis, high: is_high }, 1e4));
+            apply(&mut window, Command::MoveFace(Face { axis, high: is_high }, 1e4));
         }
     }
-    assert!((desk.scene().low - low).length() < 1e-9 && (desk.scene().high - high).length() < 1e-9);
+    assert!((window.scene().low - low).length() < 1e-9 && (window.scene().high - high).length() < 1e-9);
     for axis in 0..3 {
-        ask(&mut desk, Command::Face(Face { axis, high: true }, -1e4));
+        apply(&mut window, Command::MoveFace(Face { axis, high: true }, -1e4));
     }
-    let scene = desk.scene();
+    let scene = window.scene();
     let left = scene.high - scene.low.with_y(scene.surface_view().low.y);
     assert!((left - DVec3::splat(2.0)).length() < 1e-9, "{left}");
 }
 
 #[test]
-fn the_viewers_plane_lies_across_the_view_and_is_one() {
-    let mut desk = Desk::new("clip=[{ at = [0, 0, 0], normal = [0, -1, 0] }]");
-    ask(&mut desk, Command::Clip(5.0));
-    ask(&mut desk, Command::Clip(7.0));
-    let clips = desk.controls.settings().clip.clone();
+fn there_is_one_viewer_clip_plane_and_it_faces_the_viewer() {
+    let mut window = TestWindow::new("clip=[{ at = [0, 0, 0], normal = [0, -1, 0] }]");
+    apply(&mut window, Command::MoveClip(5.0));
+    apply(&mut window, Command::MoveClip(7.0));
+    let clips = window.controls.settings().clip.clone();
     assert_eq!(clips.len(), 2);
     assert_eq!(DVec3::from(clips[1].normal), -DVec3::Y);
-    let near = desk.scene().low.y - 40.0;
+    let near = window.scene().low.y - 40.0;
     assert!((clips[1].at[1] - near - 12.0).abs() < 1e-9);
-    ask(&mut desk, Command::Turn([60.0, 10.0]));
-    ask(&mut desk, Command::Clip(0.5));
-    let turned = desk.controls.settings().clip.clone();
+    apply(&mut window, Command::Rotate([60.0, 10.0]));
+    apply(&mut window, Command::MoveClip(0.5));
+    let turned = window.controls.settings().clip.clone();
     let moved = DVec3::from(turned[1].at) - DVec3::from(clips[1].at);
-    assert!(turned.len() == 2 && (moved - desk.scene().rays.forward * 0.5).length() < 1e-9, "{moved}");
-    ask(&mut desk, Command::Clip(-1e5));
-    assert_eq!(desk.controls.settings().clip, clips[..1]);
-    let mut full = Desk::new(&format!("clip=[{}]", ["{ at = [0, 0, 0], normal = [0, -1, 0] }"; 4].join(", ")));
-    assert_eq!(ask(&mut full, Command::Clip(5.0)), Change::Nothing);
+    assert!(turned.len() == 2 && (moved - window.scene().rays.forward * 0.5).length() < 1e-9, "{moved}");
+    apply(&mut window, Command::MoveClip(-1e5));
+    assert_eq!(window.controls.settings().clip, clips[..1]);
+    let mut full = TestWindow::new(&format!("clip=[{}]", ["{ at = [0, 0, 0], normal = [0, -1, 0] }"; 4].join(", ")));
+    assert_eq!(apply(&mut full, Command::MoveClip(5.0)), Change::Nothing);
 }
 
 #[test]
-fn the_light_follows_the_hand_and_stays_on_the_viewers_side() {
+fn the_light_follows_the_drag_and_stays_on_the_viewers_side() {
     for toml in ["", "light.position=[0, 30, 40]"] {
-        let mut desk = Desk::new(toml);
-        let place = |desk: &Desk| {
-            let light = &desk.controls.settings().light;
+        let mut window = TestWindow::new(toml);
+        let place = |window: &TestWindow| {
+            let light = &window.controls.settings().light;
             light.position.unwrap_or(light.direction).normalize()
         };
-        let before = place(&desk);
-        ask(&mut desk, Command::Light([0.1, -0.05]));
-        assert!((place(&desk) - before).truncate().distance(glam::DVec2::new(0.2, 0.1)) < 1e-9);
-        ask(&mut desk, Command::Light([-40.0, 90.0]));
-        assert!(place(&desk).z > 0.1 && place(&desk).y < 0.0);
-        let near = desk.controls.settings().light.position;
+        let before = place(&window);
+        apply(&mut window, Command::MoveLight([0.1, -0.05]));
+        assert!((place(&window) - before).truncate().distance(glam::DVec2::new(0.2, 0.1)) < 1e-9);
+        apply(&mut window, Command::MoveLight([-40.0, 90.0]));
+        assert!(place(&window).z > 0.1 && place(&window).y < 0.0);
+        let near = window.controls.settings().light.position;
         assert!(near.is_none_or(|near| (near.length() - 50.0).abs() < 1e-9));
     }
 }
 
 #[test]
-fn what_is_no_matter_of_settings_is_for_who_asked() {
+fn commands_that_do_not_concern_settings_are_returned_to_the_caller() {
     let mut controls = Controls::new(Settings::default());
-    for command in [Command::Freeze, Command::Cine(-1), Command::SavePicture, Command::Help, Command::Exit] {
-        assert_eq!(controls.apply(&command, None), Change::Screen(command));
+    for command in [Command::Freeze, Command::StepCine(-1), Command::SavePicture, Command::ToggleHelp, Command::Exit] {
+        assert_eq!(controls.apply(&command, None), Change::Caller(command));
     }
     assert_eq!(controls.apply(&Command::Tool(Tool::Light), None), Change::Tool);
     assert_eq!(controls.apply(&Command::Zoom(2.0), None), Change::Nothing, "nothing is shown");
     controls.resize([1920, 0]);
     controls.reset();
-    assert_eq!((controls.tool(), controls.settings().picture.size), (Tool::Turn, [1920, 64]));
+    assert_eq!((controls.tool(), controls.settings().picture.size), (Tool::Rotate, [1920, 64]));
 }
 
 #[test]
-fn a_shadow_comes_back_as_it_was() {
-    let mut desk = Desk::new("light.shadow={ strength = 0.5, softness = 0 }");
-    let before = desk.controls.settings().clone();
-    ask(&mut desk, Command::Shadow(false));
-    assert_eq!(desk.controls.settings().light.shadow.map(|s| s.strength), Some(0.0));
-    ask(&mut desk, Command::Shadow(true));
-    assert_eq!(desk.controls.settings(), &before);
+fn a_shadow_is_restored() {
+    let mut window = TestWindow::new("light.shadow={ strength = 0.5, softness = 0 }");
+    let before = window.controls.settings().clone();
+    apply(&mut window, Command::Shadow(false));
+    assert_eq!(window.controls.settings().light.shadow.map(|s| s.strength), Some(0.0));
+    apply(&mut window, Command::Shadow(true));
+    assert_eq!(window.controls.settings(), &before);
 }

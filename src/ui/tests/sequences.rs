@@ -1,12 +1,12 @@
-//! Whatever is done, in whatever order: settings can be drawn, and numbers are numbers.
+//! Property tests: after any sequence of commands and inputs the settings can be drawn, and numbers are finite.
 
 use super::*;
 use crate::scene::{ColourMap, TransferName};
 use crate::ui::input::Phase;
-use crate::ui::keys::{KEYS, Keys};
+use crate::ui::keys::{HeldKeys, KEY_BINDINGS};
 use proptest::prelude::*;
 
-/// Numbers as hands make them, and as broken drivers do.
+/// Numbers of users, and of broken drivers.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![4 => -3.0..3.0, 4 => -200.0..200.0, 1 => any::<f64>(), 1 => Just(f64::NAN), 1 => Just(f64::INFINITY)]
 }
@@ -17,7 +17,7 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn tool() -> impl Strategy<Value = Tool> {
-    prop::sample::select(vec![Tool::Turn, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane])
+    prop::sample::select(vec![Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane])
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -26,19 +26,19 @@ fn command() -> impl Strategy<Value = Command> {
         3 => mode().prop_map(Command::Mode),
         2 => prop::sample::select(vec![Layout::Single, Layout::Four]).prop_map(Command::Layout),
         1 => tool().prop_map(Command::Tool),
-        1 => two().prop_map(Command::Turn),
+        1 => two().prop_map(Command::Rotate),
         1 => number().prop_map(Command::Roll),
         1 => number().prop_map(Command::Zoom),
         1 => two().prop_map(Command::Pan),
-        1 => two().prop_map(Command::Light),
-        4 => (0usize..4, any::<bool>(), number()).prop_map(|(axis, high, by)| Command::Face(Face { axis, high }, by)),
-        3 => number().prop_map(Command::Clip),
+        1 => two().prop_map(Command::MoveLight),
+        4 => (0usize..4, any::<bool>(), number()).prop_map(|(axis, high, by)| Command::MoveFace(Face { axis, high }, by)),
+        3 => number().prop_map(Command::MoveClip),
         1 => prop::sample::select(vec![PlaneName::A, PlaneName::B, PlaneName::C]).prop_map(Command::Plane),
-        1 => number().prop_map(Command::PlaneBy),
-        1 => [number(), number(), number()].prop_map(Command::Meet),
-        1 => two().prop_map(Command::PlaneTurn),
-        6 => (0..SLIDERS.len() + 1, number()).prop_map(|(place, value)| Command::Slide(place, value)),
-        4 => (0..SLIDERS.len() + 1, any::<i32>()).prop_map(|(place, steps)| Command::Nudge(place, steps % 20)),
+        1 => number().prop_map(Command::StepPlane),
+        1 => [number(), number(), number()].prop_map(Command::MoveCrossing),
+        1 => two().prop_map(Command::RotatePlanes),
+        6 => (0..SLIDERS.len() + 1, number()).prop_map(|(place, value)| Command::SetSlider(place, value)),
+        4 => (0..SLIDERS.len() + 1, any::<i32>()).prop_map(|(place, steps)| Command::StepSlider(place, steps % 20)),
         1 => prop::sample::select(vec![TransferName::Grey, TransferName::Bone]).prop_map(Command::Transfer),
         1 => prop::sample::select(vec![ColourMap::None, ColourMap::Ice]).prop_map(Command::ColourMap),
         1 => any::<bool>().prop_map(Command::Shadow),
@@ -53,9 +53,9 @@ fn place() -> impl Strategy<Value = [f64; 2]> {
 
 fn input() -> impl Strategy<Value = Input> {
     let button = prop::sample::select(vec![Button::Left, Button::Right, Button::Middle]);
-    let phase = prop::sample::select(vec![Phase::Down, Phase::Moved, Phase::Moved, Phase::Up, Phase::Gone]);
+    let phase = prop::sample::select(vec![Phase::Down, Phase::Moved, Phase::Moved, Phase::Up, Phase::Cancelled]);
     let modifiers = any::<[bool; 3]>().prop_map(|[shift, control, alt]| Modifiers { shift, control, alt });
-    let key = prop::sample::select(KEYS.iter().map(|b| b.key).collect::<Vec<_>>());
+    let key = prop::sample::select(KEY_BINDINGS.iter().map(|b| b.key).collect::<Vec<_>>());
     prop_oneof![
         8 => place().prop_map(Input::Moved),
         4 => (button, any::<bool>()).prop_map(|(button, pressed)| Input::Button { button, pressed }),
@@ -63,19 +63,21 @@ fn input() -> impl Strategy<Value = Input> {
         3 => (key, any::<bool>()).prop_map(|(key, pressed)| Input::Key { key, pressed }),
         1 => modifiers.prop_map(Input::Modifiers),
         8 => (0u64..4, phase, place()).prop_map(|(finger, phase, at)| Input::Touch { finger, phase, at }),
-        1 => Just(Input::Left),
+        1 => Just(Input::FocusLost),
     ]
 }
 
 fn is_finite(command: &Command) -> bool {
     let all = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
     match command {
-        Command::Turn(n) | Command::Pan(n) | Command::Light(n) | Command::PlaneTurn(n) => all(n),
-        Command::Roll(n) | Command::Zoom(n) | Command::Face(_, n) | Command::Clip(n) | Command::PlaneBy(n) => {
-            n.is_finite()
-        }
-        Command::Meet(n) => all(n),
-        Command::Slide(_, n) => n.is_finite(),
+        Command::Rotate(n) | Command::Pan(n) | Command::MoveLight(n) | Command::RotatePlanes(n) => all(n),
+        Command::Roll(n)
+        | Command::Zoom(n)
+        | Command::MoveFace(_, n)
+        | Command::MoveClip(n)
+        | Command::StepPlane(n) => n.is_finite(),
+        Command::MoveCrossing(n) => all(n),
+        Command::SetSlider(_, n) => n.is_finite(),
         _ => true,
     }
 }
@@ -84,7 +86,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn any_commands_leave_settings_that_can_be_drawn(
+    fn settings_can_be_drawn_after_any_commands(
         commands in prop::collection::vec(command(), 1..60), size in any::<[u32; 2]>(), lag in 1usize..5,
     ) {
         for geometry in geometries() {
@@ -96,7 +98,7 @@ proptest! {
                     controls.apply(command, Some(&shown));
                     let drawn = Scene::new(geometry.clone(), BYTES, controls.settings().clone());
                     prop_assert!(drawn.is_ok(), "{preset} {command:?}: {}", drawn.unwrap_err());
-                    // What is shown lags behind.
+                    // The scene on the screen lags behind.
                     if n % lag == 0 {
                         shown = drawn.unwrap();
                     }
@@ -106,7 +108,7 @@ proptest! {
     }
 
     #[test]
-    fn any_sliders_alone_leave_settings_that_say_what_they_mean(
+    fn settings_are_valid_after_any_slider_values(
         slid in prop::collection::vec((0..SLIDERS.len(), number()), 1..40), mode in mode(),
     ) {
         for preset in presets() {
@@ -115,26 +117,26 @@ proptest! {
                 SLIDERS[*place].set(&mut set, *value);
                 prop_assert!(SLIDERS[*place].get(&set).is_finite());
             }
-            // As a scene file, which knows no geometry.
+            // Checks that need no geometry.
             prop_assert!(set.surface.window[0] < set.surface.window[1] && set.volume.window[0] < set.volume.window[1]);
             prop_assert!(set.distance.median == 0 || set.distance.median % 2 == 1);
         }
     }
 
     #[test]
-    fn any_inputs_are_taken_and_ask_for_numbers(
+    fn any_inputs_give_commands_with_finite_numbers(
         inputs in prop::collection::vec((input(), tool(), any::<bool>()), 1..120), size in [0.0..900.0, 0.0..900.0],
     ) {
         for geometry in geometries() {
             for preset in ["", "fetal", "bone"] {
                 let mut controls = Controls::new(settings(preset, ""));
                 let Ok(mut shown) = Scene::new(geometry.clone(), BYTES, controls.settings().clone()) else { continue };
-                let (mut hand, mut keys, mut now) = (Gestures::default(), Keys::default(), Duration::ZERO);
+                let (mut gestures, mut keys, mut now) = (Gestures::default(), HeldKeys::default(), Duration::ZERO);
                 for (input, tool, follows) in &inputs {
                     now += Duration::from_millis(30);
                     let scene = Some(&shown).filter(|_| now.as_millis() % 11 != 0);
-                    let on = Picture { corner: [60.0, 5.0], size, scene, taken: !follows, now };
-                    let mut commands = hand.input(input, &on, *tool, keys.modifiers());
+                    let on = Viewport { corner: [60.0, 5.0], size, scene, is_covered: !follows, now };
+                    let mut commands = gestures.input(input, &on, *tool, keys.modifiers());
                     commands.extend(keys.input(input));
                     for command in commands {
                         prop_assert!(is_finite(&command), "{input:?}: {command:?}");

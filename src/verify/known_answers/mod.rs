@@ -6,7 +6,7 @@ mod shadows;
 
 use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
 use super::{Bench, Check, Found, drawn, shown};
-use crate::gpu::{GpuError, Options, Renderer};
+use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::{MISS, Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::probe::{Axis, Geometry, Grid, Probe};
@@ -264,7 +264,7 @@ fn turns(bench: &mut Bench) -> Result<Found, GpuError> {
                 ray = { sampling = 'exact' }";
     let scene = made(block(0.5, [16, 16, 3]), toml)?;
     let levels = [40u8, 90, 200];
-    let options = Options { volume_images: levels.len() as u32, ..Options::default() };
+    let options = RendererOptions { volume_images: levels.len() as u32, ..RendererOptions::default() };
     let mut renderer = Renderer::new(&bench.context, scene.clone(), &options)?;
     for (image, level) in levels.iter().enumerate() {
         drawn::send(&mut renderer, &frames(&scene, |_| f64::from(*level) / 255.0), image as u32)?;

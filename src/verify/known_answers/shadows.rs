@@ -1,7 +1,7 @@
 //! Edges of shadows.
 
 use crate::gpu::GpuError;
-use crate::gpu::renderer::size_of;
+use crate::gpu::resources::shape_size;
 use crate::passes::shade::shadow;
 use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
 use crate::verify::built_in::{BYTES, scene, wobbler};
@@ -26,7 +26,7 @@ pub(super) fn of_a_hill(bench: &mut Bench) -> Result<Found, GpuError> {
     }
     let writes = (shadow::PASS.writes)(&scene, &args);
     for bind in &writes {
-        expected.insert(bind.name, Texels::untouched(size_of(Slot::Shadow.shape(&scene)), 1));
+        expected.insert(bind.name, Texels::untouched(shape_size(Slot::Shadow.shape(&scene)), 1));
     }
     shadow::PASS.expected(&scene, &args, &inputs, &mut expected);
     let got = bench.single()?.run(&scene, &shadow::PASS, &args, &inputs, POISON)?;

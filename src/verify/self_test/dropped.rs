@@ -2,10 +2,10 @@
 //! there, some. Recorded is what a renderer does for two volumes that take turns, drawn while the other is filled.
 
 use super::Caught;
-use crate::barriers::oracle::Log;
-use crate::gpu::{Context, ContextOptions, GpuError, Options, Renderer};
+use crate::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
 use crate::passes::Texels;
 use crate::probe::Geometry;
+use crate::queues::oracle::SubmissionLog;
 use crate::scene::Scene;
 use crate::verify::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
 use crate::verify::{drawn, isolated_context};
@@ -61,9 +61,9 @@ fn streamed(renderer: &mut Renderer, frames: &[Texels]) -> Result<(), GpuError> 
     renderer.picture().map(|_| ())
 }
 
-fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, Log), GpuError> {
+fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, SubmissionLog), GpuError> {
     let (scene, frames) = made(toml)?;
-    let options = Options { volume_images: 2, queues: Some(queues), log: true, ..Options::default() };
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), log: true, ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scene, &options)?;
     streamed(&mut renderer, &frames)?;
     let log = renderer.log().cloned().unwrap_or_default();
@@ -78,11 +78,11 @@ fn by_oracle(options: &ContextOptions) -> Result<Caught, GpuError> {
         for queues in counts {
             let (scene, log) = logged(&context, &toml, queues)?;
             let of = |what: String| format!("{name}, {queues} queues: {what}");
-            if let Some(found) = log.unordered(&scene) {
+            if let Some(found) = log.find_hazard(&scene) {
                 missed.get_or_insert(of(format!("nothing is left out, and {found:?}")));
             }
             for barrier in log.barriers() {
-                let unseen = log.without_barrier(barrier).unordered(&scene).is_none();
+                let unseen = log.without_barrier(barrier).find_hazard(&scene).is_none();
                 // What a submission waits for may have waited for the same itself.
                 let may_be = !log.submissions[barrier.0].waits.is_empty();
                 implied += usize::from(unseen && may_be);
@@ -90,7 +90,7 @@ fn by_oracle(options: &ContextOptions) -> Result<Caught, GpuError> {
                     missed.get_or_insert(of(format!("barrier {barrier:?} is not missed")));
                 }
             }
-            let unseen = |wait: &(usize, usize)| log.without_wait(*wait).unordered(&scene).is_none();
+            let unseen = |wait: &(usize, usize)| log.without_wait(*wait).find_hazard(&scene).is_none();
             missed = missed.or(log.waits().into_iter().find(unseen).map(|w| of(format!("wait {w:?} is not missed"))));
             (barriers, waits, runs) = (barriers + log.barriers().len(), waits + log.waits().len(), runs + 1);
         }
@@ -124,7 +124,7 @@ fn by_layer(options: &ContextOptions) -> Result<Caught, GpuError> {
     let recorded = |dropped: Option<u32>| -> Result<(u32, Vec<String>), GpuError> {
         let context = Context::new(options)?;
         let (scene, frames) = made(&toml)?;
-        let mut renderer = Renderer::new(&context, scene, &Options::default())?;
+        let mut renderer = Renderer::new(&context, scene, &RendererOptions::default())?;
         dropped.iter().for_each(|n| renderer.drop_barrier(*n));
         drawn::send(&mut renderer, &frames, 0)?;
         renderer.picture()?;

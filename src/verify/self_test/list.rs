@@ -3,7 +3,7 @@
 use crate::passes::fault_injection::{Change, InjectedFault};
 use crate::passes::{DispatchArgs, Params, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::mutate::{FMAX, FMIN, added, in_halves, replaced};
+use crate::spirv::mutate::{FMAX, FMIN, add_to_writes, replace_last, round_to_half};
 
 const LSB: f32 = 1.0 / 255.0;
 
@@ -99,25 +99,25 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     InjectedFault {
         name: "1 LSB bias",
         what: "what is stored in the volume is one of 255 steps too bright",
-        change: Change::Shader { pass: "scan_convert", by: |words| added(words, "target", [LSB; 4]) },
+        change: Change::Shader { pass: "scan_convert", by: |words| add_to_writes(words, "target", [LSB; 4]) },
     },
     InjectedFault {
         name: "wrong rounding",
         what: "the screen's 8 bits are cut off instead of rounded",
         change: Change::Shader {
             pass: "tone",
-            by: |words| added(words, "screen", [-0.5 * LSB, -0.5 * LSB, -0.5 * LSB, 0.0]),
+            by: |words| add_to_writes(words, "screen", [-0.5 * LSB, -0.5 * LSB, -0.5 * LSB, 0.0]),
         },
     },
     InjectedFault {
         name: "median of the wrong rank",
         what: "the compiler takes a smaller for a larger value, once",
-        change: Change::Shader { pass: "median_slice", by: |words| replaced(words, FMAX, FMIN) },
+        change: Change::Shader { pass: "median_slice", by: |words| replace_last(words, FMAX, FMIN) },
     },
     InjectedFault {
         name: "half precision",
         what: "a filter computes with 11 bits instead of 24",
-        change: Change::Shader { pass: "perona_malik_slice", by: in_halves },
+        change: Change::Shader { pass: "perona_malik_slice", by: round_to_half },
     },
     InjectedFault {
         name: "window of one texel less",

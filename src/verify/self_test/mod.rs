@@ -110,7 +110,7 @@ impl Search {
     fn caught(&mut self, planted: &InjectedFault) -> Result<Caught, GpuError> {
         let (begun, mut bench) = (Instant::now(), self.sound.planted(planted.change)?);
         let looked = self.look(planted, &mut bench);
-        let struck = bench.context.faults.struck();
+        let struck = bench.context.faults.change_count();
         let (by, found) = match looked {
             Ok((by, found)) => (Some(by), found),
             Err(Some(error)) => (None, format!("the device refused it, and no check compared anything: {error}")),

@@ -4,7 +4,7 @@ use super::list::{number, set, swap, times};
 use crate::passes::fault_injection::{Change, InjectedFault};
 use crate::passes::{Params, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::mutate::added;
+use crate::spirv::mutate::add_to_writes;
 use half::f16;
 
 /// Rays of pixels half a pixel to the right.
@@ -100,7 +100,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         what: "every surface is found 2 um early",
         change: Change::Shader {
             pass: "raycast_surface",
-            by: |words| added(words, "distance_map", [-2e-3, 0.0, 0.0, 0.0]),
+            by: |words| add_to_writes(words, "distance_map", [-2e-3, 0.0, 0.0, 0.0]),
         },
     },
     InjectedFault {
@@ -136,7 +136,10 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     InjectedFault {
         name: "leap one brick too far",
         what: "the distance to the next brick of another kind is counted from the one behind",
-        change: Change::Shader { pass: "leap_", by: |words| added(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]) },
+        change: Change::Shader {
+            pass: "leap_",
+            by: |words| add_to_writes(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]),
+        },
     },
     InjectedFault {
         name: "brick taken for empty",

@@ -18,7 +18,7 @@ pub fn configuration(bytes: &[u8]) -> String {
     let arguments = config.source_arguments();
     assert!(arguments.iter().all(|argument| argument.starts_with("--")), "{arguments:?}");
     config.layers().and_then(|layers| layers.finish()).expect("checked before");
-    told(config.refuse(&arguments.join(" ")))
+    told(config.flag_error(&arguments.join(" ")))
 }
 
 /// What follows a name that nobody knows stays, and so do lines.
@@ -26,9 +26,9 @@ pub fn redacted(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut redactor = Redactor::new();
     redactor.add_recording(Path::new(text.lines().next().unwrap_or_default()));
-    let said = redactor.text(&text);
+    let said = redactor.redact(&text);
     assert_eq!(said.matches('\n').count(), text.matches('\n').count());
-    let mut planted = Redactor::new().text(&text.replace('\n', "/data/ZQX.mha\n"));
+    let mut planted = Redactor::new().redact(&text.replace('\n', "/data/ZQX.mha\n"));
     planted.retain(|c| c.is_ascii_uppercase() || c == '\n');
     assert!(text.contains("ZQX") || !planted.contains("ZQX"), "{planted}");
     said.split_whitespace().filter(|word| word.contains('<')).take(8).collect()

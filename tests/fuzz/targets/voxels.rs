@@ -23,11 +23,11 @@ pub fn compounder(bytes: &[u8]) -> String {
     let options = CompoundingOptions {
         splat: [Splat::Nearest, Splat::Trilinear][usize::from(bytes.u8() % 2)],
         overlap: [Overlap::Mean, Overlap::Latest, Overlap::Maximum][usize::from(bytes.u8() % 3)],
-        widest_hole: if bytes.u8() < 128 { 2.0 } else { bytes.number() },
+        max_hole: if bytes.u8() < 128 { 2.0 } else { bytes.number() },
         clip: (bytes.u8() > 200).then(|| std::array::from_fn(|_| usize::from(bytes.u8()) << (bytes.u8() % 8))),
         spacing: (bytes.u8() > 128).then(|| bytes.number()),
         margin: if bytes.u8() < 200 { 1.0 } else { bytes.number() },
-        most_voxels: MOST_VOXELS,
+        max_voxels: MOST_VOXELS,
     };
     let first = (bytes.u8(), bytes.u8() < 200);
     let lattice = match first {

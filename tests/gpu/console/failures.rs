@@ -2,7 +2,7 @@
 
 use super::*;
 use ash::vk;
-use echolume::gpu::faults::Seam;
+use echolume::gpu::faults::InjectionPoint;
 
 /// Prevents a console that ends with its probe, or needs to be told that it is back.
 #[test]
@@ -16,7 +16,7 @@ fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_millis(60) {
         let next = desk.tick(Instant::now());
-        assert!(!next.exit && !next.renews);
+        assert!(!next.exit && !next.restart);
     }
     let mut last = None;
     for (number, why) in [(0, None), (1, Some("cut".to_string())), (2, None)] {
@@ -32,7 +32,7 @@ fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
         last = Some(picture);
     }
     // A hand turns what is shown, source or not.
-    desk.console.command(&Command::Turn([20.0, 5.0]), Instant::now());
+    desk.console.execute(&Command::Rotate([20.0, 5.0]), Instant::now());
     desk.rest();
     assert!(last.as_ref() != Some(&desk.picture()));
     assert_eq!(desk.console.stream().cine().volumes().len(), 3, "volumes of three sources");
@@ -45,7 +45,7 @@ fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
     let chord = "ctrl+alt+q".parse().expect("keys");
     let (all, none) = (Modifiers { control: true, alt: true, shift: false }, Modifiers::default());
     for is_kiosk in [true, false] {
-        let mut desk = Desk::new(&device, Options { is_kiosk, exit: is_kiosk.then_some(chord), ..options() });
+        let mut desk = Desk::new(&device, ConsoleOptions { is_kiosk, exit: is_kiosk.then_some(chord), ..options() });
         let half = Modifiers { control: true, ..none };
         for (held, key, exits) in [
             (none, Key::Char('q'), !is_kiosk),
@@ -59,14 +59,16 @@ fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
             assert!(!desk.tick(Instant::now()).exit, "once is once");
         }
         desk.press(Key::Function(11));
-        assert_eq!(desk.tick(Instant::now()).toggles_full_screen, !is_kiosk);
+        assert_eq!(desk.tick(Instant::now()).toggle_full_screen, !is_kiosk);
     }
 }
 
 /// Prevents a console that goes down with its device, or shows something else on the next one.
 #[test]
 fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
-    for (seam, is_frozen) in [(Seam::Submit, true), (Seam::Submit, false), (Seam::Wait, true)] {
+    for (seam, is_frozen) in
+        [(InjectionPoint::Submit, true), (InjectionPoint::Submit, false), (InjectionPoint::Wait, true)]
+    {
         let (device, other) = (Device::new(), Device::new());
         let mut desk = Desk::new(&device, options());
         desk.begin();
@@ -78,10 +80,10 @@ fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
         }
         assert!(desk.picture() == seen[shown]);
         device.faults.inject(seam, 0, vk::Result::ERROR_DEVICE_LOST);
-        desk.console.command(&Command::Turn([1.0, 0.0]), Instant::now());
+        desk.console.execute(&Command::Rotate([1.0, 0.0]), Instant::now());
         let lost = desk.rest_or_lost().expect_err("lost");
         assert!(matches!(&lost, ConsoleError::DeviceLost(error) if error.is_device_lost()), "{lost}");
-        desk.console.command(&Command::Reset, Instant::now());
+        desk.console.execute(&Command::Reset, Instant::now());
         desk.console.revive(&other, None).expect("made anew");
         desk.rest();
         assert!(desk.picture() == seen[shown], "{seam:?}, frozen: {is_frozen}");
@@ -101,8 +103,8 @@ fn memory_that_runs_out_anywhere_is_got_over() {
     for n in (0..60).step_by(8) {
         let sources = Arc::new(Mutex::new(Vec::new()));
         let mut desk =
-            Desk::of(&device, Options { retry: Some(Duration::from_millis(5)), ..options() }, sources.clone());
-        device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+            Desk::of(&device, ConsoleOptions { retry: Some(Duration::from_millis(5)), ..options() }, sources.clone());
+        device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         // What is opened again says all of it again, and none of them ends by itself.
         let mut speak = Vec::new();
         for _ in 0..4 {
@@ -119,7 +121,7 @@ fn memory_that_runs_out_anywhere_is_got_over() {
         }
         desk.rest();
         reached += usize::from(sources.lock().expect("lock").len() < 3);
-        device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "allocation {n}");
     }
     assert!(reached > 2, "{reached}");

@@ -95,7 +95,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
         if stream.is_idle() {
             places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
             // The time at which it asks to be asked again comes at once.
-            now = next.at.expect("a loop goes on").max(now);
+            now = next.wake_at.expect("a loop goes on").max(now);
         }
     }
     assert!(places.windows(2).all(|w| w[1] == (w[0] + 1) % 3), "{places:?}");
@@ -109,7 +109,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
 #[test]
 fn what_is_saved_is_what_is_seen_and_kept() {
     let (device, folder) = (Device::new(), Folder::new("saved"));
-    let mut desk = Desk::new(&device, Options { folder: folder.0.clone(), ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
     // Nothing to save yet is no fault of anything.
     desk.press(Key::Char('p'));
     desk.press(Key::Char('r'));
@@ -139,7 +139,7 @@ fn what_is_saved_is_what_is_seen_and_kept() {
 #[test]
 fn panels_take_room_and_nothing_else() {
     let device = Device::new();
-    let mut desk = Desk::new(&device, Options { panels: true, scale: 0.5, ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { panels: true, scale: 0.5, ..options() });
     desk.begin();
     desk.live(0);
     for size in [[400, 240], [60, 50], [1, 1], [0, 0], [417, 233]] {
@@ -154,7 +154,7 @@ fn panels_take_room_and_nothing_else() {
     desk.rest();
     assert!(desk.drawn().picture.size == [417, 233] && beside[0] < 417 && beside[1] < 233);
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));
-    desk.console.command(&Command::Help, Instant::now());
+    desk.console.execute(&Command::ToggleHelp, Instant::now());
     desk.press(Key::Function(2));
     desk.rest();
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)));

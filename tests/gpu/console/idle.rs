@@ -7,7 +7,7 @@ use super::*;
 fn a_console_at_rest_does_nothing_and_wants_nothing() {
     let device = Device::new();
     for (overlay, panels, hud) in [(true, false, false), (false, false, false), (true, true, true)] {
-        let mut desk = Desk::new(&device, Options { overlay, panels, scale: 0.5, ..options() });
+        let mut desk = Desk::new(&device, ConsoleOptions { overlay, panels, scale: 0.5, ..options() });
         desk.console.resize([400, 240]);
         desk.begin();
         desk.live(0);
@@ -23,7 +23,7 @@ fn a_console_at_rest_does_nothing_and_wants_nothing() {
         while now < end {
             let next = desk.tick(now);
             woken += 1;
-            match next.at {
+            match next.wake_at {
                 None => break,
                 Some(at) => {
                     assert!(at > now, "again at once: overlay {overlay}, panels {panels}");
@@ -47,7 +47,7 @@ fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() 
     let mut settings = plain();
     settings.light.shadow = Some(Default::default());
     let budget = Some(Duration::from_nanos(1));
-    let mut desk = Desk::new(&device, Options { settings, budget, ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { settings, budget, ..options() });
     desk.begin();
     desk.live(0);
     let last = quality_ladder::built_in().len() - 1;

@@ -11,16 +11,16 @@ use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
 use echolume::live::Update;
-use echolume::live::views::Views;
+use echolume::live::Views;
 use echolume::picture::Picture;
 use echolume::scene::Settings;
 use echolume::source::Frame;
 use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
-use echolume::ui::console::{Console, ConsoleError, Next, Options};
+use echolume::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
 use echolume::ui::input::{Button, Input, Key, Modifiers};
 use echolume::ui::quality_ladder;
-use echolume::ui::source_supervisor::Open;
+use echolume::ui::source_supervisor::OpenSource;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -34,8 +34,8 @@ pub fn plain() -> Settings {
 }
 
 /// Without a screen, a budget or a second source.
-pub fn options() -> Options {
-    Options {
+pub fn options() -> ConsoleOptions {
+    ConsoleOptions {
         settings: plain(),
         update: Update::Whole,
         images: 3,
@@ -52,7 +52,7 @@ pub fn options() -> Options {
         exit: None,
         is_kiosk: false,
         wake: Arc::new(|| ()),
-        amiss: None,
+        startup_fault: None,
         shaders: None,
     }
 }
@@ -89,15 +89,15 @@ pub struct Desk {
 }
 
 impl Desk {
-    pub fn new(device: &Arc<Context>, options: Options) -> Desk {
+    pub fn new(device: &Arc<Context>, options: ConsoleOptions) -> Desk {
         let (say, said) = channel();
         let desk = Desk::of(device, options, Arc::new(Mutex::new(vec![said])));
         Desk { say, ..desk }
     }
 
     /// Its sources are taken from the end of these; where there is none it cannot be opened.
-    pub fn of(device: &Arc<Context>, options: Options, sources: Arc<Mutex<Vec<Receiver<Event>>>>) -> Desk {
-        let open: Open = Arc::new(move || match sources.lock().expect("lock").pop() {
+    pub fn of(device: &Arc<Context>, options: ConsoleOptions, sources: Arc<Mutex<Vec<Receiver<Event>>>>) -> Desk {
+        let open: OpenSource = Arc::new(move || match sources.lock().expect("lock").pop() {
             Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
             None => Err("no probe".into()),
         });
@@ -112,8 +112,8 @@ impl Desk {
         frames.into_iter().for_each(|frame| self.say.send(Event::Frame(frame)).expect("listens"));
     }
 
-    pub fn tick(&mut self, now: Instant) -> Next {
-        self.console.tick(now).expect("the device is there")
+    pub fn tick(&mut self, now: Instant) -> LoopRequest {
+        self.console.update(now).expect("the device is there")
     }
 
     /// The settings as they are drawn at rest.
@@ -124,17 +124,17 @@ impl Desk {
     }
 
     /// Ticks until all that was said and done is drawn, at a time at which no hand moves any more.
-    pub fn rest(&mut self) -> Next {
+    pub fn rest(&mut self) -> LoopRequest {
         self.rest_or_lost().expect("the device is there")
     }
 
-    pub fn rest_or_lost(&mut self) -> Result<Next, ConsoleError> {
+    pub fn rest_or_lost(&mut self) -> Result<LoopRequest, ConsoleError> {
         let begun = Instant::now();
         // What the source was sent takes a moment to arrive, and says nothing of itself.
         let mut still = 0;
         loop {
             assert!(begun.elapsed() < BOUND, "it does not come to rest");
-            let next = self.console.tick(Instant::now() + LATER)?;
+            let next = self.console.update(Instant::now() + LATER)?;
             let drawn = self.drawn();
             let stream = self.console.stream();
             let is_drawn = stream.scene().is_none_or(|scene| scene.settings == drawn);
@@ -195,7 +195,7 @@ impl Desk {
 pub fn headless(device: &Arc<Context>, settings: &Settings, frames: &[Frame]) -> Picture {
     let views = Views::new(&header(0.3), settings, Update::Whole).expect("views");
     let scene = views.of(&vec![frames[0].backward; frames.len()]).into_owned();
-    let mut renderer = Renderer::new(device, scene, &gpu::Options::default()).expect("renderer");
+    let mut renderer = Renderer::new(device, scene, &gpu::RendererOptions::default()).expect("renderer");
     frames.iter().for_each(|f| renderer.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
     renderer.show(0).expect("show");
     renderer.picture().expect("picture")

@@ -69,7 +69,7 @@ fn negative(picture: &Picture) -> Picture {
 #[test]
 fn an_edited_shader_is_drawn_with_and_a_broken_one_leaves_the_last_good_picture() {
     let (device, glsl) = (Device::new(), Glsl::new());
-    let mut desk = Desk::new(&device, Options { shaders: Some(glsl.folder()), ..options() });
+    let mut desk = Desk::new(&device, ConsoleOptions { shaders: Some(glsl.folder()), ..options() });
     desk.begin();
     let first = desk.live(0);
     assert!(difference(&first, &headless(&device, &desk.drawn(), &body(0))).1 <= 1.0, "compiled with other options");
@@ -126,7 +126,7 @@ fn every_compiler_of_the_system_draws_what_the_embedded_shaders_draw() {
     let views = Views::new(&header(0.3), &plain(), Update::Whole).expect("views");
     let scene = views.of(&vec![false; body(0).len()]).into_owned();
     let draw = |shaders| {
-        let options = gpu::Options { shaders, ..gpu::Options::default() };
+        let options = gpu::RendererOptions { shaders, ..gpu::RendererOptions::default() };
         let mut renderer = Renderer::new(&device, scene.clone(), &options).expect("renderer");
         body(0).iter().for_each(|f| renderer.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
         renderer.show(0).expect("show");

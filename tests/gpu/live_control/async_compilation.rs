@@ -3,7 +3,7 @@
 use super::*;
 use ash::vk;
 use echolume::gpu::Wake;
-use echolume::gpu::faults::Seam;
+use echolume::gpu::faults::InjectionPoint;
 use echolume::plan::Plan;
 use echolume::probe::{Axis, Geometry, Probe};
 use echolume::scene::{Scene, VolumeFormat};
@@ -109,11 +109,11 @@ fn memory_that_runs_out_while_settings_change_costs_the_settings_and_not_the_str
     (0..2).for_each(|number| drop(bench.live(number)));
     bench.stream.freeze(true);
     for n in 0.. {
-        device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         bench.stream.change(settings(after)).expect("change");
         let picture = bench.settle().pop();
         // One that was not reached is none any more.
-        device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         match bench.faults.pop() {
             None => {
                 assert!(picture.expect("drawn").picture == Some(new));

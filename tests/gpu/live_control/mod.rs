@@ -6,9 +6,9 @@ mod sources;
 
 use crate::common::gpu::*;
 use crate::live::*;
-use echolume::gpu::{Options, Renderer};
+use echolume::gpu::{Renderer, RendererOptions};
+use echolume::live::Views;
 use echolume::live::cine::CineLimits;
-use echolume::live::views::Views;
 use echolume::live::{self, Feed, FinishedPicture, Step, Stream, Update};
 use echolume::picture::Picture;
 use echolume::source::Frame;
@@ -116,7 +116,7 @@ fn fresh(device: &Device, toml: &str, header: &Header, update: Update, frames: &
     let views = Views::new(header, &settings(toml), update).expect("views");
     let backward = vec![frames[0].backward; frames.len()];
     let scene = views.of(&backward).into_owned();
-    let mut plain = Renderer::new(device, scene, &Options::default()).expect("renderer");
+    let mut plain = Renderer::new(device, scene, &RendererOptions::default()).expect("renderer");
     frames.iter().for_each(|f| plain.frame(f.slice as u32, &f.bytes, 0).expect("frame"));
     plain.show(0).expect("show");
     plain.picture().expect("picture")
@@ -129,5 +129,5 @@ fn of(device: &Device, toml: &str, number: u32) -> Picture {
 /// Pipelines that were made while whoever draws waited for them.
 fn waited_for(device: &Device) -> u64 {
     let counts = &device.counts;
-    counts.pipelines.load(Ordering::Relaxed) - counts.beside.load(Ordering::Relaxed)
+    counts.pipelines.load(Ordering::Relaxed) - counts.async_pipelines.load(Ordering::Relaxed)
 }

@@ -2,7 +2,7 @@
 
 use super::{FILTERED, scene};
 use crate::common::probes::voxels;
-use echolume::barriers::{Access, Resource, Worker, Workers, accesses};
+use echolume::barriers::{Access, PipelineStage, PipelineStages, Resource, accesses};
 use echolume::passes::{DispatchArgs, Slot, by_name};
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ fn touched(name: &str, args: DispatchArgs) -> (Touched, Touched) {
             Resource::Slot(slot, image) => (slot, image, a.parts.clone()),
             Resource::Readback => panic!("no pass reads back"),
         };
-        assert!(all.iter().all(|a| a.by == Worker::Compute));
+        assert!(all.iter().all(|a| a.stage == PipelineStage::Compute));
         all.iter().filter(|a| a.write == write).map(part).collect()
     };
     (of(false), of(true))
@@ -50,18 +50,18 @@ fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
 
 #[test]
 fn a_set_of_workers_lacks_what_was_taken_out_of_it() {
-    assert!(Workers::DEVICE.has(Worker::Compute) && Workers::DEVICE.has(Worker::Copy));
-    assert!(!Workers::DEVICE.has(Worker::Host));
-    let copies = Workers::DEVICE.without(Worker::Compute);
-    assert_eq!(copies, Workers::from(Worker::Copy));
-    assert_eq!(copies.without(Worker::Host), copies, "what is not there cannot be taken out");
-    assert_eq!(copies.without(Worker::Copy), Workers::default());
+    assert!(PipelineStages::DEVICE.has(PipelineStage::Compute) && PipelineStages::DEVICE.has(PipelineStage::Copy));
+    assert!(!PipelineStages::DEVICE.has(PipelineStage::Host));
+    let copies = PipelineStages::DEVICE.without(PipelineStage::Compute);
+    assert_eq!(copies, PipelineStages::from(PipelineStage::Copy));
+    assert_eq!(copies.without(PipelineStage::Host), copies, "what is not there cannot be taken out");
+    assert_eq!(copies.without(PipelineStage::Copy), PipelineStages::default());
 }
 
 /// Tiles of a volume's slices are texels of one 3D image too.
 #[test]
 fn a_reader_and_a_writer_of_a_volume_conflict_wherever_they_are_and_of_other_slots_where_they_meet() {
-    let access = |slot, parts: Range<u32>, write| Access::of_slot(slot, 0, parts, write, Worker::Compute);
+    let access = |slot, parts: Range<u32>, write| Access::of_slot(slot, 0, parts, write, PipelineStage::Compute);
     for slot in [Slot::Volume, Slot::SharpVolume, Slot::TileRanges] {
         assert!(access(slot, 0..1, true).conflicts(&access(slot, 3..4, false)), "{slot:?}");
         assert!(access(slot, 0..1, false).conflicts(&access(slot, 3..4, true)), "{slot:?}");
@@ -71,6 +71,6 @@ fn a_reader_and_a_writer_of_a_volume_conflict_wherever_they_are_and_of_other_slo
     let frames = |parts, write| access(Slot::Frames, parts, write);
     assert!(frames(0..2, true).conflicts(&frames(1..3, false)) && frames(1..3, true).conflicts(&frames(0..2, true)));
     assert!(!frames(0..2, true).conflicts(&frames(2..3, false)) && !frames(2..3, true).conflicts(&frames(0..2, false)));
-    let other = Access::of_slot(Slot::Frames, 1, 0..2, true, Worker::Compute);
+    let other = Access::of_slot(Slot::Frames, 1, 0..2, true, PipelineStage::Compute);
     assert!(!frames(0..2, true).conflicts(&other), "another image");
 }

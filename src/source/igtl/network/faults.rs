@@ -1,15 +1,15 @@
-//! What is amiss, said at most once a second each, with how often it was.
+//! What is amiss, reported at most once a second each, with how often it was.
 
-use crate::source::error::escaped;
+use crate::files::escaped;
 use std::time::{Duration, Instant};
 
-const APART: Duration = Duration::from_secs(1);
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest reason, in characters.
-const LONGEST: usize = 400;
+const MAX_REASON: usize = 400;
 
 /// What may be amiss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FaultKind {
     Unreachable,
     Lost,
     Again,
@@ -26,19 +26,19 @@ pub(super) enum Kind {
     Volume,
 }
 
-const KINDS: [(Kind, &str); 12] = [
-    (Kind::Unreachable, "not connected"),
-    (Kind::Lost, "connection lost"),
-    (Kind::Again, "connected again"),
-    (Kind::Checksum, "messages with a wrong checksum passed over"),
-    (Kind::Malformed, "malformed messages passed over"),
-    (Kind::Dropped, "messages dropped"),
-    (Kind::Image, "images passed over"),
-    (Kind::Samples, "samples that are not finite or are denormal"),
-    (Kind::Unpaired, "frames without a pose left out"),
-    (Kind::Pose, "frames refused"),
-    (Kind::Outside, "frames outside of the volume"),
-    (Kind::Volume, "no volume for the sweep"),
+const KINDS: [(FaultKind, &str); 12] = [
+    (FaultKind::Unreachable, "not connected"),
+    (FaultKind::Lost, "connection lost"),
+    (FaultKind::Again, "connected again"),
+    (FaultKind::Checksum, "messages with a wrong checksum passed over"),
+    (FaultKind::Malformed, "malformed messages passed over"),
+    (FaultKind::Dropped, "messages dropped"),
+    (FaultKind::Image, "images passed over"),
+    (FaultKind::Samples, "samples that are not finite or are denormal"),
+    (FaultKind::Unpaired, "frames without a pose left out"),
+    (FaultKind::Pose, "frames refused"),
+    (FaultKind::Outside, "frames outside of the volume"),
+    (FaultKind::Volume, "no volume for the sweep"),
 ];
 
 #[derive(Clone, Default)]
@@ -46,7 +46,7 @@ struct Fault {
     count: u64,
     /// The last one's.
     why: String,
-    said: Option<Instant>,
+    reported: Option<Instant>,
 }
 
 pub(super) struct Faults {
@@ -56,24 +56,24 @@ pub(super) struct Faults {
 
 impl Faults {
     pub fn new(address: &str) -> Faults {
-        Faults { address: escaped(address, LONGEST), faults: Default::default() }
+        Faults { address: escaped(address, MAX_REASON), faults: Default::default() }
     }
 
-    pub fn note(&mut self, kind: Kind, count: u64, why: &str) {
+    pub fn note(&mut self, kind: FaultKind, count: u64, why: &str) {
         let place = KINDS.iter().position(|(k, _)| *k == kind).and_then(|n| self.faults.get_mut(n));
         if let Some(fault) = place.filter(|_| count > 0) {
             fault.count = fault.count.saturating_add(count);
-            fault.why = escaped(why, LONGEST);
+            fault.why = escaped(why, MAX_REASON);
         }
     }
 
-    /// One that has not been said for a second.
+    /// One that has not been reported for a second.
     pub fn due(&mut self) -> Option<String> {
-        let waited = |fault: &Fault| fault.said.is_none_or(|said| said.elapsed() >= APART);
+        let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
         let mut faults = self.faults.iter_mut().zip(KINDS);
         let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
         let count = std::mem::take(&mut fault.count);
-        fault.said = Some(Instant::now());
+        fault.reported = Some(Instant::now());
         let times = if count == 1 { String::new() } else { format!(" ({count})") };
         let why = if fault.why.is_empty() { String::new() } else { format!(": {}", fault.why) };
         Some(format!("OpenIGTLink from {}: {what}{times}{why}", self.address))
@@ -88,25 +88,32 @@ mod tests {
     fn a_flood_of_faults_is_one_line_a_second_and_none_is_forgotten() {
         let mut faults = Faults::new("host\n:1");
         assert_eq!(faults.due(), None);
-        faults.note(Kind::Lost, 1, "gone");
-        faults.note(Kind::Dropped, 3, "");
-        faults.note(Kind::Image, 0, "never");
+        faults.note(FaultKind::Lost, 1, "gone");
+        faults.note(FaultKind::Dropped, 3, "");
+        faults.note(FaultKind::Image, 0, "never");
         assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: connection lost: gone"));
         assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: messages dropped (3)"));
         for n in 0..1000 {
-            faults.note(Kind::Dropped, 2, &format!("the {n}th\u{1b}[2J"));
+            faults.note(FaultKind::Dropped, 2, &format!("the {n}th\u{1b}[2J"));
             assert_eq!(faults.due(), None);
         }
         for fault in &mut faults.faults {
-            fault.said = fault.said.and_then(|said| said.checked_sub(APART));
+            fault.reported = fault.reported.and_then(|reported| reported.checked_sub(REPORT_INTERVAL));
         }
-        let said = faults.due().unwrap();
-        assert!(said.contains("messages dropped (2000): the 999th") && !said.contains('\u{1b}'), "{said}");
+        let reported = faults.due().unwrap();
+        assert!(reported.contains("messages dropped (2000): the 999th") && !reported.contains('\u{1b}'), "{reported}");
     }
 
     #[test]
     fn every_kind_has_its_words() {
-        for kind in [Kind::Unreachable, Kind::Again, Kind::Checksum, Kind::Samples, Kind::Unpaired, Kind::Volume] {
+        for kind in [
+            FaultKind::Unreachable,
+            FaultKind::Again,
+            FaultKind::Checksum,
+            FaultKind::Samples,
+            FaultKind::Unpaired,
+            FaultKind::Volume,
+        ] {
             let mut faults = Faults::new("host");
             faults.note(kind, 1, "");
             assert!(faults.due().is_some(), "{kind:?}");

@@ -4,66 +4,24 @@
 //! frame of a freehand sweep. Whichever changed is then given slice by slice under a new volume's number, always all of its slices, so that
 //! whoever receives them has a whole volume every time and need not know what is behind it.
 
+mod assembly;
 mod faults;
-mod samples;
-mod sweep;
-mod whole;
 
-use super::client::{self, Client, ClientStatistics};
-use super::decode::BODY_LIMIT;
+pub use assembly::{NetworkOptions, Poses};
+
+use super::client::{Client, ClientStatistics};
 use super::message::Message;
+use crate::source::frame::{Frame, Header};
 use crate::source::live::{Event, Live};
-use crate::source::recorder::Header;
-use crate::source::{Frame, freehand};
-use faults::{Faults, Kind};
+use assembly::{CartesianVolume, FreehandSweep};
+use faults::{FaultKind, Faults};
 use std::io;
 use std::time::{Duration, Instant};
-use sweep::Sweep;
-use whole::Whole;
 
 /// How often statistics are looked at while nothing comes.
 const POLL: Duration = Duration::from_millis(100);
 /// Messages that are looked through although patience is at its end, so that one who never waits gets on, too.
-const AT_ONCE: usize = 256;
-
-/// Where the pose of a 2D frame comes from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Poses {
-    /// TRANSFORM and TDATA messages, chosen as [`Pairing::new`](super::Pairing::new) says: device, tolerance and patience in s.
-    Messages { device: Option<String>, tolerance: f64, patience: f64 },
-    /// The image's own matrix.
-    Image,
-}
-
-/// How a [`Network`] behaves.
-#[derive(Clone, Debug)]
-pub struct NetworkOptions {
-    pub client: client::ClientOptions,
-    pub poses: Poses,
-    pub freehand: freehand::CompoundingOptions,
-    /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
-    pub first: usize,
-    /// A sweep is given out so often, s, while frames come ...
-    pub update: f64,
-    /// ... or after so many frames.
-    pub frames: usize,
-    /// Largest volume, bytes as it is stored.
-    pub volume_bytes: usize,
-}
-
-impl Default for NetworkOptions {
-    fn default() -> NetworkOptions {
-        NetworkOptions {
-            client: client::ClientOptions::default(),
-            poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
-            freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
-            first: 100,
-            update: 0.5,
-            frames: 64,
-            volume_bytes: BODY_LIMIT,
-        }
-    }
-}
+const MAX_AT_ONCE: usize = 256;
 
 /// What comes from an OpenIGTLink server, which is connected to again whenever it is lost.
 ///
@@ -82,17 +40,17 @@ pub struct Network {
     /// Connections.
     lost: u64,
     faults: Faults,
-    whole: Option<Whole>,
-    sweep: Sweep,
+    whole: Option<CartesianVolume>,
+    sweep: FreehandSweep,
     volume_bytes: usize,
     /// Given with the last `Begin`.
     begun: Option<Header>,
-    giving: Option<Giving>,
+    output: Option<VolumeOutput>,
     volumes: u32,
 }
 
 /// A volume whose slices are given out.
-struct Giving {
+struct VolumeOutput {
     of_sweep: bool,
     begin: bool,
     volume: u32,
@@ -115,9 +73,9 @@ impl Network {
             faults: Faults::new(address),
             whole: None,
             volume_bytes: options.volume_bytes,
-            sweep: Sweep::new(options),
+            sweep: FreehandSweep::new(options),
             begun: None,
-            giving: None,
+            output: None,
             volumes: 0,
         })
     }
@@ -133,17 +91,17 @@ impl Network {
         let error = self.client.last_error();
         let why = error.as_deref().unwrap_or("no reason is known");
         let (known, faults) = (&self.known, &mut self.faults);
-        faults.note(Kind::Checksum, now.checksum_failures - known.checksum_failures, why);
-        faults.note(Kind::Malformed, now.malformed - known.malformed, why);
-        faults.note(Kind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
-        faults.note(Kind::Again, now.reconnects - known.reconnects, "");
+        faults.note(FaultKind::Checksum, now.checksum_failures - known.checksum_failures, why);
+        faults.note(FaultKind::Malformed, now.malformed - known.malformed, why);
+        faults.note(FaultKind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
+        faults.note(FaultKind::Again, now.reconnects - known.reconnects, "");
         // Every connection but the one that stands was lost, however short it was.
         self.connected |= now.connected || now.bytes > 0 || now.reconnects > 0;
         let lost = now.reconnects + u64::from(self.connected) - u64::from(now.connected);
-        faults.note(Kind::Lost, lost.saturating_sub(self.lost), why);
+        faults.note(FaultKind::Lost, lost.saturating_sub(self.lost), why);
         let is_told = lost > self.lost || error == self.last_error;
         if !now.connected && !is_told && error.is_some() {
-            faults.note(Kind::Unreachable, 1, why);
+            faults.note(FaultKind::Unreachable, 1, why);
         }
         (self.known, self.last_error, self.lost) = (now, error, lost);
     }
@@ -152,12 +110,12 @@ impl Network {
         match message {
             Message::Image(image) if image.size[2] > 1 => {
                 let time = (image.time > 0.0).then_some(image.time);
-                match Whole::take(&mut self.whole, image, self.volume_bytes) {
+                match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
                     Ok(replaced) => {
-                        self.faults.note(Kind::Samples, replaced, "they read as 0");
+                        self.faults.note(FaultKind::Samples, replaced, "they read as 0");
                         self.give(false, time);
                     }
-                    Err(fault) => self.faults.note(Kind::Image, 1, &fault),
+                    Err(fault) => self.faults.note(FaultKind::Image, 1, &fault),
                 }
             }
             other => self.sweep.take(other, &mut self.faults),
@@ -166,34 +124,34 @@ impl Network {
 
     /// Begins to give a volume out.
     fn give(&mut self, of_sweep: bool, time: Option<f64>) {
-        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(Whole::header) };
+        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
         let Some(header) = header else { return };
         if let Err((field, fault)) = header.check() {
-            return self.faults.note(Kind::Image, 1, &format!("{field} {fault}"));
+            return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
         }
         let begin = self.begun.as_ref() != Some(&header);
         self.begun = Some(header);
-        self.giving = Some(Giving { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time });
         self.volumes = self.volumes.wrapping_add(1);
     }
 
     /// What is next of the volume that is given out.
     fn given(&mut self) -> Option<Event> {
-        let giving = self.giving.as_mut()?;
-        if std::mem::take(&mut giving.begin) {
+        let output = self.output.as_mut()?;
+        if std::mem::take(&mut output.begin) {
             return self.begun.clone().map(|header| Event::Begin(Box::new(header)));
         }
-        let k = giving.next;
-        giving.next += 1;
-        let slice = match giving.of_sweep {
+        let k = output.next;
+        output.next += 1;
+        let slice = match output.of_sweep {
             true => self.sweep.slice(k),
             false => self.whole.as_ref().and_then(|whole| whole.slice(k)),
         };
         let Some(slice) = slice else {
-            self.giving = None;
+            self.output = None;
             return None;
         };
-        let (volume, time, bytes) = (giving.volume, giving.time, slice.to_vec());
+        let (volume, time, bytes) = (output.volume, output.time, slice.to_vec());
         Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
     }
 }
@@ -216,7 +174,7 @@ impl Live for Network {
             }
             let left = patience.saturating_sub(started.elapsed());
             // Poses alone may come without end.
-            if left.is_zero() && taken >= AT_ONCE {
+            if left.is_zero() && taken >= MAX_AT_ONCE {
                 return Event::Idle;
             }
             match self.client.next(left.min(POLL)) {

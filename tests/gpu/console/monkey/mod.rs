@@ -5,9 +5,9 @@ mod random_source;
 use super::*;
 use crate::common::own_process;
 use ash::vk;
-use echolume::gpu::faults::Seam;
+use echolume::gpu::faults::InjectionPoint;
 use echolume::ui::input::Phase;
-use echolume::ui::keys::KEYS;
+use echolume::ui::keys::KEY_BINDINGS;
 use echolume::ui::sliders::SLIDERS;
 use random_source::Wild;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -65,7 +65,7 @@ impl Monkey {
             (Device::watched(watched), Arc::new(AtomicBool::new(false)), Folder::new("monkey"));
         let last: Arc<Mutex<Vec<Receiver<Event>>>> = Arc::default();
         let (is_calm, sources, opened) = (calm.clone(), last.clone(), std::sync::atomic::AtomicU64::new(seed));
-        let open: Open = Arc::new(move || {
+        let open: OpenSource = Arc::new(move || {
             let n = opened.fetch_add(1, Ordering::Relaxed);
             match is_calm.load(Ordering::Relaxed) {
                 true => match sources.lock().expect("lock").pop() {
@@ -76,7 +76,7 @@ impl Monkey {
                 false => Ok(Box::new(Wild::new(n, is_calm.clone()))),
             }
         });
-        let options = Options {
+        let options = ConsoleOptions {
             retry: Some(Duration::from_millis(10)),
             budget: Some(Duration::from_millis(8)),
             folder: folder.0.clone(),
@@ -113,16 +113,16 @@ impl Monkey {
     fn input(&mut self) -> Input {
         let pressed = self.below(2) == 0;
         match self.below(14) {
-            0 => Input::Left,
+            0 => Input::FocusLost,
             1 => Input::Scroll(self.number()),
             2 | 3 => Input::Button { button: [Button::Left, Button::Right, Button::Middle][self.below(3)], pressed },
             4 => Input::Modifiers(Modifiers { shift: pressed, control: self.below(3) == 0, alt: self.below(9) == 0 }),
             5..=7 => {
-                let phase = [Phase::Down, Phase::Moved, Phase::Moved, Phase::Up, Phase::Gone][self.below(5)];
+                let phase = [Phase::Down, Phase::Moved, Phase::Moved, Phase::Up, Phase::Cancelled][self.below(5)];
                 Input::Touch { finger: self.below(4) as u64, phase, at: self.place() }
             }
             8..=10 => {
-                let bound = &KEYS[self.below(KEYS.len())];
+                let bound = &KEY_BINDINGS[self.below(KEY_BINDINGS.len())];
                 Input::Key { key: bound.key, pressed }
             }
             _ => Input::Moved(self.place()),
@@ -132,23 +132,23 @@ impl Monkey {
     fn command(&mut self) -> Command {
         let (a, b, c) = (self.number(), self.number(), self.number());
         match self.below(16) {
-            0 => Command::Turn([a, b]),
+            0 => Command::Rotate([a, b]),
             1 => Command::Roll(a),
             2 => Command::Zoom(a),
             3 => Command::Pan([a / 40.0, b / 40.0]),
-            4 => Command::Light([a / 40.0, b]),
-            5 => Command::Face(echolume::ui::command::Face { axis: self.below(5), high: a > 0.0 }, b),
-            6 => Command::Clip(a),
-            7 => Command::PlaneBy(a),
-            8 => Command::Meet([a, b, c]),
-            9 => Command::PlaneTurn([a, b]),
-            10 => Command::Slide(self.below(SLIDERS.len() + 2), a),
-            11 => Command::Nudge(self.below(SLIDERS.len() + 2), [i32::MIN, i32::MAX, -1, 1, 3][self.below(5)]),
-            12 => Command::Cine([i32::MIN, i32::MAX, -1, 1, 5][self.below(5)]),
-            13 => Command::CineAt([0, 1, 3, usize::MAX][self.below(4)]),
+            4 => Command::MoveLight([a / 40.0, b]),
+            5 => Command::MoveFace(echolume::ui::command::Face { axis: self.below(5), high: a > 0.0 }, b),
+            6 => Command::MoveClip(a),
+            7 => Command::StepPlane(a),
+            8 => Command::MoveCrossing([a, b, c]),
+            9 => Command::RotatePlanes([a, b]),
+            10 => Command::SetSlider(self.below(SLIDERS.len() + 2), a),
+            11 => Command::StepSlider(self.below(SLIDERS.len() + 2), [i32::MIN, i32::MAX, -1, 1, 3][self.below(5)]),
+            12 => Command::StepCine([i32::MIN, i32::MAX, -1, 1, 5][self.below(5)]),
+            13 => Command::SeekCine([0, 1, 3, usize::MAX][self.below(4)]),
             // Far from the edges, where pictures are of something.
             14 => Command::Reset,
-            _ => KEYS[self.below(KEYS.len())].what,
+            _ => KEY_BINDINGS[self.below(KEY_BINDINGS.len())].command,
         }
     }
 
@@ -163,16 +163,16 @@ impl Monkey {
             }
             4 => {
                 let n = self.below(30) as u32;
-                self.device.faults.inject(Seam::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+                self.device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
             }
             5 if self.below(4) == 0 => {
-                let (n, seam) = (self.below(6) as u32, [Seam::Submit, Seam::Wait][self.below(2)]);
+                let (n, seam) = (self.below(6) as u32, [InjectionPoint::Submit, InjectionPoint::Wait][self.below(2)]);
                 self.device.faults.inject(seam, n, vk::Result::ERROR_DEVICE_LOST);
             }
-            6 => self.desk.console.expose(),
+            6 => self.desk.console.redraw(),
             7..=30 => {
                 let command = self.command();
-                self.desk.console.command(&command, Instant::now());
+                self.desk.console.execute(&command, Instant::now());
             }
             _ => {
                 let input = self.input();
@@ -185,8 +185,8 @@ impl Monkey {
     }
 
     fn tick(&mut self, now: Instant) {
-        match self.desk.console.tick(now) {
-            Ok(next) => assert!(!next.exit && !next.renews),
+        match self.desk.console.update(now) {
+            Ok(next) => assert!(!next.exit && !next.restart),
             Err(ConsoleError::Screen(fault)) => panic!("there is no screen: {fault}"),
             Err(ConsoleError::DeviceLost(_)) => {
                 self.lost += 1;
@@ -201,14 +201,14 @@ impl Monkey {
 
     /// No failure is planned any more, the volume of a source of ours is shown as at the start, and drawn as by itself.
     fn rest(&mut self) {
-        self.device.faults.inject(Seam::Wait, u32::MAX, vk::Result::SUCCESS);
+        self.device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         self.calm.store(true, Ordering::Relaxed);
-        self.desk.console.input(&Input::Left);
+        self.desk.console.input(&Input::FocusLost);
         self.desk.console.input(&Input::Modifiers(Modifiers::default()));
-        self.desk.console.command(&Command::Reset, Instant::now());
-        self.desk.console.command(&Command::Tool(Tool::Turn), Instant::now());
+        self.desk.console.execute(&Command::Reset, Instant::now());
+        self.desk.console.execute(&Command::Tool(Tool::Rotate), Instant::now());
         if self.desk.console.stream().is_frozen() {
-            self.desk.console.command(&Command::Freeze, Instant::now());
+            self.desk.console.execute(&Command::Freeze, Instant::now());
         }
         self.desk.console.resize(SIZE);
         let (say, said) = channel();

@@ -1,0 +1,330 @@
+//! From what each operation touches to the barriers between them. One rule: where an operation conflicts with one that came
+//! before and no barrier lies between, a global memory barrier goes in front of it; nowhere else. The order is a ring: a
+//! tracker lives as long as its slots, so the end of one picture feeds the start of the next.
+
+use crate::passes::{DispatchArgs, Part, Pass, Slot};
+use crate::scene::Scene;
+use std::ops::Range;
+
+/// What a barrier orders accesses of. Volume images that take turns are told apart by their index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Resource {
+    Slot(Slot, u32),
+    /// The buffer that results come back in.
+    Readback,
+}
+
+/// Who touches it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PipelineStage {
+    Compute,
+    Copy,
+    Host,
+}
+
+/// A set of workers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct PipelineStages(u8);
+
+impl PipelineStages {
+    /// What runs on the device. The host is left out: making memory visible to it can cost a cache flush, so only a host
+    /// access asks for it.
+    pub const DEVICE: PipelineStages = PipelineStages(0b011);
+
+    pub fn has(self, worker: PipelineStage) -> bool {
+        self.0 & PipelineStages::from(worker).0 != 0
+    }
+
+    pub fn without(self, worker: PipelineStage) -> PipelineStages {
+        PipelineStages(self.0 & !PipelineStages::from(worker).0)
+    }
+
+    pub fn with(self, other: PipelineStages) -> PipelineStages {
+        PipelineStages(self.0 | other.0)
+    }
+}
+
+impl From<PipelineStage> for PipelineStages {
+    fn from(worker: PipelineStage) -> PipelineStages {
+        PipelineStages(1 << worker as u8)
+    }
+}
+
+/// One access of an operation: the parts are slices of a 3D image, layers of an array, or the one part of anything else.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Access {
+    pub resource: Resource,
+    pub parts: Range<u32>,
+    pub write: bool,
+    pub stage: PipelineStage,
+}
+
+/// A global memory barrier: everything `from` did so far is done and visible to whatever `to` does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Barrier {
+    pub from: PipelineStages,
+    pub to: PipelineStages,
+}
+
+impl Access {
+    pub fn of_slot(slot: Slot, image: u32, parts: Range<u32>, write: bool, stage: PipelineStage) -> Access {
+        Access { resource: Resource::Slot(slot, image), parts, write, stage }
+    }
+
+    /// Two accesses whose order matters. Slices of a 3D image are no sub-resources to Vulkan: two writers of different slices
+    /// may overlap, but a reader (who may filter across slices, and whose caches know no slices) and a writer may not.
+    pub fn conflicts(&self, later: &Access) -> bool {
+        if self.resource != later.resource || !(self.write || later.write) {
+            return false;
+        }
+        let overlap = self.parts.start < later.parts.end && later.parts.start < self.parts.end;
+        let is_volume = matches!(self.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume | Slot::TileRanges, _));
+        overlap || (is_volume && self.write != later.write)
+    }
+}
+
+/// What a dispatch of a pass touches.
+pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> {
+    let access = |bind: crate::passes::Bind, write| {
+        let parts = match bind.part {
+            Part::Whole => 0..bind.slot.shape(scene).parts(),
+            Part::Slice => args.slice..args.slice + 1,
+            Part::Layer => args.layer..args.layer + 1,
+            Part::Around(more) => {
+                let all = bind.slot.shape(scene).parts();
+                args.slice.saturating_sub(more)..(args.slice + args.slices + more).min(all)
+            }
+        };
+        let image = if bind.slot.is_multibuffered() { args.image } else { 0 };
+        Access::of_slot(bind.slot, image, parts, write, PipelineStage::Compute)
+    };
+    let reads = (pass.reads)(scene, args).into_iter().map(|b| access(b, false));
+    let writes = (pass.writes)(scene, args).into_iter().map(|b| access(b, true));
+    reads.chain(writes).collect()
+}
+
+/// Accesses that no barrier has covered yet.
+#[derive(Clone, Debug, Default)]
+pub struct BarrierTracker {
+    pending: Vec<(Access, PipelineStages)>,
+    /// Something that was recorded may never have run.
+    is_invalid: bool,
+}
+
+impl BarrierTracker {
+    /// The barrier that must come before an operation with these accesses, if any; the operation is then taken as recorded.
+    pub fn record(&mut self, accesses: &[Access]) -> Option<Barrier> {
+        let hazard = accesses.iter().any(|later| {
+            self.pending.iter().any(|(earlier, covered)| !covered.has(later.stage) && earlier.conflicts(later))
+        });
+        let barrier = (hazard || self.is_invalid).then(|| self.barrier(accesses));
+        for access in accesses {
+            self.add(access);
+        }
+        barrier
+    }
+
+    /// What was recorded last was not submitted, so its barriers do not count: the next operation waits for everything.
+    pub fn invalidate(&mut self) {
+        self.is_invalid = true;
+    }
+
+    fn barrier(&mut self, accesses: &[Access]) -> Barrier {
+        let to = accesses.iter().fold(PipelineStages::DEVICE, |to, a| to.with(a.stage.into()));
+        let before = if self.is_invalid { PipelineStages::DEVICE } else { PipelineStages::default() };
+        let from = self.pending.iter().fold(before, |from, (a, _)| from.with(a.stage.into()));
+        self.is_invalid = false;
+        for (_, covered) in &mut self.pending {
+            *covered = covered.with(to);
+        }
+        // Only the readback buffer is ever touched by the host while the device runs.
+        self.pending.retain(|(access, covered)| match access.resource {
+            Resource::Readback => !covered.has(PipelineStage::Host),
+            Resource::Slot(..) => false,
+        });
+        Barrier { from, to }
+    }
+
+    fn add(&mut self, access: &Access) {
+        let known = self.pending.iter().any(|(a, covered)| a == access && *covered == PipelineStages::default());
+        if !known {
+            self.pending.push((access.clone(), PipelineStages::default()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    type Operation = Vec<Access>;
+
+    /// A second opinion, with nothing in common with the tracker: every pair of conflicting operations must have a barrier
+    /// between them that goes from the first one's worker to the second one's.
+    fn uncovered(operations: &[Operation], barriers: &[Option<Barrier>]) -> Option<(usize, usize)> {
+        for (j, later) in operations.iter().enumerate() {
+            for (i, earlier) in operations[..j].iter().enumerate() {
+                for a in earlier {
+                    for b in later.iter().filter(|b| needs_order(a, b)) {
+                        let between = &barriers[i + 1..=j];
+                        if !between.iter().flatten().any(|barrier| barrier.from.has(a.stage) && barrier.to.has(b.stage))
+                        {
+                            return Some((i, j));
+                        }
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    fn needs_order(a: &Access, b: &Access) -> bool {
+        let shared = (0..64).any(|part| a.parts.contains(&part) && b.parts.contains(&part));
+        let is_volume = matches!(a.resource, Resource::Slot(Slot::Volume | Slot::SharpVolume, _));
+        let mixed = is_volume && a.write != b.write;
+        a.resource == b.resource && (a.write || b.write) && (shared || mixed)
+    }
+
+    fn derive(operations: &[Operation]) -> Vec<Option<Barrier>> {
+        let mut tracker = BarrierTracker::default();
+        operations.iter().map(|o| tracker.record(o)).collect()
+    }
+
+    fn operation() -> impl Strategy<Value = Operation> {
+        let device = (0usize..5, 0u32..2, 0u32..4, 1u32..3, any::<bool>());
+        let accesses = prop::collection::vec(device, 1..4);
+        (accesses, 0u8..8).prop_map(|(accesses, kind)| {
+            if kind == 0 {
+                return vec![Access {
+                    resource: Resource::Readback,
+                    parts: 0..1,
+                    write: false,
+                    stage: PipelineStage::Host,
+                }];
+            }
+            let stage = if kind < 3 { PipelineStage::Copy } else { PipelineStage::Compute };
+            accesses
+                .into_iter()
+                .map(|(slot, image, from, count, write)| {
+                    let resource = match slot {
+                        0 => Resource::Slot(Slot::Frames, 0),
+                        1 => Resource::Slot(Slot::Volume, image),
+                        2 => Resource::Slot(Slot::Picture, 0),
+                        3 => Resource::Slot(Slot::Distance, 0),
+                        _ => Resource::Readback,
+                    };
+                    let parts = if slot < 2 { from..from + count } else { 0..1 };
+                    Access { resource, parts, write: write || slot == 4, stage }
+                })
+                .collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn every_conflict_is_covered_and_every_barrier_covers_one(operations in prop::collection::vec(operation(), 1..24)) {
+            let barriers = derive(&operations);
+            prop_assert_eq!(uncovered(&operations, &barriers), None);
+            for dropped in 0..barriers.len() {
+                if barriers[dropped].is_some() {
+                    let mut without = barriers.clone();
+                    without[dropped] = None;
+                    prop_assert!(uncovered(&operations, &without).is_some(), "barrier {} is not needed", dropped);
+                }
+            }
+        }
+    }
+
+    /// Two volumes of frames and two pictures of a scene with every filter, as the renderer records them.
+    #[test]
+    fn every_barrier_of_a_real_plan_is_needed_and_none_is_missing() {
+        use crate::passes::{Frequency, PASSES};
+        use crate::probe::{Geometry, Grid};
+        let settings = "slices.median = true
+            slices.sigma = {}
+            slices.enhanced_sigma = { growth = true }
+            slices.perona_malik = { scheme = 'aos', repeat = 2 }
+            slices.smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 }
+            distance = { median = 3, bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 }, sigma = {} }
+            light = { shadow = {}, occlusion = {} }
+            post = { sigma = {}, enhanced_sigma = {}, perona_malik = { scheme = 'aos' } }";
+        let grid = Grid { size: [8, 8, 6], spacing: [1.0; 3], origin: [0.0; 3] };
+        let input = crate::scene::Input { stored: crate::source::StoredType::U8, range: [0.0, 255.0] };
+        let scene = Scene::new(Geometry::Cartesian(grid), input, toml::from_str(settings).unwrap()).unwrap();
+        let mut operations: Vec<Operation> = Vec::new();
+        let run = |frequency: Frequency, args: DispatchArgs, operations: &mut Vec<Operation>| {
+            for pass in PASSES.iter().filter(|p| p.frequency == frequency && p.is_needed(&scene)) {
+                for iteration in 0..(pass.repeat)(&scene) {
+                    operations.push(accesses(&scene, pass, &DispatchArgs { iteration, ..args }));
+                }
+            }
+        };
+        for image in 0..2 {
+            for slice in 0..6 {
+                let args = DispatchArgs { layer: slice % 4, slice, image, ..DispatchArgs::default() };
+                let layer = args.layer..args.layer + 1;
+                operations.push(vec![Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy)]);
+                run(Frequency::Frame, args, &mut operations);
+            }
+            run(
+                Frequency::Volume,
+                DispatchArgs { image, slices: scene.slices(), ..DispatchArgs::default() },
+                &mut operations,
+            );
+            run(Frequency::Picture, DispatchArgs { image, ..DispatchArgs::default() }, &mut operations);
+        }
+        let barriers = derive(&operations);
+        assert!(barriers.iter().flatten().count() > 40);
+        assert_eq!(uncovered(&operations, &barriers), None);
+        for dropped in (0..barriers.len()).filter(|n| barriers[*n].is_some()) {
+            let mut without = barriers.clone();
+            without[dropped] = None;
+            assert!(uncovered(&operations, &without).is_some(), "barrier {dropped} is not needed");
+        }
+    }
+
+    fn touch(slot: Slot, parts: Range<u32>, write: bool) -> Access {
+        Access::of_slot(slot, 0, parts, write, PipelineStage::Compute)
+    }
+
+    #[test]
+    fn two_slices_may_be_written_at_once_but_not_read_while_one_is_written() {
+        let mut tracker = BarrierTracker::default();
+        assert!(tracker.record(&[touch(Slot::Volume, 0..1, true)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Volume, 1..2, true)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Volume, 1..2, true)]).is_some(), "write after write, which layers miss");
+        assert!(tracker.record(&[touch(Slot::Volume, 3..4, false)]).is_some());
+    }
+
+    #[test]
+    fn after_a_failed_submission_the_next_operation_waits_for_everything() {
+        let mut tracker = BarrierTracker::default();
+        assert!(tracker.record(&[touch(Slot::Picture, 0..1, true)]).is_none());
+        tracker.invalidate();
+        let barrier = tracker.record(&[touch(Slot::Distance, 0..1, false)]).expect("a barrier");
+        assert_eq!((barrier.from, barrier.to), (PipelineStages::DEVICE, PipelineStages::DEVICE));
+        assert!(tracker.record(&[touch(Slot::Distance, 0..1, false)]).is_none());
+    }
+
+    #[test]
+    fn layers_of_an_array_do_not_wait_for_one_another() {
+        let mut tracker = BarrierTracker::default();
+        let copy = |layer: u32| Access::of_slot(Slot::Frames, 0, layer..layer + 1, true, PipelineStage::Copy);
+        assert!(tracker.record(&[copy(0)]).is_none());
+        assert!(tracker.record(&[copy(1)]).is_none());
+        assert!(tracker.record(&[touch(Slot::Frames, 0..1, false)]).is_some());
+        assert!(tracker.record(&[copy(2)]).is_none());
+        assert!(tracker.record(&[copy(0)]).is_some(), "write after read");
+    }
+
+    #[test]
+    fn volume_images_that_take_turns_are_independent() {
+        let mut tracker = BarrierTracker::default();
+        let on = |image, write| Access::of_slot(Slot::Volume, image, 0..4, write, PipelineStage::Compute);
+        assert!(tracker.record(&[on(0, true)]).is_none());
+        assert!(tracker.record(&[on(1, true)]).is_none());
+        assert!(tracker.record(&[on(0, false)]).is_some());
+        assert!(tracker.record(&[on(1, false)]).is_none(), "the barrier before covered both");
+    }
+}

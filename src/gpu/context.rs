@@ -1,0 +1,481 @@
+//! Instance, device, queues, memory allocator and validation messenger. Everything made from a context holds an `Arc` of it, and
+//! its `Drop` destroys them in order.
+
+use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
+use super::error::{ErrorContext, GpuError};
+use super::faults::{Faults, InjectionPoint};
+use super::window::target::Target;
+use crate::queues::MAX_QUEUES;
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::collections::{BTreeSet, HashMap};
+use std::ffi::{CStr, CString, c_void};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
+/// The first version of the layer whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559,
+/// September 2024).
+const TIMELINE_VALIDATION: u32 = vk::make_api_version(0, 1, 3, 297);
+
+/// Which device a [`Context`] uses, and how.
+#[derive(Clone, Debug)]
+pub struct ContextOptions {
+    pub device: DeviceChoice,
+    /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
+    pub validation: bool,
+}
+
+/// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
+pub struct Context {
+    /// The loader stays loaded as long as anything made from it lives.
+    #[cfg_attr(not(feature = "view"), expect(dead_code))]
+    pub(super) entry: ash::Entry,
+    pub(super) instance: ash::Instance,
+    /// For a context that presents pictures.
+    pub(super) presentation: Option<Presentation>,
+    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Box<Mutex<Vec<String>>>,
+    /// The validation layer handles waits for timeline semaphores.
+    layer_knows_timelines: bool,
+    pub candidate: Candidate,
+    pub limits: vk::PhysicalDeviceLimits,
+    pub device: ash::Device,
+    /// `None` if the device cannot push descriptors: they are then sets of a pool.
+    pub push_descriptor: Option<ash::khr::push_descriptor::Device>,
+    /// Reads the device's clock, if the device can.
+    clock: Option<ash::ext::calibrated_timestamps::Device>,
+    names: Option<ash::ext::debug_utils::Device>,
+    /// In the order of `candidate.queues`: rendering, ingestion, copies.
+    queues: Vec<Mutex<vk::Queue>>,
+    /// The queue families that share slots used on several queues.
+    pub queue_families: Vec<u32>,
+    /// Taken in `drop`, before the device is destroyed.
+    pub(super) allocator: Mutex<Option<Allocator>>,
+    formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
+    pub faults: Faults,
+    pub counts: Counts,
+}
+
+/// The extensions that present pictures.
+pub struct Presentation {
+    pub surfaces: ash::khr::surface::Instance,
+    pub swapchains: ash::khr::swapchain::Device,
+    /// If the target is a monitor.
+    pub displays: Option<ash::khr::display::Instance>,
+}
+
+/// Counts, since the start, of costly operations that must not happen for every frame.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Allocations of device memory.
+    pub allocations: AtomicU64,
+    pub pipelines: AtomicU64,
+    /// Pipelines that were compiled in the background.
+    pub async_pipelines: AtomicU64,
+    pub dispatches: AtomicU64,
+    /// Waits until the device is idle.
+    pub waits_idle: AtomicU64,
+}
+
+/// Loads Vulkan and lists the devices, for `echolume devices`.
+///
+/// # Errors
+/// No Vulkan loader or no driver.
+pub fn list() -> Result<Vec<Candidate>, GpuError> {
+    let entry = load()?;
+    let instance = create_instance(&entry, false, false, None)?;
+    let candidates = device_selection::candidates(&instance);
+    // SAFETY: nothing made from the instance is left.
+    unsafe { instance.destroy_instance(None) };
+    candidates
+}
+
+impl Context {
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// No Vulkan loader, no device, a device that lacks a required feature, or no validation layer although validation is requested.
+    pub fn new(options: &ContextOptions) -> Result<Arc<Context>, GpuError> {
+        Context::create(options, None)
+    }
+
+    /// Opens a device that can present on `target`.
+    ///
+    /// # Errors
+    /// As for [`Context::new`]; no device that can present there.
+    #[cfg(feature = "view")]
+    pub fn for_presentation(options: &ContextOptions, target: &Target) -> Result<Arc<Context>, GpuError> {
+        Context::create(options, Some(target))
+    }
+
+    fn create(options: &ContextOptions, target: Option<&Target>) -> Result<Arc<Context>, GpuError> {
+        let entry = load()?;
+        // SAFETY: only reads the list of layers.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION));
+        if options.validation && layer.is_none() {
+            return Err(GpuError::NoValidation);
+        }
+        let validates_timelines = layer.is_some_and(|l| l.spec_version >= TIMELINE_VALIDATION);
+        // SAFETY: only reads the list of extensions.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
+        let debug_utils = options.validation
+            || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
+        let instance = create_instance(&entry, options.validation, debug_utils, target)?;
+        // Also on failure, the loader stays loaded until the instance is destroyed.
+        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, validates_timelines, target);
+        if made.is_err() {
+            // SAFETY: `on_instance` leaves nothing alive when it fails.
+            unsafe { instance.destroy_instance(None) };
+        }
+        made
+    }
+
+    fn on_instance(
+        entry: ash::Entry,
+        instance: &ash::Instance,
+        options: &ContextOptions,
+        debug_utils: bool,
+        validates_timelines: bool,
+        target: Option<&Target>,
+    ) -> Result<Arc<Context>, GpuError> {
+        let mut candidates = device_selection::candidates(instance)?;
+        if let Some(target) = target {
+            candidates.iter_mut().for_each(|candidate| target.check_support(&entry, instance, candidate));
+        }
+        let candidate = candidates[device_selection::choose(&candidates, &options.device)?].clone();
+        let device = create_device(instance, &candidate, target.is_some())?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.clone(),
+            device: device.clone(),
+            physical_device: candidate.handle,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(e) => {
+                // SAFETY: nothing made from the device is left.
+                unsafe { device.destroy_device(None) };
+                return Err(GpuError::Memory { operation: "create allocator".into(), fault: e.to_string() });
+            }
+        };
+        let messages = Box::new(Mutex::new(Vec::new()));
+        let messenger = match options.validation {
+            false => None,
+            true => match create_messenger(&entry, instance, &messages) {
+                Ok(messenger) => Some(messenger),
+                Err(error) => {
+                    drop(allocator);
+                    // SAFETY: nothing made from the device is left.
+                    unsafe { device.destroy_device(None) };
+                    return Err(error);
+                }
+            },
+        };
+        let context = Arc::new(Context {
+            push_descriptor: (candidate.push_descriptors)
+                .then(|| ash::khr::push_descriptor::Device::new(instance, &device)),
+            clock: (candidate.calibrated_timestamps)
+                .then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
+            names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
+            queues: {
+                // SAFETY: the device was created with these queues.
+                let get = |q: &QueueInfo| unsafe { device.get_device_queue(q.family, q.index) };
+                candidate.queues.iter().map(|q| Mutex::new(get(q))).collect()
+            },
+            queue_families: candidate.queues.iter().map(|q| q.family).collect::<BTreeSet<_>>().into_iter().collect(),
+            limits: candidate.limits,
+            presentation: target.map(|target| Presentation {
+                surfaces: ash::khr::surface::Instance::new(&entry, instance),
+                swapchains: ash::khr::swapchain::Device::new(instance, &device),
+                displays: target.is_monitor().then(|| ash::khr::display::Instance::new(&entry, instance)),
+            }),
+            instance: instance.clone(),
+            entry,
+            messenger,
+            messages,
+            layer_knows_timelines: validates_timelines,
+            candidate,
+            device,
+            allocator: Mutex::new(Some(allocator)),
+            formats: Mutex::default(),
+            faults: Faults::default(),
+            counts: Counts::default(),
+        });
+        context.name(context.device.handle(), "device");
+        for (queue, name) in context.queues.iter().zip(["queue", "ingest queue", "transfer queue"]) {
+            context.name(*queue.lock().unwrap_or_else(|e| e.into_inner()), name);
+        }
+        tracing::info!("device '{}', driver {}", context.candidate.name, context.candidate.driver.trim());
+        Ok(context)
+    }
+
+    /// True if the validation layer is enabled.
+    pub fn has_validation(&self) -> bool {
+        self.messenger.is_some()
+    }
+
+    /// All validation messages so far. A correct program has none.
+    pub fn messages(&self) -> Vec<String> {
+        self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// True if hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline
+    /// of another; with a single queue that does not matter.
+    pub fn validates_timelines(&self) -> bool {
+        self.layer_knows_timelines || self.queue_count() == 1
+    }
+
+    /// Bytes of device memory in use.
+    pub fn allocated(&self) -> u64 {
+        let allocator = self.allocator.lock().unwrap_or_else(|e| e.into_inner());
+        allocator.as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
+    }
+
+    /// Total bytes of the device's own memory.
+    pub fn memory(&self) -> u64 {
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        let there = unsafe { self.instance.get_physical_device_memory_properties(self.candidate.handle) };
+        let own = there.memory_heaps_as_slice().iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+        own.map(|heap| heap.size).sum()
+    }
+
+    /// A time stamp of the device, and the time at which the host read it; `None` if the device's clock cannot be read.
+    pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
+        let clock = self.clock.as_ref()?;
+        let info = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let before = Instant::now();
+        // SAFETY: the extension is enabled; the device's own domain is always among its domains.
+        let (ticks, _) = unsafe { clock.get_calibrated_timestamps(&info) }.ok()?;
+        Some((*ticks.first()?, before + before.elapsed() / 2))
+    }
+
+    /// Features of a format with optimal tiling.
+    pub fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        let mut known = self.formats.lock().unwrap_or_else(|e| e.into_inner());
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        let query = || unsafe { self.instance.get_physical_device_format_properties(self.candidate.handle, format) };
+        *known.entry(format).or_insert_with(|| query().optimal_tiling_features)
+    }
+
+    /// Fault injection: from now on a format has these features.
+    pub(super) fn override_features(&mut self, format: vk::Format, features: vk::FormatFeatureFlags) {
+        self.formats.lock().unwrap_or_else(|e| e.into_inner()).insert(format, features);
+    }
+
+    /// Names an object in captures and validation messages.
+    pub(super) fn name<T: vk::Handle>(&self, object: T, name: &str) {
+        let Some(names) = &self.names else { return };
+        let Ok(name) = CString::new(name) else { return };
+        let naming = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object is alive and the name outlives the call. A name that cannot be set is not worth an error.
+        let _ = unsafe { names.set_debug_utils_object_name(&naming) };
+    }
+
+    pub(super) fn begin_label(&self, commands: vk::CommandBuffer, label: &str) {
+        let Some(names) = &self.names else { return };
+        let Ok(label) = CString::new(label) else { return };
+        // SAFETY: the command buffer is being recorded; the label outlives the call.
+        unsafe { names.cmd_begin_debug_utils_label(commands, &vk::DebugUtilsLabelEXT::default().label_name(&label)) };
+    }
+
+    pub(super) fn end_label(&self, commands: vk::CommandBuffer) {
+        if let Some(names) = &self.names {
+            // SAFETY: ends the label that `begin_label` began on the same command buffer.
+            unsafe { names.cmd_end_debug_utils_label(commands) };
+        }
+    }
+
+    /// The queue for this role; with fewer queues on the device than roles, several roles share the last one.
+    pub fn queue(&self, number: usize) -> QueueInfo {
+        self.candidate.queues[number.min(self.queues.len() - 1)]
+    }
+
+    /// Number of queues in use: 1..=3.
+    pub fn queue_count(&self) -> usize {
+        self.queues.len()
+    }
+
+    /// Submits to a queue. `done` is a fence to signal at completion, or null.
+    pub(super) fn submit(
+        &self,
+        queue: usize,
+        submit: &vk::SubmitInfo2,
+        done: vk::Fence,
+        operation: impl FnOnce() -> String,
+    ) -> Result<(), GpuError> {
+        self.faults
+            .check(InjectionPoint::Submit)
+            .and_then(|()| {
+                let queue = &self.queues[queue.min(self.queues.len() - 1)];
+                let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
+                // SAFETY: the lock keeps the queue to one thread; the command buffer in `submit` is recorded and what it names is
+                // alive until the timeline says it is done.
+                unsafe { self.device.queue_submit2(*queue, &[*submit], done) }
+            })
+            .context(operation)
+    }
+
+    /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].
+    #[cfg(feature = "view")]
+    pub(super) fn on_queue<T>(&self, work: impl FnOnce(vk::Queue) -> T) -> T {
+        work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
+    }
+
+    pub(super) fn wait_idle(&self) {
+        self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
+        let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+        // SAFETY: the locks keep every queue of the device to this thread.
+        let _ = unsafe { self.device.device_wait_idle() };
+    }
+
+    /// The limits of an image of this format, type and usage.
+    ///
+    /// # Errors
+    /// A combination that the device does not support.
+    pub fn image_limits(
+        &self,
+        format: vk::Format,
+        kind: vk::ImageType,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<vk::ImageFormatProperties, GpuError> {
+        let (device, tiling) = (self.candidate.handle, vk::ImageTiling::OPTIMAL);
+        let none = vk::ImageCreateFlags::empty();
+        // SAFETY: the handle belongs to this instance; the call only reads.
+        unsafe { self.instance.get_physical_device_image_format_properties(device, format, kind, tiling, usage, none) }
+            .context(|| format!("use {format:?} as {usage:?}"))
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: everything made from this context held an `Arc` of it and is gone. The order is the one of creation reversed.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
+            self.device.destroy_device(None);
+            if let Some((debug, messenger)) = self.messenger.take() {
+                debug.destroy_debug_utils_messenger(messenger, None);
+            }
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+fn load() -> Result<ash::Entry, GpuError> {
+    // SAFETY: loading libvulkan runs its initialisers; it is the system's own Vulkan loader.
+    unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))
+}
+
+/// `target`: where pictures will be presented, if anywhere.
+fn create_instance(
+    entry: &ash::Entry,
+    validation: bool,
+    debug_utils: bool,
+    target: Option<&Target>,
+) -> Result<ash::Instance, GpuError> {
+    let application = vk::ApplicationInfo::default()
+        .application_name(c"echolume")
+        .engine_name(c"echolume")
+        .api_version(vk::API_VERSION_1_3);
+    let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
+    let mut extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
+    // The layer itself provides this extension.
+    extensions.extend(validation.then_some(ash::ext::validation_features::NAME.as_ptr()));
+    if let Some(target) = target {
+        extensions.extend(target.extensions(entry)?.iter().map(|name| name.as_ptr()));
+    }
+    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let mut create = vk::InstanceCreateInfo::default()
+        .application_info(&application)
+        .enabled_layer_names(&layers)
+        .enabled_extension_names(&extensions);
+    if validation {
+        create = create.push_next(&mut features);
+    }
+    // SAFETY: every pointer in `create` outlives the call.
+    let instance = unsafe { entry.create_instance(&create, None) };
+    match instance {
+        // The loader returns this if no driver is installed.
+        Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(GpuError::NoDevice),
+        other => other.context(|| "create instance".into()),
+    }
+}
+
+/// `shows`: the device will present pictures with panels drawn over them.
+fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -> Result<ash::Device, GpuError> {
+    let priorities = [1.0; MAX_QUEUES];
+    let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
+    let queues: Vec<_> = families
+        .into_iter()
+        .map(|family| {
+            let count = candidate.queues.iter().filter(|q| q.family == family).count();
+            vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities[..count])
+        })
+        .collect();
+    let mut extensions = Vec::new();
+    extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
+    extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
+    extensions.extend(shows.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    let core = vk::PhysicalDeviceFeatures::default()
+        .pipeline_statistics_query(candidate.pipeline_statistics)
+        .shader_storage_image_extended_formats(true)
+        .shader_storage_image_write_without_format(true);
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default()
+        .scalar_block_layout(true)
+        .timeline_semaphore(true)
+        .host_query_reset(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .maintenance4(true)
+        .dynamic_rendering(shows);
+    let create = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .enabled_features(&core)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
+    unsafe { instance.create_device(candidate.handle, &create, None) }
+        .context(|| format!("create device '{}'", candidate.name))
+}
+
+fn create_messenger(
+    entry: &ash::Entry,
+    instance: &ash::Instance,
+    messages: &Mutex<Vec<String>>,
+) -> Result<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT), GpuError> {
+    let debug = ash::ext::debug_utils::Instance::new(entry, instance);
+    let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+        // Not PERFORMANCE: it recommends transfer layouts, but images stay in GENERAL by design.
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+        .pfn_user_callback(Some(on_message))
+        .user_data(std::ptr::from_ref(messages).cast_mut().cast());
+    // SAFETY: `messages` is boxed in the context and dropped after the messenger.
+    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) };
+    messenger.map(|m| (debug, m)).context(|| "create messenger".into())
+}
+
+unsafe extern "system" fn on_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    if data.is_null() || messages.is_null() {
+        return vk::FALSE;
+    }
+    // SAFETY: Vulkan hands over valid data, and `messages` is the context's boxed mutex, which outlives the messenger.
+    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
+    // SAFETY: a message is null or a terminated string.
+    let text = unsafe { data.message_as_c_str() }.map_or(String::new(), |m| m.to_string_lossy().into_owned());
+    tracing::error!(target: "validation", "{text}");
+    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
+    vk::FALSE
+}

@@ -1,0 +1,344 @@
+//! Device selection: the properties of each device, what it lacks, and which one is used.
+
+use super::error::GpuError;
+use ash::vk;
+use std::borrow::Cow;
+use std::ffi::CStr;
+
+/// The device that a user asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The best device that lacks no required feature.
+    Best,
+    /// By its number in `echolume devices`.
+    Number(usize),
+    /// By a part of its name, ignoring case.
+    Name(String),
+}
+
+impl std::str::FromStr for DeviceChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<DeviceChoice, Self::Err> {
+        Ok(text.parse().map_or_else(|_| DeviceChoice::Name(text.to_string()), DeviceChoice::Number))
+    }
+}
+
+/// A physical device.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    pub handle: vk::PhysicalDevice,
+    pub name: String,
+    pub kind: vk::PhysicalDeviceType,
+    pub driver: String,
+    pub version: u32,
+    /// Required features that the device lacks.
+    pub missing: Vec<Cow<'static, str>>,
+    /// Optional features that the device lacks, with the consequence.
+    pub missing_optional: Vec<&'static str>,
+    /// The queues to use: the first renders, the second (if any) ingests frames, the third (if any) copies them.
+    pub queues: Vec<QueueInfo>,
+    /// Time stamps can be converted to the host's clock.
+    pub calibrated_timestamps: bool,
+    /// Supports push descriptors.
+    pub push_descriptors: bool,
+    /// Can count shader invocations.
+    pub pipeline_statistics: bool,
+    /// Can present pictures, with panels drawn over them.
+    pub can_present: bool,
+    pub limits: vk::PhysicalDeviceLimits,
+    /// The smaller of the largest allocation and the largest buffer, bytes.
+    pub max_bytes: u64,
+}
+
+/// A queue of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QueueInfo {
+    pub family: u32,
+    /// Within its family.
+    pub index: u32,
+    /// Valid bits of its time stamps; 0 without time stamps.
+    pub valid_bits: u32,
+    pub computes: bool,
+    pub draws: bool,
+    /// True if it can copy single slices of a 3D image; otherwise only complete images.
+    pub copies_slices: bool,
+}
+
+impl Candidate {
+    pub fn is_software(&self) -> bool {
+        self.kind == vk::PhysicalDeviceType::CPU
+    }
+
+    /// True if it shares the machine's memory.
+    pub fn has_unified_memory(&self) -> bool {
+        self.is_software() || self.kind == vk::PhysicalDeviceType::INTEGRATED_GPU
+    }
+
+    /// Valid bits of the time stamps of the rendering queue; 0 without time stamps.
+    pub fn valid_bits(&self) -> u32 {
+        self.queues.first().map_or(0, |q| q.valid_bits)
+    }
+
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => "discrete GPU",
+            vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated GPU",
+            vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual GPU",
+            vk::PhysicalDeviceType::CPU => "software",
+            _ => "other",
+        }
+    }
+
+    fn rank(&self) -> u32 {
+        match self.kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => 0,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => 1,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => 2,
+            vk::PhysicalDeviceType::CPU => 4,
+            _ => 3,
+        }
+    }
+
+    pub fn api_version(&self) -> String {
+        let v = self.version;
+        format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v))
+    }
+}
+
+/// Every device of an instance, in the driver's order.
+pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
+    // SAFETY: the instance is alive; the call only reads.
+    let handles = unsafe { instance.enumerate_physical_devices() }
+        .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;
+    Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
+}
+
+fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut properties =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut v11).push_next(&mut v13);
+    // SAFETY: `handle` comes from this instance; the chain is on the stack and outlives the call.
+    unsafe { instance.get_physical_device_properties2(handle, &mut properties) };
+    let properties = properties.properties;
+    let text = |c: Result<&CStr, _>| c.map(|c| c.to_string_lossy().into_owned()).unwrap_or_default();
+
+    // SAFETY: as above; both calls only read.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
+    // SAFETY: as above.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }.unwrap_or_default();
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+
+    let mut can_present = has(ash::khr::swapchain::NAME);
+    let mut missing = Vec::new();
+    let mut need = |there: bool, name: &'static str| (!there).then(|| missing.push(name.into()));
+    need(properties.api_version >= vk::API_VERSION_1_3, "Vulkan 1.3");
+    if properties.api_version >= vk::API_VERSION_1_3 {
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+        // SAFETY: as above.
+        unsafe { instance.get_physical_device_features2(handle, &mut features) };
+        let core = features.features;
+        need(core.shader_storage_image_extended_formats == vk::TRUE, "shaderStorageImageExtendedFormats");
+        need(core.shader_storage_image_write_without_format == vk::TRUE, "shaderStorageImageWriteWithoutFormat");
+        need(v12.scalar_block_layout == vk::TRUE, "scalarBlockLayout");
+        need(v12.timeline_semaphore == vk::TRUE, "timelineSemaphore");
+        need(v12.host_query_reset == vk::TRUE, "hostQueryReset");
+        need(v13.synchronization2 == vk::TRUE, "synchronization2");
+        need(v13.maintenance4 == vk::TRUE, "maintenance4");
+        can_present &= v13.dynamic_rendering == vk::TRUE;
+    }
+    let queues = queues(&families);
+    need(!queues.is_empty(), "a compute queue");
+    let valid_bits = queues.first().map_or(0, |q| q.valid_bits);
+    let mut missing_optional = Vec::new();
+    match queues.len() {
+        0 | 1 => missing_optional
+            .push("an asynchronous compute queue: frames are converted between pictures, not in parallel with them"),
+        2 => missing_optional.push("a transfer queue: frames are copied on the queue that converts them"),
+        _ => {}
+    }
+    if valid_bits == 0 {
+        missing_optional.push("time stamps: no times are printed");
+    }
+    let calibrated_timestamps = valid_bits > 0 && has(ash::ext::calibrated_timestamps::NAME);
+    if !calibrated_timestamps {
+        missing_optional
+            .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
+    }
+    let push_descriptors = has(ash::khr::push_descriptor::NAME);
+    if !push_descriptors {
+        missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
+    }
+    // SAFETY: as above.
+    let pipeline_statistics =
+        unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
+    if !pipeline_statistics {
+        missing_optional.push("pipelineStatisticsQuery: invocations are not counted");
+    }
+    if !can_present {
+        missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
+    }
+    if !has(ash::ext::memory_budget::NAME) {
+        missing_optional.push("VK_EXT_memory_budget");
+    }
+    Candidate {
+        handle,
+        name: text(properties.device_name_as_c_str()),
+        kind: properties.device_type,
+        driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+        version: properties.api_version,
+        missing,
+        missing_optional,
+        queues,
+        calibrated_timestamps,
+        push_descriptors,
+        pipeline_statistics,
+        can_present,
+        limits: properties.limits,
+        // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
+        max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
+    }
+}
+
+/// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
+/// without graphics; and one for transfers only.
+fn queues(families: &[vk::QueueFamilyProperties]) -> Vec<QueueInfo> {
+    let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
+    let of = |family: usize, index: u32| QueueInfo {
+        family: family as u32,
+        index,
+        valid_bits: families[family].timestamp_valid_bits,
+        computes: families[family].queue_flags.contains(compute),
+        draws: families[family].queue_flags.contains(graphics),
+        copies_slices: families[family].min_image_transfer_granularity.depth == 1
+            && families[family].min_image_transfer_granularity.width == 1
+            && families[family].min_image_transfer_granularity.height == 1,
+    };
+    let find =
+        |fits: &dyn Fn(&vk::QueueFamilyProperties) -> bool| families.iter().position(|f| f.queue_count > 0 && fits(f));
+    let first = find(&|f| f.queue_flags.contains(graphics | compute)).or(find(&|f| f.queue_flags.contains(compute)));
+    let Some(first) = first else { return Vec::new() };
+    let mut queues = vec![of(first, 0)];
+    let only_computes =
+        |f: &vk::QueueFamilyProperties| f.queue_flags.contains(compute) && !f.queue_flags.contains(graphics);
+    match find(&only_computes).filter(|f| *f != first) {
+        Some(family) => queues.push(of(family, 0)),
+        None if families[first].queue_count > 1 => queues.push(of(first, 1)),
+        None => return queues,
+    }
+    let only_copies = |f: &vk::QueueFamilyProperties| {
+        f.queue_flags.contains(vk::QueueFlags::TRANSFER) && !f.queue_flags.intersects(graphics | compute)
+    };
+    queues.extend(find(&only_copies).map(|family| of(family, 0)));
+    queues
+}
+
+/// The index of the chosen device.
+///
+/// # Errors
+/// No such device, or one that lacks a required feature.
+pub fn choose(candidates: &[Candidate], choice: &DeviceChoice) -> Result<usize, GpuError> {
+    let names = || candidates.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect::<Vec<_>>().join(", ");
+    if candidates.is_empty() {
+        return Err(GpuError::NoDevice);
+    }
+    let missing = |wanted: String| GpuError::NoSuchDevice { wanted, there: names() };
+    let index = match choice {
+        DeviceChoice::Number(n) => (*n < candidates.len()).then_some(*n).ok_or_else(|| missing(n.to_string()))?,
+        DeviceChoice::Name(name) => {
+            let part = name.to_lowercase();
+            let found = candidates.iter().position(|c| !part.is_empty() && c.name.to_lowercase().contains(&part));
+            found.ok_or_else(|| missing(name.clone()))?
+        }
+        DeviceChoice::Best => {
+            let fitting = candidates.iter().enumerate().filter(|(_, c)| c.missing.is_empty());
+            let best = fitting.min_by_key(|(_, c)| c.rank()).map(|(i, _)| i);
+            best.ok_or_else(|| GpuError::NoneFits(all_lacks(candidates)))?
+        }
+    };
+    match candidates[index].missing.is_empty() {
+        true => Ok(index),
+        false => Err(GpuError::NoneFits(all_lacks(&candidates[index..=index]))),
+    }
+}
+
+fn all_lacks(candidates: &[Candidate]) -> String {
+    candidates.iter().map(|c| format!("{} lacks {}", c.name, c.missing.join(", "))).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(name: &str, kind: vk::PhysicalDeviceType, lacks: Vec<&'static str>) -> Candidate {
+        Candidate {
+            handle: vk::PhysicalDevice::null(),
+            name: name.into(),
+            kind,
+            driver: String::new(),
+            version: vk::API_VERSION_1_3,
+            missing: lacks.into_iter().map(Cow::from).collect(),
+            missing_optional: vec![],
+            queues: vec![],
+            calibrated_timestamps: true,
+            push_descriptors: true,
+            pipeline_statistics: true,
+            can_present: true,
+            limits: vk::PhysicalDeviceLimits::default(),
+            max_bytes: u64::MAX,
+        }
+    }
+
+    #[test]
+    fn the_best_device_is_a_complete_gpu_and_software_comes_last() {
+        let devices = [
+            device("llvmpipe", vk::PhysicalDeviceType::CPU, vec![]),
+            device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"]),
+            device("Small", vk::PhysicalDeviceType::INTEGRATED_GPU, vec![]),
+        ];
+        assert_eq!(choose(&devices, &DeviceChoice::Best).ok(), Some(2));
+        assert_eq!(choose(&devices[..2], &DeviceChoice::Best).ok(), Some(0));
+        assert_eq!(choose(&devices, &DeviceChoice::Name("PIPE".into())).ok(), Some(0));
+    }
+
+    fn family(flags: vk::QueueFlags, queue_count: u32, depth: u32) -> vk::QueueFamilyProperties {
+        let min_image_transfer_granularity = vk::Extent3D { width: depth, height: depth, depth };
+        vk::QueueFamilyProperties {
+            queue_flags: flags,
+            queue_count,
+            timestamp_valid_bits: 64,
+            min_image_transfer_granularity,
+        }
+    }
+
+    /// A single queue (lavapipe); several queues in one family (Intel); separate families (NVIDIA, AMD), where the transfer family
+    /// may only copy complete images.
+    #[test]
+    fn one_queue_is_used_for_each_role_that_the_device_has_a_queue_for() {
+        use vk::QueueFlags as Q;
+        let all = Q::GRAPHICS | Q::COMPUTE | Q::TRANSFER;
+        let families = |list: &[vk::QueueFamilyProperties]| -> Vec<(u32, u32)> {
+            queues(list).iter().map(|q| (q.family, q.index)).collect()
+        };
+        assert_eq!(families(&[family(all, 1, 1)]), [(0, 0)]);
+        assert_eq!(families(&[family(all, 2, 1)]), [(0, 0), (0, 1)]);
+        let own = [family(all, 16, 1), family(Q::TRANSFER, 2, 0), family(Q::COMPUTE | Q::TRANSFER, 8, 1)];
+        assert_eq!(families(&own), [(0, 0), (2, 0), (1, 0)]);
+        assert_eq!(queues(&own).iter().map(|q| q.copies_slices).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(families(&[family(Q::TRANSFER, 1, 1), family(Q::COMPUTE, 1, 1)]), [(1, 0)]);
+        assert_eq!(families(&[family(Q::TRANSFER, 1, 1)]), []);
+    }
+
+    #[test]
+    fn an_error_names_the_missing_feature_or_the_devices() {
+        let devices = [device("Old", vk::PhysicalDeviceType::DISCRETE_GPU, vec!["maintenance4"])];
+        assert!(choose(&devices, &DeviceChoice::Best).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(0)).unwrap_err().to_string().contains("maintenance4"));
+        assert!(choose(&devices, &DeviceChoice::Number(7)).unwrap_err().to_string().contains("0 Old"));
+        assert!(matches!(choose(&[], &DeviceChoice::Best), Err(GpuError::NoDevice)));
+    }
+}

@@ -1,0 +1,241 @@
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants.
+
+use super::context::Context;
+use super::error::{ErrorContext, GpuError};
+use super::formats::{self, TexelAccess};
+use super::resources::has_texels;
+use crate::passes::slots::{Format, Shape};
+use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::spirv::{self, Kind, Module};
+use ash::vk;
+use std::collections::{HashMap, HashSet};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+/// A compute pipeline and its layout.
+pub struct Pipeline {
+    context: Arc<Context>,
+    pub module: Module,
+    pub set_layout: vk::DescriptorSetLayout,
+    pub layout: vk::PipelineLayout,
+    pub handle: vk::Pipeline,
+}
+
+/// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
+pub(super) type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+
+/// Returns the SPIR-V words of a shader by name.
+pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
+
+/// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
+pub struct Pipelines {
+    pub(super) context: Arc<Context>,
+    made: Mutex<HashMap<Key, Arc<Pipeline>>>,
+    shaders: Arc<Shaders>,
+    texel_access: TexelAccess,
+    sampler: vk::Sampler,
+}
+
+/// The embedded shaders.
+pub fn embedded() -> Arc<Shaders> {
+    Arc::new(|name| {
+        spirv::embedded(name).map(spirv::words).ok_or_else(|| "is not embedded; run tools/shaders".to_string())
+    })
+}
+
+pub fn descriptor_type(kind: Kind) -> vk::DescriptorType {
+    match kind {
+        Kind::Params => vk::DescriptorType::UNIFORM_BUFFER,
+        Kind::Sampled => vk::DescriptorType::SAMPLED_IMAGE,
+        Kind::Filtered => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+        Kind::Storage => vk::DescriptorType::STORAGE_IMAGE,
+        Kind::Buffer => vk::DescriptorType::STORAGE_BUFFER,
+        Kind::Texels(_) => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
+    }
+}
+
+impl Pipelines {
+    pub fn new(
+        context: &Arc<Context>,
+        shaders: Arc<Shaders>,
+        texel_access: TexelAccess,
+    ) -> Result<Pipelines, GpuError> {
+        let create = vk::SamplerCreateInfo::default()
+            .mag_filter(context.faults.filter())
+            .min_filter(context.faults.filter())
+            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
+        // SAFETY: the create structure is complete.
+        let sampler = unsafe { context.device.create_sampler(&create, None) }.context(|| "create sampler".into())?;
+        context.name(sampler, "trilinear");
+        Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, texel_access, sampler })
+    }
+
+    pub(super) fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
+        let formats = (pass.reads)(scene, args).iter().map(|b| b.slot.format(scene)).collect();
+        ((pass.shader)(scene, args), (pass.constants)(scene, args), formats)
+    }
+
+    pub(super) fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
+    }
+
+    /// The pipeline of a pass in a scene, compiled at its first use.
+    ///
+    /// # Errors
+    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    pub fn get(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
+        let key = Pipelines::key(pass, scene, args);
+        if let Some(pipeline) = self.cached(&key) {
+            return Ok(pipeline);
+        }
+        let pipeline = self.make(&key, pass, scene, args)?;
+        // Another thread may have made the same pipeline meanwhile; either can be used.
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
+        Ok(pipeline)
+    }
+
+    /// Compiles the pipelines of a plan again that use `shaders`, and forgets all others that do. Returns the pipelines of the plan, by
+    /// step. The device must have finished with the previous pipelines, and no other thread may compile any.
+    ///
+    /// # Errors
+    /// As of [`Pipelines::get`]; the previous pipelines stay.
+    pub(super) fn recompile(
+        &self,
+        shaders: &HashSet<String>,
+        plan: &Plan,
+        scene: &Scene,
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        made.retain(|key, _| !shaders.contains(key.0));
+        let mut steps = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            let args = step.args();
+            let key = Pipelines::key(step.pass, scene, &args);
+            let pipeline = match made.get(&key) {
+                Some(pipeline) => pipeline.clone(),
+                None => self.make(&key, step.pass, scene, &args)?,
+            };
+            made.insert(key, pipeline.clone());
+            steps.push(pipeline);
+        }
+        *self.made.lock().unwrap_or_else(|e| e.into_inner()) = made;
+        Ok(steps)
+    }
+
+    fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
+        let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
+        let words = (self.shaders)(key.0).map_err(at_fault)?;
+        let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
+        if self.texel_access == TexelAccess::Storage {
+            let stores = |slot: Slot| match slot.shape(scene) {
+                Shape::Buffer(bytes) => has_texels(&self.context, bytes.into()),
+                _ => formats::usage(&self.context, slot).contains(vk::ImageUsageFlags::STORAGE),
+            };
+            words = interface_check::for_cpu(pass, scene, args, &words, stores).map_err(at_fault)?;
+        }
+        self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
+        let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
+        interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
+        let constants = self.context.faults.constants(pass.name, &key.1);
+        Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module).map(Arc::new)
+    }
+}
+
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).clear();
+        // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
+        unsafe { self.context.device.destroy_sampler(self.sampler, None) };
+    }
+}
+
+impl Pipeline {
+    fn new(
+        context: &Arc<Context>,
+        sampler: vk::Sampler,
+        name: &'static str,
+        constants: &[(&'static str, i32)],
+        words: &[u32],
+        module: Module,
+    ) -> Result<Pipeline, GpuError> {
+        let device = &context.device;
+        let operation = || format!("create pipeline '{name}'");
+        let samplers = [sampler];
+        let bindings: Vec<_> = module
+            .bindings
+            .iter()
+            .map(|b| {
+                let binding = vk::DescriptorSetLayoutBinding::default()
+                    .binding(b.binding)
+                    .descriptor_type(descriptor_type(b.kind))
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE);
+                if b.kind == Kind::Filtered { binding.immutable_samplers(&samplers) } else { binding }
+            })
+            .collect();
+        let flags = match context.push_descriptor {
+            Some(_) => vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR,
+            None => vk::DescriptorSetLayoutCreateFlags::empty(),
+        };
+        let create = vk::DescriptorSetLayoutCreateInfo::default().flags(flags).bindings(&bindings);
+        // SAFETY: the structures are complete and outlive the calls; a failure below drops `pipeline`, which frees what is made.
+        let set_layout = unsafe { device.create_descriptor_set_layout(&create, None) }.context(operation)?;
+        let mut pipeline = Pipeline {
+            context: context.clone(),
+            module,
+            set_layout,
+            layout: vk::PipelineLayout::null(),
+            handle: vk::Pipeline::null(),
+        };
+        let layouts = [set_layout];
+        let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
+        // SAFETY: as above.
+        pipeline.layout = unsafe { device.create_pipeline_layout(&create, None) }.context(operation)?;
+        context.name(set_layout, name);
+        context.name(pipeline.layout, name);
+        // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
+        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
+            .context(operation)?;
+        context.name(shader, name);
+        let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
+            .filter_map(|c| constants.iter().find(|(name, _)| *name == c.name).map(|(_, value)| (c.id, *value)))
+            .collect();
+        let entries: Vec<_> = values
+            .iter()
+            .enumerate()
+            .map(|(i, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * i as u32, size: 4 })
+            .collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|(_, value)| value.to_ne_bytes()).collect();
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&bytes);
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(shader)
+            .name(c"main")
+            .specialization_info(&specialization);
+        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
+        // SAFETY: as above; the shader module is alive until after the call.
+        let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
+        context.counts.pipelines.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: a shader module may be destroyed once its pipelines are made.
+        unsafe { device.destroy_shader_module(shader, None) };
+        pipeline.handle = made.map_err(|(_, result)| result).context(operation)?[0];
+        context.name(pipeline.handle, name);
+        tracing::debug!("pipeline '{name}' {constants:?}");
+        Ok(pipeline)
+    }
+}
+
+impl Drop for Pipeline {
+    fn drop(&mut self) {
+        // SAFETY: whoever drops the last reference has waited for the device; null handles are allowed.
+        unsafe {
+            self.context.device.destroy_pipeline(self.handle, None);
+            self.context.device.destroy_pipeline_layout(self.layout, None);
+            self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}

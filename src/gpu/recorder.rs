@@ -1,0 +1,457 @@
+//! One command buffer: operations with the barriers they need, labels, time stamps, and their parameters.
+
+use super::barrier_recorder::BarrierRecorder;
+use super::context::Context;
+use super::descriptor_sets::DescriptorSets;
+use super::error::{ErrorContext, GpuError};
+use super::formats;
+use super::pipelines::{Pipeline, descriptor_type};
+use super::resources::{Buffer, Image, Purpose, WHOLE};
+use super::slots::{Resource, Slots};
+use super::timeline::Timelines;
+use super::timing::{Stamps, Timings};
+use crate::barriers::{self, Access, PipelineStage};
+use crate::passes::slots::Shape;
+use crate::passes::{DispatchArgs, Part, Pass, Slot, interface_check};
+use crate::scene::Scene;
+use crate::spirv::Kind;
+use ash::vk;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Room for the parameters of one command buffer.
+const PARAMS_BYTES: u64 = 64 << 10;
+const STAMPS: u32 = 128;
+
+/// One dispatch: a pass, and what it runs on.
+#[derive(Clone, Copy)]
+pub struct Dispatch<'a> {
+    pub slots: &'a Slots,
+    pub pipeline: &'a Pipeline,
+    pub scene: &'a Scene,
+    pub pass: &'static Pass,
+    pub args: &'a DispatchArgs,
+}
+
+/// Parts of a slot: layers of an array, slices of a 3D image; of one of the images that take turns.
+#[derive(Clone, Debug)]
+pub struct SlotParts {
+    pub slot: Slot,
+    pub copy: u32,
+    pub parts: Range<u32>,
+}
+
+pub struct Recorder {
+    context: Arc<Context>,
+    pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    params: Buffer,
+    params_used: u64,
+    /// Where descriptors are not pushed.
+    sets: DescriptorSets,
+    pub stamps: Option<Stamps>,
+    /// Value of the timeline at which the last submission is done.
+    done_at: u64,
+    /// The submission whose times were added last.
+    collected_to: u64,
+    label: &'static str,
+    /// The queue that it is submitted to.
+    queue: usize,
+}
+
+impl Recorder {
+    /// With `statistics` the invocations of every dispatch are counted, where the device can.
+    pub fn new(
+        context: &Arc<Context>,
+        queue: usize,
+        label: &'static str,
+        statistics: bool,
+    ) -> Result<Recorder, GpuError> {
+        let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(queue).family);
+        let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
+        let stamps = Stamps::new(context, queue, STAMPS, statistics)?;
+        // SAFETY: the create structure is complete.
+        let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
+        context.name(pool, label);
+        let allocate = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        // SAFETY: the pool was just made; one buffer is asked for.
+        let commands = unsafe { context.device.allocate_command_buffers(&allocate) };
+        let mut recorder = Recorder {
+            context: context.clone(),
+            pool,
+            commands: vk::CommandBuffer::null(),
+            params,
+            params_used: 0,
+            sets: DescriptorSets::new(context),
+            stamps,
+            done_at: 0,
+            collected_to: 0,
+            label,
+            queue,
+        };
+        recorder.commands = commands.context(|| "create commands".into())?[0];
+        context.name(recorder.commands, label);
+        Ok(recorder)
+    }
+
+    /// Waits until the last submission is done, then starts anew.
+    pub fn begin(&mut self, barriers: &mut BarrierRecorder, timelines: &Timelines) -> Result<(), GpuError> {
+        barriers.begin(self.queue);
+        self.wait(timelines)?;
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the device is done with this pool's only command buffer.
+        unsafe {
+            self.context
+                .device
+                .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
+                .and_then(|()| self.context.device.begin_command_buffer(self.commands, &begin))
+        }
+        .context(|| format!("record '{}'", self.label))?;
+        self.params_used = 0;
+        self.sets.begin()?;
+        if let Some(stamps) = &mut self.stamps {
+            stamps.begin(self.commands);
+            self.flush_timestamps();
+        }
+        Ok(())
+    }
+
+    /// llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp when it next flushes, once anything was ever drawn on a window:
+    /// without a flush behind each one the dispatch after it would seem to take no time. A barrier is one.
+    fn flush_timestamps(&self) {
+        if self.context.presentation.is_none() || !self.context.candidate.is_software() {
+            return;
+        }
+        // Of no memory: what the derivation leaves out is still seen to be missing.
+        flush(&self.context.device, self.commands, vk::AccessFlags2::NONE);
+    }
+
+    /// Adds the times of the last submission, once, when it is done.
+    pub fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
+        if self.collected_to == self.done_at {
+            return Ok(());
+        }
+        self.wait(timelines)?;
+        self.collected_to = self.done_at;
+        if let Some(stamps) = &self.stamps {
+            let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
+            timings.add(&stamps.read()?, bits, period);
+        }
+        Ok(())
+    }
+
+    /// Blocks until the last submission is done.
+    pub fn wait(&self, timelines: &Timelines) -> Result<(), GpuError> {
+        timelines.of(self.queue).wait(self.done_at)
+    }
+
+    /// Whether the last submission is done.
+    pub fn is_done(&self, timelines: &Timelines) -> Result<bool, GpuError> {
+        timelines.of(self.queue).is_done(self.done_at)
+    }
+
+    pub fn submit(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
+        // SAFETY: the command buffer is being recorded.
+        unsafe { self.context.device.end_command_buffer(self.commands) }
+            .context(|| format!("record '{}'", self.label))?;
+        let waits = barriers.queues.waits(self.queue);
+        let waited: Vec<_> = waits
+            .iter()
+            .map(|wait| {
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(timelines.of(wait.queue).semaphore)
+                    .value(wait.value)
+                    .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            })
+            .collect();
+        let timeline = timelines.of_mut(self.queue);
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
+        let signal = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(timeline.semaphore)
+            .value(timeline.submitted + 1)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let submit = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waited)
+            .command_buffer_infos(&commands)
+            .signal_semaphore_infos(&signal);
+        self.context.submit(self.queue, &submit, vk::Fence::null(), || format!("submit '{}'", self.label))?;
+        timeline.submitted += 1;
+        timeline.label = self.label.to_string();
+        self.done_at = timeline.submitted;
+        barriers.submitted(self.queue, &waits, self.done_at);
+        Ok(())
+    }
+
+    /// One dispatch of a pass.
+    pub fn dispatch(&mut self, barriers: &mut BarrierRecorder, work: &Dispatch) -> Result<(), GpuError> {
+        let Dispatch { pipeline, scene, pass, args, .. } = *work;
+        self.barrier(barriers, &barriers::accesses(scene, pass, args));
+        let Some(args) = &self.context.faults.args(pass, scene, args) else { return Ok(()) };
+        let work = &Dispatch { args, ..*work };
+        self.context.begin_label(self.commands, pass.name);
+        let block = interface_check::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, args));
+        let offset = self.place_params(&block)?;
+        self.bind(work, offset, block.len() as u64)?;
+        let extent = self.context.faults.invocations(pass, scene, args);
+        let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
+        let (device, commands) = (&self.context.device, self.commands);
+        // Before any query begins: lavapipe looks at the pipeline then.
+        // SAFETY: the pipeline is alive until the device is done.
+        unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
+        let dispatch = || {
+            for n in 0..self.context.faults.times(pass.name) {
+                // One that is slow is so one after the other, also where there is room for several at once.
+                if n > 0 {
+                    flush(device, commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
+                }
+                // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
+                unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
+            }
+        };
+        match &mut self.stamps {
+            Some(stamps) => stamps.dispatch(commands, pass.name, dispatch),
+            None => dispatch(),
+        }
+        self.flush_timestamps();
+        self.context.counts.dispatches.fetch_add(1, Ordering::Relaxed);
+        self.context.end_label(self.commands);
+        if let Some(dispatched) = &mut barriers.dispatched {
+            dispatched.push((pass.name, extent));
+        }
+        Ok(())
+    }
+
+    fn place_params(&mut self, block: &[u8]) -> Result<u64, GpuError> {
+        let alignment = self.context.limits.min_uniform_buffer_offset_alignment.max(16);
+        let offset = self.params_used.next_multiple_of(alignment);
+        let end = offset + block.len() as u64;
+        if end > PARAMS_BYTES {
+            return Err(GpuError::Limit {
+                what: "parameters of one command buffer".into(),
+                needed: end,
+                allowed: PARAMS_BYTES,
+            });
+        }
+        self.params.bytes_mut()[offset as usize..end as usize].copy_from_slice(block);
+        self.params_used = end;
+        Ok(offset)
+    }
+
+    pub fn stamp(&mut self, name: &'static str) {
+        if let Some(stamps) = &mut self.stamps {
+            stamps.end_of(self.commands, name);
+            self.flush_timestamps();
+        }
+    }
+
+    fn barrier(&self, barriers: &mut BarrierRecorder, accesses: &[Access]) {
+        barriers.before(&self.context, self.queue, self.commands, accesses);
+    }
+}
+
+/// Everything before it is done, and what was written is there for `memory` behind it.
+fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFlags2) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .src_access_mask(memory & vk::AccessFlags2::MEMORY_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        .dst_access_mask(memory)];
+    let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+    // SAFETY: the command buffer is being recorded, outside any render pass.
+    unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+}
+
+/// Where a binding's entry is while a dispatch is bound.
+enum DescriptorInfo {
+    Image(usize),
+    Buffer(usize),
+    Texels(usize),
+}
+
+impl Recorder {
+    fn bind(&mut self, work: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
+        let Dispatch { slots, pipeline, scene, pass, args } = *work;
+        let binds = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+        let mut images = Vec::with_capacity(binds.len());
+        let mut buffers = Vec::with_capacity(binds.len());
+        let mut texels = Vec::with_capacity(binds.len());
+        // Which of the three lists a binding's entry went to, and where.
+        let mut places = Vec::with_capacity(binds.len());
+        for binding in &pipeline.module.bindings {
+            let bound = binds.iter().find(|b| b.name == binding.name);
+            match (binding.kind, bound.map(|b| (b, slots.get(b.slot, args.image)))) {
+                (Kind::Params, _) => {
+                    places.push((binding, DescriptorInfo::Buffer(buffers.len())));
+                    buffers.push([vk::DescriptorBufferInfo {
+                        buffer: self.params.handle,
+                        offset: params_offset,
+                        range: params_size,
+                    }]);
+                }
+                (Kind::Texels(components), Some((_, Resource::Buffer(buffer)))) => {
+                    places.push((binding, DescriptorInfo::Texels(texels.len())));
+                    texels.push([buffer.texels(components)]);
+                }
+                (_, Some((_, Resource::Buffer(buffer)))) => {
+                    places.push((binding, DescriptorInfo::Buffer(buffers.len())));
+                    buffers.push([vk::DescriptorBufferInfo {
+                        buffer: buffer.handle,
+                        offset: 0,
+                        range: vk::WHOLE_SIZE,
+                    }]);
+                }
+                (_, Some((bind, Resource::Image(image)))) => {
+                    let view = match bind.part {
+                        Part::Layer => image.layers[args.layer as usize],
+                        _ => image.view,
+                    };
+                    places.push((binding, DescriptorInfo::Image(images.len())));
+                    images.push([vk::DescriptorImageInfo {
+                        sampler: vk::Sampler::null(),
+                        image_view: view,
+                        image_layout: vk::ImageLayout::GENERAL,
+                    }]);
+                }
+                // The contract of pass and shader was checked when the pipeline was made.
+                (_, None) => {}
+            }
+        }
+        // Pushed descriptors go to no set.
+        let set = match self.context.push_descriptor {
+            Some(_) => vk::DescriptorSet::null(),
+            None => self.sets.take(pipeline)?,
+        };
+        let writes: Vec<_> = places
+            .iter()
+            .map(|(binding, listed)| {
+                let write = vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(binding.binding)
+                    .descriptor_type(descriptor_type(binding.kind));
+                match *listed {
+                    DescriptorInfo::Image(at) => write.image_info(&images[at]),
+                    DescriptorInfo::Buffer(at) => write.buffer_info(&buffers[at]),
+                    DescriptorInfo::Texels(at) => write.texel_buffer_view(&texels[at]),
+                }
+            })
+            .collect();
+        let (commands, point, layout) = (self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout);
+        // SAFETY: every view and buffer named is alive until the device is done, since slots are only freed after a wait. A set of a
+        // pool was taken just now, so that nothing uses it yet.
+        unsafe {
+            match &self.context.push_descriptor {
+                Some(push) => push.cmd_push_descriptor_set(commands, point, layout, 0, &writes),
+                None => {
+                    let device = &self.context.device;
+                    device.update_descriptor_sets(&writes, &[]);
+                    device.cmd_bind_descriptor_sets(commands, point, layout, 0, &[set], &[]);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Recorder {
+    /// New images from UNDEFINED to GENERAL, and all their bits to zero: pixels outside the sector are never written again.
+    pub fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &Slots, new: &[(Slot, u32)]) {
+        let images: Vec<(&Image, Slot, u32)> =
+            new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
+        let transitions: Vec<_> = images
+            .iter()
+            .map(|(image, ..)| {
+                // The memory may have been another image's a moment ago.
+                vk::ImageMemoryBarrier2::default()
+                    .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+                    .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+                    .dst_stage_mask(vk::PipelineStageFlags2::ALL_TRANSFER)
+                    .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+                    .old_layout(vk::ImageLayout::UNDEFINED)
+                    .new_layout(vk::ImageLayout::GENERAL)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .image(image.handle)
+                    .subresource_range(WHOLE)
+            })
+            .collect();
+        let device = &self.context.device;
+        // SAFETY: the images are new, alive, and used by nothing yet.
+        unsafe {
+            device.cmd_pipeline_barrier2(
+                self.commands,
+                &vk::DependencyInfo::default().image_memory_barriers(&transitions),
+            );
+        }
+        for (image, slot, n) in images {
+            let access = Access::of_slot(slot, n, 0..image.shape.parts(), true, PipelineStage::Copy);
+            self.barrier(barriers, &[access]);
+            let poison = self.context.faults.poisoned().filter(|_| !slot.starts_clear());
+            let value =
+                poison.map_or(vk::ClearColorValue { float32: [0.0; 4] }, |p| formats::clear_value(p, image.format));
+            // SAFETY: the image is in GENERAL since the transition above.
+            unsafe {
+                device.cmd_clear_color_image(self.commands, image.handle, vk::ImageLayout::GENERAL, &value, &[WHOLE]);
+            }
+        }
+    }
+
+    /// Bytes of a staging buffer into parts of an image: layers of an array, slices of a 3D image.
+    pub fn copy_in(&mut self, barriers: &mut BarrierRecorder, from: &Buffer, image: &Image, to: SlotParts) {
+        let parts = to.parts.clone();
+        self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+        // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
+        unsafe {
+            self.context.device.cmd_copy_buffer_to_image(
+                self.commands,
+                from.handle,
+                image.handle,
+                vk::ImageLayout::GENERAL,
+                &[region(image, parts.start, parts.end - parts.start)],
+            );
+        }
+    }
+
+    /// A whole image into the readback buffer, made visible to the host.
+    pub fn copy_out(&mut self, barriers: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
+        let parts = image.shape.parts();
+        let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
+        let resource = barriers::Resource::Readback;
+        let write = Access { resource, parts: 0..1, write: true, stage: PipelineStage::Copy };
+        self.barrier(barriers, &[read, write]);
+        // SAFETY: the buffer is as large as the image (its maker sized it so) and both live until the device is done.
+        unsafe {
+            self.context.device.cmd_copy_image_to_buffer(
+                self.commands,
+                image.handle,
+                vk::ImageLayout::GENERAL,
+                to.handle,
+                &[region(image, 0, parts)],
+            );
+        }
+        self.barrier(barriers, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);
+    }
+}
+
+fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
+    let is_volume = image.extent.depth > 1 || matches!(image.shape, Shape::Three(_));
+    let (layer, layers, z, depth) = if is_volume { (0, 1, part, parts) } else { (part, parts, 0, 1) };
+    vk::BufferImageCopy {
+        image_subresource: vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: layer,
+            layer_count: layers,
+        },
+        image_offset: vk::Offset3D { x: 0, y: 0, z: z as i32 },
+        image_extent: vk::Extent3D { depth, ..image.extent },
+        ..vk::BufferImageCopy::default()
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
+        unsafe { self.context.device.destroy_command_pool(self.pool, None) };
+    }
+}

@@ -1,0 +1,602 @@
+//! The probe file: a TOML that says where the scan lines and frames of a recording lie. Lengths in mm, angles in degrees.
+//!
+//! The numbers of samples, lines and frames are not in it: they come from the recording.
+
+use super::geometry::GeometryError;
+use super::motor::MotorTable;
+use super::{Advance, Array, Axis, Motion, Probe, Volumes};
+use crate::files::{self, InputError};
+use serde::Deserialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Longest probe file, in bytes.
+const MAX_BYTES: u64 = 1 << 20;
+/// Thickness of the slab that a lone frame is drawn as, mm.
+pub(crate) const SLAB: f64 = 1.0;
+
+/// A probe file as written. `tests/data/*/probe.toml` are commented examples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbeFile {
+    path: PathBuf,
+    tables: Tables,
+}
+
+impl ProbeFile {
+    /// Reads and checks all that can be checked without the recording.
+    pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
+        let text = files::read_text(path, MAX_BYTES, "probe file").map_err(|e| InputError::new(path, "file", e))?;
+        ProbeFile::parse(path, &text)
+    }
+
+    fn parse(path: &Path, text: &str) -> Result<ProbeFile, InputError> {
+        let tables = toml::from_str::<Tables>(text).map_err(|e| {
+            let before = e.span().and_then(|s| text.get(..s.start)).unwrap_or("");
+            let line = before.matches('\n').count() + 1;
+            InputError::new(path, format!("line {line}"), e.message().trim().replace('\n', ", "))
+        })?;
+        ProbeFile { path: path.into(), tables }.checked()
+    }
+
+    /// The same tables as JSON objects, from within what `path` names.
+    ///
+    /// # Errors
+    /// As of [`ProbeFile::read`].
+    pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
+        let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
+        ProbeFile { path: path.into(), tables }.checked()
+    }
+
+    fn checked(self) -> Result<ProbeFile, InputError> {
+        self.check()?;
+        Ok(self)
+    }
+
+    /// The probe file beside a recording: `<stem>.probe.toml`, which is for this recording alone, or else `probe.toml`,
+    /// which is for all in its folder.
+    pub fn find_for(recording: &Path) -> Option<PathBuf> {
+        let own = recording.file_stem().map(|stem| {
+            let mut name = stem.to_os_string();
+            name.push(".probe.toml");
+            recording.with_file_name(name)
+        });
+        own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Sample values that are to be shown as 0 and 1, in the recording's own units.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        self.tables.samples.range
+    }
+
+    /// What the frames of a fan lie over, from the first to the last, degrees.
+    pub fn fan_angle(&self) -> Option<f64> {
+        let motion = &self.tables.motion;
+        let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
+        motion.fan_angle_deg.or(table)
+    }
+
+    /// How the motor is driven, where the file says so.
+    pub fn motor(&self) -> Option<&MotorTable> {
+        self.tables.motor.as_ref()
+    }
+
+    fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+        Err(InputError::new(&self.path, field, fault))
+    }
+
+    fn check(&self) -> Result<(), InputError> {
+        let (lines, motion) = (&self.tables.lines, &self.tables.motion);
+        let curved = self.tables.array.kind == ArrayKind::Curved;
+        let (fan, translated) = (motion.kind == MotionKind::Fan, motion.kind == MotionKind::Translated);
+        // Field, its value, may it be zero, does it belong to this kind of probe.
+        let numbers = [
+            ("array.radius_mm", self.tables.array.radius_mm, true, curved),
+            ("lines.sector_angle_deg", lines.sector_angle_deg, false, curved),
+            ("lines.width_mm", lines.width_mm, false, !curved),
+            ("depth.start_mm", Some(self.tables.depth.start_mm), true, true),
+            ("depth.sample_pitch_mm", self.tables.depth.sample_pitch_mm, false, true),
+            ("depth.end_mm", self.tables.depth.end_mm, false, true),
+            ("motion.wobble_radius_mm", motion.wobble_radius_mm, true, fan),
+            ("motion.fan_angle_deg", motion.fan_angle_deg, true, fan),
+            ("motion.pitch_mm", motion.pitch_mm, false, translated),
+            ("motion.thickness_mm", motion.thickness_mm, false, true),
+            ("motion.speed_ratio", Some(motion.speed_ratio), true, true),
+            ("sound.speed_m_per_s", Some(self.tables.sound.speed_m_per_s), false, true),
+        ];
+        for (field, value, zero, belongs) in numbers {
+            let Some(value) = value else { continue };
+            if !belongs {
+                return self.fault(field, "does not belong to this kind of array or motion");
+            }
+            if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero) {
+                let least = if zero { "of at least 0" } else { "above 0" };
+                return self.fault(field, format!("is {value}, must be a finite number {least}"));
+            }
+        }
+        let tables = [
+            ("lines.angles_deg", &lines.angles_deg, curved),
+            ("lines.positions_mm", &lines.positions_mm, !curved),
+            ("motion.frame_angles_deg", &motion.frame_angles_deg, fan),
+            ("motion.frame_positions_mm", &motion.frame_positions_mm, translated),
+        ];
+        for (field, table, belongs) in tables {
+            if table.is_some() && !belongs {
+                return self.fault(field, "does not belong to this kind of array or motion");
+            }
+        }
+        if motion.speed_ratio > 1.0 {
+            return self.fault("motion.speed_ratio", format!("is {}, must be 0 to 1", motion.speed_ratio));
+        }
+        if motion.kind == MotionKind::Still && motion.frames_per_volume > 1 {
+            return self.fault("motion.frames_per_volume", "must be 1 when the probe is still");
+        }
+        if let Some((field, fault)) = self.tables.motor.as_ref().and_then(|m| m.check().err()) {
+            return self.fault(field, fault);
+        }
+        match self.range() {
+            Some([low, high]) if !(low < high && (high - low).is_finite()) => {
+                self.fault("samples.range", format!("is [{low}, {high}], must be two rising finite numbers"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The probe, swept forwards without [`Advance`], and the volumes of a recording of so many samples a line, lines a
+    /// frame, and frames. See [`Volumes::advance`] for what the motion adds to each volume.
+    pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
+        let volumes = self.volumes(frames)?;
+        let (motion, slices) = self.motion(volumes.frames)?;
+        let (array, lines) = self.lines(lines)?;
+        let depth = &self.tables.depth;
+        let sample_pitch = match (depth.sample_pitch_mm, depth.end_mm) {
+            (Some(pitch), None) => pitch,
+            (None, Some(end)) => (end - depth.start_mm) / (samples.max(2) - 1) as f64,
+            _ => return self.fault("depth", "must have either sample_pitch_mm or end_mm"),
+        };
+        let probe = Probe {
+            array,
+            lines,
+            start_depth: depth.start_mm,
+            sample_pitch,
+            samples,
+            motion,
+            slices,
+            advance: Advance::None,
+            sound_speed: self.tables.sound.speed_m_per_s,
+        };
+        probe.check().map_err(|e| geometry_error(&self.path, &e))?;
+        for volume in 0..volumes.count.min(2) {
+            let advance = volumes.advance(volume, &probe.slices);
+            let moving = Probe { advance, ..probe.clone() };
+            moving.check().map_err(|e| geometry_error(&self.path, &e))?;
+        }
+        Ok((probe, volumes))
+    }
+
+    fn volumes(&self, frames: usize) -> Result<Volumes, InputError> {
+        let motion = &self.tables.motion;
+        let each = match (motion.kind, motion.frames_per_volume) {
+            (MotionKind::Still, _) => 1,
+            (_, 0) => frames,
+            (_, each) => each,
+        };
+        if frames == 0 || each > frames {
+            return self.fault("motion.frames_per_volume", format!("is {each}, but the recording has {frames} frames"));
+        }
+        Ok(Volumes {
+            frames: each,
+            count: frames / each,
+            left_over: frames % each,
+            both_ways: motion.both_ways,
+            first_backward: motion.first_direction == Direction::Backward,
+            speed_ratio: motion.speed_ratio,
+        })
+    }
+
+    fn motion(&self, frames: usize) -> Result<(Motion, Axis), InputError> {
+        let motion = &self.tables.motion;
+        let slab = Motion::Still { thickness: motion.thickness_mm.unwrap_or(SLAB) };
+        let (kind, slices) = match motion.kind {
+            MotionKind::Still => (slab, Axis::centred(1.0, 1)),
+            MotionKind::Translated => {
+                let slices = match (motion.pitch_mm, &motion.frame_positions_mm) {
+                    (Some(pitch), None) => Axis::centred(pitch, frames),
+                    (None, Some(table)) => self.table("motion.frame_positions_mm", table, frames, "frames")?,
+                    _ => return self.fault("motion", "must have either pitch_mm or frame_positions_mm"),
+                };
+                (Motion::Translated, slices)
+            }
+            MotionKind::Fan => {
+                let Some(wobble_radius) = motion.wobble_radius_mm else {
+                    return self.fault("motion.wobble_radius_mm", "is missing");
+                };
+                let slices = match (motion.fan_angle_deg, &motion.frame_angles_deg) {
+                    (Some(angle), None) => spread(angle.to_radians(), frames),
+                    (None, Some(table)) => {
+                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
+                        self.table("motion.frame_angles_deg", &table, frames, "frames")?
+                    }
+                    _ => return self.fault("motion", "must have either fan_angle_deg or frame_angles_deg"),
+                };
+                (Motion::Fan { wobble_radius }, slices)
+            }
+        };
+        // One frame has no sweep to lie in: it is drawn as a slab.
+        if frames == 1 { Ok((slab, Axis::centred(1.0, 1))) } else { Ok((kind, slices)) }
+    }
+
+    fn lines(&self, count: usize) -> Result<(Array, Axis), InputError> {
+        let lines = &self.tables.lines;
+        match (self.tables.array.kind, self.tables.array.radius_mm) {
+            (ArrayKind::Curved, None) => self.fault("array.radius_mm", "is missing"),
+            (ArrayKind::Curved, Some(radius)) => {
+                let axis = match (lines.sector_angle_deg, &lines.angles_deg) {
+                    (Some(angle), None) => spread(angle.to_radians(), count),
+                    (None, Some(table)) => {
+                        let table: Vec<f64> = table.iter().map(|a| a.to_radians()).collect();
+                        self.table("lines.angles_deg", &table, count, "lines")?
+                    }
+                    _ => return self.fault("lines", "must have either sector_angle_deg or angles_deg"),
+                };
+                Ok((Array::Curved { radius }, axis))
+            }
+            (ArrayKind::Linear, _) => {
+                let axis = match (lines.width_mm, &lines.positions_mm) {
+                    (Some(width), None) => spread(width, count),
+                    (None, Some(table)) => self.table("lines.positions_mm", table, count, "lines")?,
+                    _ => return self.fault("lines", "must have either width_mm or positions_mm"),
+                };
+                Ok((Array::Linear, axis))
+            }
+        }
+    }
+
+    fn table(&self, field: &str, table: &[f64], count: usize, of: &str) -> Result<Axis, InputError> {
+        if table.len() != count {
+            return self.fault(field, format!("has {} entries, but there are {count} {of}", table.len()));
+        }
+        let axis = Axis::from_table(table.to_vec());
+        if axis.is_valid() {
+            Ok(axis)
+        } else {
+            self.fault(field, "must be finite numbers that rise from one to the next")
+        }
+    }
+}
+
+/// A fault of the geometry as one of the file that it comes from.
+pub(crate) fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
+    InputError::new(file, error.field, &error.fault)
+}
+
+/// `count` positions over `span`, first to last, centred on zero. One position lies in the middle.
+fn spread(span: f64, count: usize) -> Axis {
+    if count < 2 { Axis::centred(1.0, 1) } else { Axis::centred(span / (count - 1) as f64, count) }
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tables {
+    array: ArrayTable,
+    lines: LinesTable,
+    depth: DepthTable,
+    motion: MotionTable,
+    #[serde(default)]
+    sound: SoundTable,
+    #[serde(default)]
+    samples: SamplesTable,
+    motor: Option<MotorTable>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ArrayKind {
+    Curved,
+    Linear,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ArrayTable {
+    kind: ArrayKind,
+    radius_mm: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LinesTable {
+    sector_angle_deg: Option<f64>,
+    width_mm: Option<f64>,
+    angles_deg: Option<Vec<f64>>,
+    positions_mm: Option<Vec<f64>>,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DepthTable {
+    #[serde(default)]
+    start_mm: f64,
+    /// Distance between samples.
+    sample_pitch_mm: Option<f64>,
+    /// Depth of the last sample: dr = (d1 - d0) / (S - 1).
+    end_mm: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum MotionKind {
+    Fan,
+    Translated,
+    Still,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Direction {
+    #[default]
+    Forward,
+    Backward,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MotionTable {
+    kind: MotionKind,
+    wobble_radius_mm: Option<f64>,
+    fan_angle_deg: Option<f64>,
+    frame_angles_deg: Option<Vec<f64>>,
+    pitch_mm: Option<f64>,
+    frame_positions_mm: Option<Vec<f64>>,
+    thickness_mm: Option<f64>,
+    /// 0: all frames of the recording are one volume.
+    #[serde(default)]
+    frames_per_volume: usize,
+    /// Every second volume was swept backwards.
+    #[serde(default)]
+    both_ways: bool,
+    #[serde(default)]
+    first_direction: Direction,
+    #[serde(default)]
+    speed_ratio: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SoundTable {
+    speed_m_per_s: f64,
+}
+
+impl Default for SoundTable {
+    fn default() -> SoundTable {
+        SoundTable { speed_m_per_s: 1540.0 }
+    }
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SamplesTable {
+    range: Option<[f64; 2]>,
+}
+
+/// What is apart by no more, in rad or mm, is the same place: a file says angles in degrees.
+const SAME: f64 = 1e-9;
+
+impl ProbeFile {
+    /// The text that [`ProbeFile::read`] and [`ProbeFile::geometry`] make this probe and these volumes of again. `range`: the values that are
+    /// shown as 0 and 1. The probe is that of the first volume.
+    ///
+    /// # Errors
+    /// A probe that no file can say: an advance that is not the motor's at an even speed, tables longer than a file may be; in words.
+    pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
+        let gap = probe.slices.at(1.0) - probe.slices.at(0.0);
+        let advance = probe.slice_position(probe.lines.len() as f64, 0.0) - probe.slice_position(0.0, 0.0);
+        let speed_ratio = if probe.slices.len() > 1 { (advance / gap).abs() } else { 0.0 };
+        let text = written(probe, &Volumes { speed_ratio, ..volumes.clone() }, range);
+        let read = ProbeFile::parse(Path::new("probe.toml"), &text)
+            .and_then(|file| file.geometry(probe.samples, probe.lines.len(), volumes.frames * volumes.count));
+        let (read, there) = read.map_err(|e| format!("{}: {}", e.field(), e.fault()))?;
+        let read = Probe { advance: there.advance(0, &read.slices), ..read };
+        match is_same(probe, &read) && text.len() as u64 <= MAX_BYTES {
+            true => Ok(text),
+            false => Err("cannot be said by a probe file".into()),
+        }
+    }
+}
+
+fn written(probe: &Probe, volumes: &Volumes, [low, high]: [f64; 2]) -> String {
+    let mut text = String::from("# Lengths in mm, angles in degrees.\n");
+    let mut say = |line: std::fmt::Arguments| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{line}");
+    };
+    match probe.array {
+        Array::Curved { radius } => {
+            say(format_args!("[array]\nkind = \"curved\"\nradius_mm = {radius:?}\n\n[lines]"));
+            say(format_args!("{}\n", angles("sector_angle_deg", "angles_deg", &probe.lines)));
+        }
+        Array::Linear => {
+            say(format_args!("[array]\nkind = \"linear\"\n\n[lines]"));
+            let span = probe.lines.last() - probe.lines.first();
+            say(format_args!("{}\n", axis(("width_mm", span), "positions_mm", &probe.lines, 1.0)));
+        }
+    }
+    say(format_args!("[depth]\nstart_mm = {:?}\nsample_pitch_mm = {:?}\n", probe.start_depth, probe.sample_pitch));
+    match probe.motion {
+        Motion::Still { thickness } => say(format_args!("[motion]\nkind = \"still\"\nthickness_mm = {thickness:?}")),
+        Motion::Translated => {
+            say(format_args!("[motion]\nkind = \"translated\""));
+            say(format_args!("{}", axis(("pitch_mm", probe.slices.pitch()), "frame_positions_mm", &probe.slices, 1.0)));
+        }
+        Motion::Fan { wobble_radius } => {
+            say(format_args!("[motion]\nkind = \"fan\"\nwobble_radius_mm = {wobble_radius:?}"));
+            say(format_args!("{}", angles("fan_angle_deg", "frame_angles_deg", &probe.slices)));
+        }
+    }
+    let direction = if volumes.first_backward { "backward" } else { "forward" };
+    say(format_args!("frames_per_volume = {}\nboth_ways = {}", volumes.frames, volumes.both_ways));
+    say(format_args!("first_direction = \"{direction}\"\nspeed_ratio = {:?}\n", volumes.speed_ratio));
+    say(format_args!("[sound]\nspeed_m_per_s = {:?}\n\n[samples]\nrange = [{low:?}, {high:?}]", probe.sound_speed));
+    text
+}
+
+fn angles(even: &str, table: &str, positions: &Axis) -> String {
+    let span = (positions.last() - positions.first()).to_degrees();
+    axis((even, span), table, positions, 180.0 / std::f64::consts::PI)
+}
+
+/// One number for positions that are even and centred, otherwise all of them.
+fn axis((even, number): (&str, f64), table: &str, positions: &Axis, scale: f64) -> String {
+    let is_centred = (positions.first() + positions.last()).abs() <= SAME;
+    match positions {
+        Axis::Even { .. } if is_centred => format!("{even} = {number:?}"),
+        _ => {
+            let all: Vec<String> =
+                (0..positions.len()).map(|k| format!("{:?}", positions.at(k as f64) * scale)).collect();
+            format!("{table} = [{}]", all.join(", "))
+        }
+    }
+}
+
+fn is_same(a: &Probe, b: &Probe) -> bool {
+    let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(1.0);
+    let kinds = match (a.motion, b.motion) {
+        (Motion::Fan { wobble_radius: a }, Motion::Fan { wobble_radius: b }) => near(a, b),
+        (Motion::Still { thickness: a }, Motion::Still { thickness: b }) => near(a, b),
+        (a, b) => a == b,
+    };
+    let sizes = |p: &Probe| [p.samples, p.lines.len(), p.slices.len()];
+    let numbers = |p: &Probe| [p.array_radius(), p.start_depth, p.sample_pitch, p.sound_speed];
+    let last = a.lines.len() as f64;
+    kinds
+        && std::mem::discriminant(&a.array) == std::mem::discriminant(&b.array)
+        && sizes(a) == sizes(b)
+        && numbers(a).into_iter().zip(numbers(b)).all(|(a, b)| near(a, b))
+        && (0..a.lines.len()).map(|k| k as f64).all(|k| near(a.lines.at(k), b.lines.at(k)))
+        && (0..a.slices.len())
+            .map(|k| k as f64)
+            .all(|k| [0.0, last].into_iter().all(|line| near(a.slice_position(line, k), b.slice_position(line, k))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAN: &str = "[array]\nkind = 'curved'\nradius_mm = 40\n[lines]\nsector_angle_deg = 70\n[depth]\nend_mm = 159\n\
+                       [motion]\nkind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60\n";
+
+    fn parse(text: &str) -> Result<ProbeFile, InputError> {
+        ProbeFile::parse(Path::new("probe.toml"), text)
+    }
+
+    #[test]
+    fn the_end_depth_is_that_of_the_last_sample() {
+        let (probe, volumes) = parse(FAN).unwrap().geometry(160, 71, 31).unwrap();
+        assert!((probe.sample_pitch - 1.0).abs() < 1e-12);
+        assert!((probe.last_range() - 199.0).abs() < 1e-9);
+        assert!((probe.lines.last().to_degrees() - 35.0).abs() < 1e-9);
+        assert!((probe.slices.first().to_degrees() + 30.0).abs() < 1e-9);
+        assert_eq!(volumes, Volumes::forward(31, 1));
+    }
+
+    #[test]
+    fn frames_after_the_last_whole_volume_are_not_a_volume() {
+        let file = parse(&format!("{FAN}frames_per_volume = 10\nboth_ways = true\nspeed_ratio = 0.5\n")).unwrap();
+        let (_, volumes) = file.geometry(160, 71, 39).unwrap();
+        assert_eq!((volumes.count, volumes.left_over, volumes.backward(1)), (3, 9, true));
+        assert!(file.geometry(160, 71, 9).is_err());
+    }
+
+    #[test]
+    fn one_frame_of_a_fan_is_a_slab() {
+        let (probe, _) = parse(FAN).unwrap().geometry(160, 71, 1).unwrap();
+        assert_eq!(probe.motion, Motion::Still { thickness: SLAB });
+        assert!(parse(FAN).unwrap().geometry(160, 1, 1).is_err(), "a single line spans no picture");
+    }
+
+    #[test]
+    fn every_fault_is_one_line_that_names_file_and_field() {
+        let faults = [
+            ("radius_mm = 40", "radius_mm = nan", "array.radius_mm"),
+            ("radius_mm = 40", "radus_mm = 40", "radus_mm"),
+            ("radius_mm = 40", "radius_mm = 40\n\"a\\nb\" = 1", "line 4"),
+            ("radius_mm = 40", "", "array.radius_mm"),
+            ("end_mm = 159", "end_mm = 159\nsample_pitch_mm = 1", "depth"),
+            ("end_mm = 159", "end_mm = -159", "depth.end_mm"),
+            ("fan_angle_deg = 60", "frame_angles_deg = [1, 2, 3]", "motion.frame_angles_deg"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\npitch_mm = 1", "motion.pitch_mm"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\nspeed_ratio = 1.5", "motion.speed_ratio"),
+            ("fan_angle_deg = 60", "fan_angle_deg = 60\n[samples]\nrange = [1, 1]", "samples.range"),
+            ("sector_angle_deg = 70", "sector_angle_deg = 190", "sector angle"),
+            ("wobble_radius_mm = 25", "wobble_radius_mm = 1", "wobble radius"),
+            ("kind = 'fan'", "kind = 'helix'", "helix"),
+        ];
+        for (from, to, named) in faults {
+            let error = parse(&FAN.replace(from, to)).and_then(|f| f.geometry(160, 71, 31)).unwrap_err().to_string();
+            assert!(error.starts_with("probe.toml: ") && error.contains(named), "{error}");
+            assert_eq!(error.lines().count(), 1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod writing_tests {
+    use super::*;
+
+    fn probe() -> Probe {
+        let volumes = Volumes { speed_ratio: 0.4, ..Volumes::forward(7, 2) };
+        let slices = Axis::centred(0.03, 7);
+        Probe {
+            array: Array::Curved { radius: 39.8 },
+            lines: Axis::centred(0.011, 40),
+            start_depth: 1.5,
+            sample_pitch: 0.25,
+            samples: 100,
+            motion: Motion::Fan { wobble_radius: 20.0 },
+            advance: volumes.advance(0, &slices),
+            slices,
+            sound_speed: 1480.0,
+        }
+    }
+
+    #[test]
+    fn no_probe_is_written_that_is_read_as_another() {
+        let uneven = Axis::Table(vec![-0.1, -0.05, 0.01, 0.05, 0.06, 0.09, 0.2]);
+        let aside = Axis::Even { first: 0.01, pitch: 0.02, count: 40 };
+        let volumes = Volumes { both_ways: true, ..Volumes::forward(7, 2) };
+        let moving = Volumes { speed_ratio: 0.3, first_backward: true, ..volumes.clone() };
+        let linear =
+            Probe { array: Array::Linear, lines: Axis::centred(0.3, 40), motion: Motion::Translated, ..probe() };
+        for (probe, volumes) in [
+            (probe(), volumes.clone()),
+            (Probe { lines: aside, ..probe() }, volumes.clone()),
+            (Probe { slices: uneven.clone(), advance: moving.advance(0, &uneven), ..probe() }, moving),
+            (linear.clone(), volumes.clone()),
+            (
+                Probe { slices: Axis::Even { first: 4.0, pitch: 0.5, count: 7 }, advance: Advance::None, ..linear },
+                volumes,
+            ),
+            (
+                Probe {
+                    motion: Motion::Still { thickness: 2.5 },
+                    slices: Axis::centred(1.0, 1),
+                    advance: Advance::None,
+                    ..probe()
+                },
+                Volumes::forward(1, 3),
+            ),
+        ] {
+            let text = ProbeFile::to_toml(&probe, &volumes, [3.0, 250.0]).unwrap();
+            let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
+            let (read, there) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
+            assert!(is_same(&Probe { advance: there.advance(0, &read.slices), ..read }, &probe), "{text}");
+            assert_eq!((there.both_ways, there.first_backward), (volumes.both_ways, volumes.first_backward));
+            assert_eq!(file.range(), Some([3.0, 250.0]));
+        }
+        let astray = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
+        assert!(ProbeFile::to_toml(&astray, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
+    }
+}

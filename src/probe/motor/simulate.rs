@@ -1,0 +1,524 @@
+//! A TMCL module on a pseudo-terminal, for tests and for anyone without the hardware: [`Simulator`].
+
+use super::table::{MotorTable, Side};
+use super::tmcl::{self, LENGTH, Reply, Request, SUCCESS, axis, command};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, ioctl_tiocnxcl, tcgetattr, tcsetattr};
+use std::collections::{BTreeMap, VecDeque};
+use std::os::fd::OwnedFd;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// What can be made to go wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Obeys, but does not answer.
+    Mute,
+    /// Every answer's checksum is wrong.
+    Checksum,
+    /// The right limit switch closes and stays closed.
+    LimitSwitch,
+    /// The rotor is held fast; the module notices and stops.
+    Stall,
+    /// The port vanishes.
+    Unplugged,
+    /// The firmware gives another module's number.
+    WrongModule,
+    /// Bytes of noise come before every answer, some of which are whole answers with a wrong checksum.
+    Noise,
+    /// Every answer comes three seconds late.
+    Slow,
+}
+
+impl FaultKind {
+    pub const ALL: [(&'static str, FaultKind); 8] = [
+        ("mute", FaultKind::Mute),
+        ("checksum", FaultKind::Checksum),
+        ("limit-switch", FaultKind::LimitSwitch),
+        ("stall", FaultKind::Stall),
+        ("unplugged", FaultKind::Unplugged),
+        ("wrong-module", FaultKind::WrongModule),
+        ("noise", FaultKind::Noise),
+        ("slow", FaultKind::Slow),
+    ];
+}
+
+/// A fault and when it begins: `NAME`, from the start; `NAME@SECONDS`, so long after the module was first sent to a position,
+/// which is when a sweep begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SimulatedFault {
+    pub kind: FaultKind,
+    pub after: Option<Duration>,
+}
+
+impl FromStr for SimulatedFault {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<SimulatedFault, String> {
+        let (name, after) = text.split_once('@').map_or((text, None), |(name, after)| (name, Some(after)));
+        let kind = FaultKind::ALL.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
+        let names = FaultKind::ALL.map(|(name, _)| name).join(", ");
+        let kind = kind.ok_or_else(|| format!("'{name}' is no fault; there are {names}"))?;
+        let seconds = |text: &str| text.parse::<f64>().ok().filter(|s| (0.0..=3600.0).contains(s));
+        let after = match after {
+            None => None,
+            Some(text) => Some(seconds(text).ok_or_else(|| format!("'{text}' must be 0 to 3600 seconds"))?),
+        };
+        Ok(SimulatedFault { kind, after: after.map(Duration::from_secs_f64) })
+    }
+}
+
+/// What the simulator is to be.
+#[derive(Clone, Debug, Default)]
+pub struct SimulatorOptions {
+    pub table: MotorTable,
+    pub fault: Option<SimulatedFault>,
+    /// The module has no watchdog.
+    pub no_watchdog: bool,
+}
+
+struct Shared {
+    module: Mutex<Module>,
+    received: Mutex<Vec<Request>>,
+    end: AtomicBool,
+}
+
+/// A simulated module, running until it is dropped.
+pub struct Simulator {
+    path: PathBuf,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Simulator {
+    /// # Errors
+    /// The system has no pseudo-terminal to give.
+    pub fn start(options: SimulatorOptions) -> std::io::Result<Simulator> {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        let path = PathBuf::from(ptsname(&master, Vec::new())?.to_string_lossy().into_owned());
+        // Held open here, the terminal outlives its users and keeps the settings: no echo of what is sent.
+        let slave = ioctl_tiocgptpeer(&master, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        let mut settings = tcgetattr(&slave)?;
+        settings.make_raw();
+        tcsetattr(&slave, OptionalActions::Now, &settings)?;
+
+        let mut module = Module::new(&options.table);
+        module.watchdog = !options.no_watchdog;
+        let (module, received) = (Mutex::new(module), Mutex::new(Vec::new()));
+        let shared = Arc::new(Shared { module, received, end: AtomicBool::new(false) });
+        let line = Line { master, slave, shared: shared.clone(), address: options.table.address, fault: options.fault };
+        let thread = std::thread::Builder::new().name("simulated module".into()).spawn(move || line.run())?;
+        Ok(Simulator { path, shared, thread: Some(thread) })
+    }
+
+    /// The port to open.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Every request that was understood so far, in order.
+    pub fn received(&self) -> Vec<Request> {
+        locked(&self.shared.received).clone()
+    }
+
+    /// The motor turns at this moment.
+    pub fn turning(&self) -> bool {
+        locked(&self.shared.module).turning()
+    }
+
+    /// Where the array really is, in degrees of the sweep.
+    pub fn angle(&self) -> f64 {
+        locked(&self.shared.module).angle()
+    }
+
+    /// It was unplugged, or its port has failed.
+    pub fn ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        self.shared.end.store(true, Ordering::SeqCst);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// The thread between the pseudo-terminal and the module.
+struct Line {
+    master: OwnedFd,
+    slave: OwnedFd,
+    shared: Arc<Shared>,
+    address: u8,
+    fault: Option<SimulatedFault>,
+}
+
+impl Line {
+    fn run(self) {
+        if let Err(error) = self.serve() {
+            tracing::warn!("the simulated module's port has failed: {error}");
+        }
+    }
+
+    fn serve(&self) -> rustix::io::Result<()> {
+        let (mut pending, mut bytes, mut outgoing) = (Vec::new(), [0; 256], VecDeque::new());
+        let (mut last, mut positioned, mut answers) = (Instant::now(), None, 0_usize);
+        let pause = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
+        while !self.shared.end.load(Ordering::SeqCst) {
+            let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
+            let ready = match poll(&mut fds, Some(&pause)) {
+                Err(rustix::io::Errno::INTR) => continue,
+                ready => ready? > 0,
+            };
+            if ready {
+                let count = rustix::io::read(&self.master, &mut bytes)?;
+                pending.extend_from_slice(&bytes[..count]);
+            } else {
+                // Whoever was killed has left the port to itself alone; the next one is to have it.
+                let _ = ioctl_tiocnxcl(&self.slave);
+            }
+            let (now, before) = (Instant::now(), last);
+            last = now;
+            let due = self.due(positioned);
+            if due == Some(FaultKind::Unplugged) {
+                return Ok(());
+            }
+            let mut module = locked(&self.shared.module);
+            module.stalled |= due == Some(FaultKind::Stall);
+            module.limit_closed |= due == Some(FaultKind::LimitSwitch);
+            if due == Some(FaultKind::WrongModule) {
+                module.number = 3110;
+            }
+            module.pass(now - before, !ready);
+            let mut replies = Vec::new();
+            while let Some((first, rest)) = pending.split_first_chunk::<LENGTH>() {
+                match Request::parse(first) {
+                    Some(request) if request.address == self.address => {
+                        locked(&self.shared.received).push(request);
+                        if request.command == command::MOVE_TO {
+                            positioned.get_or_insert(now);
+                        }
+                        replies.push(module.answer(&request).bytes());
+                        pending = rest.to_vec();
+                    }
+                    // Another module's: this one says nothing.
+                    Some(_) => pending = rest.to_vec(),
+                    // Shifted: the next byte may be the first.
+                    None => drop(pending.remove(0)),
+                }
+            }
+            drop(module);
+            for reply in replies {
+                answers += 1;
+                let wait = Duration::from_secs(if due == Some(FaultKind::Slow) { 3 } else { 0 });
+                outgoing.push_back((now + wait, with_fault(reply, due, answers)));
+            }
+            while outgoing.front().is_some_and(|(at, _)| *at <= now) {
+                let (_, bytes) = outgoing.pop_front().unwrap_or((now, Vec::new()));
+                self.write(&bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The fault that is present.
+    fn due(&self, positioned: Option<Instant>) -> Option<FaultKind> {
+        let fault = self.fault?;
+        let begun = match (fault.after, positioned) {
+            (None, _) => true,
+            (Some(after), Some(since)) => since.elapsed() >= after,
+            (Some(_), None) => false,
+        };
+        begun.then_some(fault.kind)
+    }
+
+    fn write(&self, mut left: &[u8]) -> rustix::io::Result<()> {
+        while !left.is_empty() {
+            let written = rustix::io::write(&self.master, left)?;
+            left = &left[written..];
+        }
+        Ok(())
+    }
+}
+
+/// What of the reply number `count` goes over the wire.
+fn with_fault(mut reply: [u8; LENGTH], due: Option<FaultKind>, count: usize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    match due {
+        Some(FaultKind::Mute) => return bytes,
+        Some(FaultKind::Checksum) => reply[8] ^= 0x55,
+        Some(FaultKind::Noise) => {
+            bytes.extend([0xff, 0x02, 0x01, 0x64].repeat(1 + count % 5));
+            if count.is_multiple_of(7) {
+                bytes.extend(reply.map(|b| b.wrapping_add(1)));
+            }
+        }
+        _ => {}
+    }
+    bytes.extend(reply);
+    bytes
+}
+
+/// Longest step of the integration, s.
+const STEP: f64 = 5e-4;
+/// Where the shaft is when the module is switched on, degrees from home.
+const START_ANGLE: f64 = 7.0;
+/// How far beyond the largest sweep the limit switches are, degrees.
+const LIMIT_MARGIN: f64 = 3.0;
+/// Status codes.
+const BAD_COMMAND: u8 = 2;
+const BAD_TYPE: u8 = 3;
+const BAD_VALUE: u8 = 4;
+
+/// What the module is carrying out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Activity {
+    /// Microsteps a second.
+    Velocity(f64),
+    /// The module's counter, microsteps.
+    Position(f64),
+    Search,
+}
+
+/// The module and its motor.
+#[derive(Debug)]
+struct Module {
+    table: MotorTable,
+    /// Number in the firmware's version.
+    number: u16,
+    /// Whether it has a watchdog.
+    watchdog: bool,
+    /// The load takes no steeper ramp: beyond it the motor stalls. Microsteps a second squared.
+    strength: f64,
+    /// The rotor does not follow any more, and the module has noticed and stopped.
+    stalled: bool,
+    /// The right limit switch is closed wherever the shaft is.
+    limit_closed: bool,
+    activity: Activity,
+    /// Microsteps from the home switch's edge.
+    shaft: f64,
+    /// The counter less the shaft.
+    offset: f64,
+    /// Microsteps a second.
+    speed: f64,
+    axes: BTreeMap<u8, i32>,
+    watchdog_ms: i32,
+    since_command: f64,
+}
+
+impl Module {
+    fn new(table: &MotorTable) -> Module {
+        let shaft = START_ANGLE * table.steps_per_degree();
+        let mut axes = BTreeMap::from([(axis::SEARCH_MODE, 1), (axis::SWITCH_SPEED, 1)]);
+        axes.insert(axis::LARGEST_SPEED, table.velocity(table.search_speed()));
+        axes.insert(axis::SEARCH_SPEED, table.velocity(table.search_speed()));
+        axes.insert(axis::LARGEST_ACCELERATION, table.acceleration(table.acceleration_deg_per_s2));
+        Module {
+            number: table.module.unwrap_or(1140),
+            watchdog: true,
+            strength: 3.0 * table.acceleration_deg_per_s2 * table.steps_per_degree(),
+            stalled: false,
+            limit_closed: false,
+            activity: Activity::Velocity(0.0),
+            shaft,
+            offset: -shaft,
+            speed: 0.0,
+            axes,
+            watchdog_ms: 0,
+            since_command: 0.0,
+            table: table.clone(),
+        }
+    }
+
+    /// Degrees of the array in the sweep, whatever the counter says.
+    fn angle(&self) -> f64 {
+        self.table.angle(self.shaft.round() as i32)
+    }
+
+    /// The motor turns, or would.
+    fn turning(&self) -> bool {
+        self.speed != 0.0
+    }
+
+    fn register(&self, parameter: u8) -> f64 {
+        self.axes.get(&parameter).copied().map_or(0.0, f64::from)
+    }
+
+    fn limits(&self) -> [f64; 2] {
+        let half = self.table.largest_angle_deg / 2.0 + LIMIT_MARGIN;
+        let ends = [-half, half].map(|angle| f64::from(self.table.position(angle)));
+        [ends[0].min(ends[1]), ends[0].max(ends[1])]
+    }
+
+    fn closed(&self, side: Side) -> bool {
+        match side {
+            Side::Left => self.shaft <= self.limits()[0],
+            Side::Right => self.limit_closed || self.shaft >= self.limits()[1],
+        }
+    }
+
+    fn home_closed(&self) -> bool {
+        let closed = if self.table.home_direction == Side::Left { self.shaft <= 0.0 } else { self.shaft >= 0.0 };
+        closed != self.table.home_inverted
+    }
+
+    /// Lets time pass. `idle`: no command is waiting to be read, so the watchdog may bark.
+    fn pass(&mut self, time: Duration, idle: bool) {
+        let mut left = time.as_secs_f64();
+        self.since_command += left;
+        if idle && self.watchdog && self.watchdog_ms > 0 && self.since_command * 1e3 > f64::from(self.watchdog_ms) {
+            self.activity = Activity::Velocity(0.0);
+        }
+        while left > 0.0 {
+            let step = left.min(STEP);
+            self.step(step);
+            left -= step;
+        }
+    }
+
+    fn step(&mut self, time: f64) {
+        let acceleration = self.register(axis::LARGEST_ACCELERATION) / self.table.acceleration_scale();
+        let towards = |from: f64, to: f64, most: f64| {
+            // As fast as can still be braked, a little less for the size of the steps.
+            let fast = (1.9 * acceleration * (to - from).abs()).sqrt();
+            fast.min(most).copysign(to - from)
+        };
+        let (wanted, end) = match self.activity {
+            Activity::Velocity(velocity) => (velocity, None),
+            Activity::Position(target) => {
+                let most = self.register(axis::LARGEST_SPEED) / self.table.speed_scale();
+                let end = target - self.offset;
+                (towards(self.shaft, end, most), Some(end))
+            }
+            Activity::Search => {
+                let most = self.register(axis::SEARCH_SPEED) / self.table.speed_scale();
+                (towards(self.shaft, 0.0, most), Some(0.0))
+            }
+        };
+        if self.stalled {
+            self.halt();
+            return;
+        }
+        let change = (wanted - self.speed).clamp(-acceleration * time, acceleration * time);
+        if change != 0.0 && acceleration > self.strength {
+            self.stalled = true;
+        }
+        self.speed += change;
+        let before = self.shaft;
+        self.shaft += self.speed * time;
+        if let Some(end) = end {
+            let crossed = (before - end) * (self.shaft - end) <= 0.0;
+            if (crossed || (self.shaft - end).abs() < 0.5) && self.speed.abs() <= 4.0 * acceleration * time {
+                (self.shaft, self.speed) = (end, 0.0);
+                if self.activity == Activity::Search {
+                    self.offset = 0.0;
+                    self.activity = Activity::Velocity(0.0);
+                }
+            }
+        }
+        let ahead = if self.speed > 0.0 { Side::Right } else { Side::Left };
+        if self.speed != 0.0 && self.closed(ahead) {
+            self.halt();
+        }
+    }
+
+    /// Stands at once. A search goes on by itself no more.
+    fn halt(&mut self) {
+        self.speed = 0.0;
+        if let Activity::Velocity(_) | Activity::Position(_) = self.activity {
+            self.activity = Activity::Velocity(0.0);
+        }
+    }
+
+    fn counter(&self) -> i32 {
+        (self.shaft + self.offset).round() as i32
+    }
+
+    /// Carries a request out.
+    fn answer(&mut self, request: &Request) -> Reply {
+        self.since_command = 0.0;
+        let (status, value) = match self.carry_out(request) {
+            Ok(value) => (SUCCESS, value),
+            Err(status) => (status, 0),
+        };
+        Reply { host: 2, module: self.table.address, status, command: request.command, value }
+    }
+
+    fn carry_out(&mut self, request: &Request) -> Result<i32, u8> {
+        let Request { command, kind, motor, value, .. } = *request;
+        let of_axis = matches!(command, command::ROTATE_RIGHT..=command::GET_AXIS | command::REFERENCE_SEARCH);
+        if of_axis && motor != self.table.motor {
+            return Err(BAD_VALUE);
+        }
+        match command {
+            command::ROTATE_RIGHT => self.activity = Activity::Velocity(f64::from(value) / self.table.speed_scale()),
+            command::ROTATE_LEFT => self.activity = Activity::Velocity(-f64::from(value) / self.table.speed_scale()),
+            command::STOP => self.activity = Activity::Velocity(0.0),
+            command::MOVE_TO => match kind {
+                0 => self.activity = Activity::Position(f64::from(value)),
+                1 => self.activity = Activity::Position(f64::from(self.counter()) + f64::from(value)),
+                _ => return Err(BAD_TYPE),
+            },
+            command::SET_AXIS => return self.set(kind, value),
+            command::GET_AXIS => return self.get(kind),
+            command::SET_GLOBAL if kind == tmcl::WATCHDOG && self.watchdog => self.watchdog_ms = value,
+            command::GET_GLOBAL if kind == tmcl::WATCHDOG && self.watchdog => return Ok(self.watchdog_ms),
+            command::SET_GLOBAL | command::GET_GLOBAL => return Err(BAD_TYPE),
+            command::REFERENCE_SEARCH => match kind {
+                0 => self.activity = Activity::Search,
+                1 if self.activity == Activity::Search => self.activity = Activity::Velocity(0.0),
+                1 => {}
+                2 => return Ok(i32::from(self.activity == Activity::Search)),
+                _ => return Err(BAD_TYPE),
+            },
+            command::GET_INPUT => return Ok(0),
+            command::VERSION => return Ok(i32::from(self.number) << 16 | 0x0110),
+            _ => return Err(BAD_COMMAND),
+        }
+        Ok(value)
+    }
+
+    fn set(&mut self, parameter: u8, value: i32) -> Result<i32, u8> {
+        match parameter {
+            axis::TARGET => self.activity = Activity::Position(f64::from(value)),
+            axis::POSITION => self.offset = f64::from(value) - self.shaft,
+            axis::LARGEST_SPEED | axis::LARGEST_ACCELERATION | axis::SEARCH_SPEED | axis::SWITCH_SPEED if value < 0 => {
+                return Err(BAD_VALUE);
+            }
+            known if self.axes.contains_key(&known) => {
+                self.axes.insert(known, value);
+            }
+            _ => return Err(BAD_TYPE),
+        }
+        Ok(value)
+    }
+
+    fn get(&self, parameter: u8) -> Result<i32, u8> {
+        Ok(match parameter {
+            axis::TARGET => match self.activity {
+                Activity::Position(target) => target as i32,
+                _ => self.counter(),
+            },
+            axis::POSITION => self.counter(),
+            axis::SPEED => (self.speed * self.table.speed_scale()).round() as i32,
+            axis::REACHED => i32::from(matches!(self.activity, Activity::Position(t) if t as i32 == self.counter())),
+            axis::HOME_SWITCH => i32::from(self.home_closed()),
+            axis::RIGHT_LIMIT => i32::from(self.closed(Side::Right)),
+            axis::LEFT_LIMIT => i32::from(self.closed(Side::Left)),
+            other => *self.axes.get(&other).ok_or(BAD_TYPE)?,
+        })
+    }
+}

@@ -1,0 +1,620 @@
+//! Freehand compounding: 2D frames whose pose is tracked become a Cartesian volume.
+//!
+//! Two steps, as in the pixel-based methods of Rohling, Gee and Berman, *A comparison of freehand three-dimensional ultrasound
+//! reconstruction techniques*, Med. Image Anal. 3 (1999), and Solberg et al., *Freehand 3D ultrasound reconstruction algorithms: a
+//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is given to the voxels around its place as it arrives ([`Splat`], [`Overlap`]),
+//! and voxels that no pixel reached are filled from those around them. The second step bridges gaps along straight lines that end in
+//! reached voxels on both sides (Vaughan et al., *Hole filling with oriented sticks in ultrasound volume reconstruction*, J. Med. Imaging
+//! 2 (2015)): so holes up to a width are closed, wider ones stay 0 all over, and nothing grows beyond the border of what was swept.
+
+use super::samples::StoredType;
+use crate::probe::Grid;
+use glam::{DAffine3, DMat3, DVec3};
+use rayon::prelude::*;
+
+/// Voxels of a volume unless asked otherwise: 2^25, about 320 along each edge.
+pub const DEFAULT_MAX_VOXELS: usize = 1 << 25;
+/// Most of these that can be asked for.
+const MAX_VOXELS: usize = 1 << 31;
+/// Weight that a voxel remembers, in pixels that hit it squarely. Beyond, it forgets half: to larger sums f32 adds one more pixel with a
+/// rounding that shows in their mean, and after 2^24 it adds none.
+const MAX_WEIGHT: f32 = 4096.0;
+/// What is larger cannot be added up in f32; as a sample it is no echo.
+const MAX_SAMPLE: f32 = 1e30;
+/// Weights below are rounding: a pixel on a voxel's middle is not given to its neighbours.
+const MIN_WEIGHT: f64 = 1e-6;
+/// What a pixel must weigh in a voxel to be its maximum. One of the eight around it always weighs so much.
+const MIN_MAXIMUM_WEIGHT: f32 = 0.125;
+
+/// Which voxels a pixel is given to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Splat {
+    /// The one whose middle is nearest.
+    Nearest,
+    /// The eight around it, each with the weight that trilinear interpolation has for it.
+    #[default]
+    Trilinear,
+}
+
+/// What a voxel is that several pixels were given to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Overlap {
+    /// Their weighted mean, whatever their order up to rounding.
+    #[default]
+    Mean,
+    /// The weighted mean of those of the frame that came last.
+    Latest,
+    /// The largest of those that weigh at least an eighth.
+    Maximum,
+}
+
+/// How frames are compounded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompoundingOptions {
+    pub splat: Splat,
+    pub overlap: Overlap,
+    /// Widest gap that is bridged, mm; at most 64 voxels. 0: none.
+    pub max_hole: f64,
+    /// The part of each frame that is ultrasound: column and row of its first pixel, columns, rows. `None`: all of it.
+    pub clip: Option<[usize; 4]>,
+    /// Distance between voxels along each axis, mm. `None`: between the frames' pixels.
+    pub spacing: Option<f64>,
+    /// What the volume has around the frames that it was laid around, mm.
+    pub margin: f64,
+    pub max_voxels: usize,
+}
+
+impl Default for CompoundingOptions {
+    fn default() -> CompoundingOptions {
+        CompoundingOptions {
+            splat: Splat::default(),
+            overlap: Overlap::default(),
+            max_hole: 2.0,
+            clip: None,
+            spacing: None,
+            margin: 5.0,
+            max_voxels: DEFAULT_MAX_VOXELS,
+        }
+    }
+}
+
+/// What became of the frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompoundingCounts {
+    /// Compounded.
+    pub frames: u64,
+    /// Of the compounded: those of which no pixel lies in the volume.
+    pub outside: u64,
+    /// Without a usable pose, or with samples that do not fit their size.
+    pub refused: u64,
+    /// Pixels left out because they were not finite, or beyond 1e30.
+    pub pixels: u64,
+}
+
+/// A volume that grows frame by frame.
+///
+/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and those of the stored type for each slice that a frame has come near.
+pub struct Compounder {
+    lattice: Lattice,
+    stored: StoredType,
+    options: CompoundingOptions,
+    voxels: Voxels,
+    sticks: Sticks,
+    /// Hit since they were last given out.
+    touched: Vec<bool>,
+    /// As they were last given out; empty: zero all over.
+    slices: Vec<Vec<u8>>,
+    zero: Vec<u8>,
+    counts: CompoundingCounts,
+}
+
+impl Compounder {
+    /// An empty volume whose voxels are `stored`; frames may be of any type, and are given without scaling.
+    ///
+    /// # Errors
+    /// A lattice or options that cannot be, or more voxels than the options allow; in words, before anything is allocated.
+    pub fn new(lattice: Lattice, stored: StoredType, options: CompoundingOptions) -> Result<Compounder, String> {
+        let grid = &lattice.grid;
+        grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
+        if !lattice.to_volume.is_finite() {
+            return Err("the volume's own place is not finite".into());
+        }
+        let count = grid.size.iter().try_fold(1usize, |n, m| n.checked_mul(*m)).unwrap_or(usize::MAX);
+        if count > options.max_voxels.min(MAX_VOXELS) {
+            let ([x, y, z], most) = (grid.size, options.max_voxels.min(MAX_VOXELS));
+            return Err(format!("{x} x {y} x {z} voxels: at most {most} are allowed; take a larger spacing"));
+        }
+        let sticks = Sticks::new(grid, options.max_hole)?;
+        let [x, y, z] = grid.size;
+        let voxels = Voxels::new(grid.size, options.overlap);
+        let zero = vec![0; x * y * stored.bytes()];
+        let (touched, slices) = (vec![false; z], vec![Vec::new(); z]);
+        Ok(Compounder {
+            lattice,
+            stored,
+            options,
+            voxels,
+            sticks,
+            touched,
+            slices,
+            zero,
+            counts: CompoundingCounts::default(),
+        })
+    }
+
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub fn stored(&self) -> StoredType {
+        self.stored
+    }
+
+    pub fn counts(&self) -> CompoundingCounts {
+        self.counts
+    }
+
+    /// Compounds a frame: how many of its pixels lie in the volume.
+    ///
+    /// # Errors
+    /// What is wrong with a frame that is refused; it is counted, and the volume stays as it is.
+    pub fn push(&mut self, frame: &TrackedFrame) -> Result<u64, String> {
+        let checked = frame.check().and_then(|()| frame.pose.clipped(self.options.clip));
+        let [columns, rows] = match checked {
+            Ok(clipped) => clipped,
+            Err(fault) => {
+                self.counts.refused += 1;
+                return Err(fault);
+            }
+        };
+        self.voxels.begin();
+        let grid = &self.lattice.grid;
+        let to_index = |place: DVec3| {
+            let place = self.lattice.to_volume.transform_point3(place);
+            (place - DVec3::from(grid.origin)) / DVec3::from(grid.spacing)
+        };
+        let origin = to_index(frame.pose.place(0.0, 0.0));
+        let (right, down) =
+            (to_index(frame.pose.place(1.0, 0.0)) - origin, to_index(frame.pose.place(0.0, 1.0)) - origin);
+        let mut inside = 0;
+        for row in rows.0..rows.1 {
+            let start = origin + down * row as f64;
+            for column in columns.0..columns.1 {
+                let at = start + right * column as f64;
+                let Some(value) = frame.sample(column, row) else { continue };
+                if value.is_nan() || value.abs() > MAX_SAMPLE {
+                    self.counts.pixels += 1;
+                    continue;
+                }
+                inside += u64::from(self.voxels.splat(at, value, self.options.splat, &mut self.touched));
+            }
+        }
+        self.counts.frames += 1;
+        self.counts.outside += u64::from(inside == 0);
+        Ok(inside)
+    }
+
+    /// Fills the slices anew that frames have come near since the last time, and names them, lowest first.
+    pub fn changed_slices(&mut self) -> Vec<usize> {
+        let (reach, last) = (self.sticks.reach(), self.touched.len());
+        let near = |k: usize| self.touched[k.saturating_sub(reach)..(k + reach + 1).min(last)].contains(&true);
+        let changed: Vec<usize> = (0..last).filter(|k| near(*k)).collect();
+        let fill = |k: &usize| (*k, self.sticks.filled(&self.voxels, *k, self.stored));
+        let filled: Vec<(usize, Vec<u8>)> = changed.par_iter().map(fill).collect();
+        for (k, bytes) in filled {
+            self.slices[k] = bytes;
+        }
+        self.touched.fill(false);
+        changed
+    }
+
+    /// A slice as it was when [`Compounder::changed_slices`] last named it: rows of depth, lateral fastest, little-endian. Zero where nothing
+    /// is; `None` beyond the last.
+    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+        self.slices.get(k).map(|slice| if slice.is_empty() { &self.zero[..] } else { &slice[..] })
+    }
+}
+
+/// No pixel lies further off, mm.
+const MAX_DISTANCE: f64 = 1e6;
+/// Least sine of the angle between rows and columns: below, the frame is a line.
+const MIN_SINE: f64 = 1e-3;
+/// Most columns and rows.
+const MAX_PIXELS: usize = 1 << 16;
+
+/// First column and the one behind the last, and rows likewise.
+type PixelRange = [(usize, usize); 2];
+
+/// Where the pixels of a frame lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// From (column, row, 0), of pixels' middles and from 0, to a place in the tracker's space, mm. Its third axis is not used.
+    pub to_space: DAffine3,
+    /// Columns and rows.
+    pub size: [usize; 2],
+}
+
+/// A frame and its pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackedFrame<'a> {
+    pub pose: Pose,
+    pub stored: StoredType,
+    /// Samples row by row, little-endian.
+    pub bytes: &'a [u8],
+}
+
+impl Pose {
+    /// The place of a pixel, mm.
+    pub fn place(&self, column: f64, row: f64) -> DVec3 {
+        self.to_space.transform_point3(DVec3::new(column, row, 0.0))
+    }
+
+    /// # Errors
+    /// A frame without pixels, or whose pose is not finite, is flat, or lies beyond 1e6 mm; in words.
+    pub fn check(&self) -> Result<(), String> {
+        let [columns, rows] = self.size;
+        if !(1..=MAX_PIXELS).contains(&columns) || !(1..=MAX_PIXELS).contains(&rows) {
+            return Err(format!("a frame of {columns} x {rows} pixels; each must be 1 to {MAX_PIXELS}"));
+        }
+        if !self.to_space.is_finite() {
+            return Err("a pose with a number that is not finite".into());
+        }
+        let (right, down) = (self.to_space.matrix3.x_axis, self.to_space.matrix3.y_axis);
+        let sine = right.cross(down).length() / (right.length() * down.length());
+        // NaN where an axis is zero.
+        if sine.is_nan() || sine < MIN_SINE {
+            return Err("a pose that makes a line or a point of the frame".into());
+        }
+        let (last, line) = ((columns - 1) as f64, (rows - 1) as f64);
+        let corners = [(0.0, 0.0), (last, 0.0), (0.0, line), (last, line)];
+        let near = corners.iter().all(|(c, r)| self.place(*c, *r).abs().max_element() <= MAX_DISTANCE);
+        let steps = [right, down].iter().all(|step| (1.0 / MAX_DISTANCE..=MAX_DISTANCE).contains(&step.length()));
+        match near && steps {
+            true => Ok(()),
+            false => Err("a pose with pixels beyond 1e6 mm, or closer than 1e-6 mm to one another".into()),
+        }
+    }
+
+    /// What a clip rectangle leaves.
+    ///
+    /// # Errors
+    /// Nothing is left.
+    fn clipped(&self, clip: Option<[usize; 4]>) -> Result<PixelRange, String> {
+        let [columns, rows] = self.size;
+        let [x, y, width, height] = clip.unwrap_or([0, 0, columns, rows]);
+        let part = |first: usize, count: usize, whole| (first, first.saturating_add(count).min(whole));
+        let left = [part(x, width, columns), part(y, height, rows)];
+        match left.iter().all(|(first, end)| first < end) {
+            true => Ok(left),
+            false => {
+                Err(format!("a clip of {width} x {height} pixels at ({x}, {y}) leaves nothing of {columns} x {rows}"))
+            }
+        }
+    }
+}
+
+impl TrackedFrame<'_> {
+    /// # Errors
+    /// As of [`Pose::check`], and samples that are more or fewer than its pixels.
+    pub fn check(&self) -> Result<(), String> {
+        self.pose.check()?;
+        let [columns, rows] = self.pose.size;
+        let expected = columns * rows * self.stored.bytes();
+        match self.bytes.len() == expected {
+            true => Ok(()),
+            false => Err(format!("a frame of {} bytes; {columns} x {rows} pixels have {expected}", self.bytes.len())),
+        }
+    }
+
+    /// None beyond the last.
+    fn sample(&self, column: usize, row: usize) -> Option<f32> {
+        let n = row * self.pose.size[0] + column;
+        let of = |bytes: usize| self.bytes.get(n * bytes..);
+        match self.stored {
+            StoredType::U8 => self.bytes.get(n).map(|v| f32::from(*v)),
+            StoredType::U16 => of(2)?.first_chunk().map(|v| f32::from(u16::from_le_bytes(*v))),
+            StoredType::F32 => of(4)?.first_chunk().map(|v| f32::from_le_bytes(*v)),
+        }
+    }
+}
+
+/// Most voxels along an edge: what 3D textures have on most devices.
+const MAX_EDGE: f64 = 2048.0;
+/// Steps in which the spacing is made coarser; each takes most of what is too much.
+const COARSENING_STEPS: usize = 64;
+
+/// Where the voxels of a volume lie in the tracker's space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    pub grid: Grid,
+    /// From the tracker's space to the volume's, mm: a turn and a shift.
+    pub to_volume: DAffine3,
+}
+
+impl Lattice {
+    /// A lattice in the tracker's own axes.
+    pub fn straight(grid: Grid) -> Lattice {
+        Lattice { grid, to_volume: DAffine3::IDENTITY }
+    }
+
+    /// The lattice that holds some frames, `options.margin` around them.
+    ///
+    /// Its axes are the mean of theirs: lateral along the rows, depth down the columns and at a right angle to it, elevation along the
+    /// normal (lateral x depth). The origin is the mean of the middles of their first rows, as if the probe's face were there. What the clip
+    /// leaves out does not count. The distance of voxels is what was asked for, otherwise that of pixels along rows and columns and the
+    /// larger of both along the normal; all three are made coarser until there are no more than `options.max_voxels`, and 2048 along
+    /// an edge. Poses that place no frame are left out.
+    ///
+    /// # Errors
+    /// No pose is left, or no length, or nothing coarse enough; in words.
+    pub fn around(poses: &[Pose], options: &CompoundingOptions) -> Result<Lattice, String> {
+        let length = |what, mm: f64, least: f64| match (least..=1e6).contains(&mm) {
+            true => Ok(()),
+            false => Err(format!("{what} {mm} mm: must be a length of at most 1e6 mm")),
+        };
+        length("margin", options.margin, 0.0)?;
+        options.spacing.map_or(Ok(()), |mm| length("spacing", mm, 1e-6))?;
+        let placed: Vec<_> = poses
+            .iter()
+            .filter(|pose| pose.check().is_ok())
+            .filter_map(|pose| pose.clipped(options.clip).ok().map(|clip| (pose, clip)))
+            .collect();
+        let Some((first, _)) = placed.first() else {
+            return Err(format!("none of {} poses places a frame", poses.len()));
+        };
+        let mean = |of: &dyn Fn(&Pose, PixelRange) -> DVec3| {
+            placed.iter().map(|(pose, clip)| of(pose, *clip)).sum::<DVec3>() / placed.len() as f64
+        };
+        let [right, down] = [|pose: &Pose| pose.to_space.matrix3.x_axis, |pose: &Pose| pose.to_space.matrix3.y_axis];
+        let turned = axes(mean(&|p, _| right(p).normalize()), mean(&|p, _| down(p).normalize()))
+            .or_else(|| axes(right(first).normalize(), down(first).normalize()))
+            .unwrap_or(DMat3::IDENTITY);
+        let origin = mean(&|pose, [columns, rows]| pose.place((columns.0 + columns.1 - 1) as f64 / 2.0, rows.0 as f64));
+        let to_volume = DAffine3::from_mat3(turned.transpose()) * DAffine3::from_translation(-origin);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (pose, [columns, rows]) in &placed {
+            for (column, row) in
+                [(columns.0, rows.0), (columns.1 - 1, rows.0), (columns.0, rows.1 - 1), (columns.1 - 1, rows.1 - 1)]
+            {
+                let corner = to_volume.transform_point3(pose.place(column as f64, row as f64));
+                (low, high) = (low.min(corner), high.max(corner));
+            }
+        }
+        let pitch = [mean(&|p, _| DVec3::splat(right(p).length())).x, mean(&|p, _| DVec3::splat(down(p).length())).x];
+        let spacing = match options.spacing {
+            Some(mm) => DVec3::splat(mm),
+            None => DVec3::new(pitch[0], pitch[1], pitch[0].max(pitch[1])),
+        };
+        let grid = grid(low - options.margin, high + options.margin, spacing, options.max_voxels)?;
+        grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
+        Ok(Lattice { grid, to_volume })
+    }
+}
+
+/// Axes at right angles, as columns: the first kept, the second as near to what is given as that allows. None where there is hardly a
+/// direction: frames that point every way have no mean.
+fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
+    const LEAST: f64 = 5e-4;
+    let x = right.try_normalize().filter(|_| right.length() > LEAST)?;
+    let y = down - x * down.dot(x);
+    let y = y.try_normalize().filter(|_| y.length() > LEAST)?;
+    Some(DMat3::from_cols(x, y, x.cross(y)))
+}
+
+/// The lattice from `low` to `high`, its spacing as little coarser as `most` voxels allow.
+fn grid(low: DVec3, high: DVec3, mut spacing: DVec3, most: usize) -> Result<Grid, String> {
+    let most = most.max(1) as f64;
+    for _ in 0..COARSENING_STEPS {
+        // Of the outermost voxels, each end is within a quarter of the spacing.
+        let count = ((high - low) / spacing).round() + 1.0;
+        let (all, along) = (count.element_product(), count.max_element());
+        if all <= most && along <= MAX_EDGE {
+            let size = count.to_array().map(|n| n as usize);
+            let origin = (low + high - (count - 1.0) * spacing) / 2.0;
+            return Ok(Grid { size, spacing: spacing.to_array(), origin: origin.to_array() });
+        }
+        spacing *= (all / most).cbrt().max(along / MAX_EDGE).max(1.001);
+    }
+    Err(format!("no spacing makes {most} voxels or fewer of {:.1} mm", high - low))
+}
+
+/// Weighted sums, lateral fastest, then depth, then elevation.
+struct Voxels {
+    size: [usize; 3],
+    overlap: Overlap,
+    /// Sum of weighted values, and of weights; the second is 0 where nothing came.
+    sums: Vec<[f32; 2]>,
+    /// The frame that a voxel's sums are of; only with [`Overlap::Latest`].
+    frames: Vec<u32>,
+    frame: u32,
+    /// By row: lowest and highest lateral index that anything came to; reversed where nothing did.
+    rows: Vec<[u32; 2]>,
+}
+
+impl Voxels {
+    fn new(size: [usize; 3], overlap: Overlap) -> Voxels {
+        let [x, y, z] = size;
+        let frames = if overlap == Overlap::Latest { vec![0; x * y * z] } else { Vec::new() };
+        Voxels { size, overlap, sums: vec![[0.0; 2]; x * y * z], frames, frame: 0, rows: vec![[u32::MAX, 0]; y * z] }
+    }
+
+    /// What follows is of another frame.
+    fn begin(&mut self) {
+        // 0 is of none.
+        self.frame = self.frame.wrapping_add(1).max(1);
+    }
+
+    /// Gives a pixel's value to the voxels around a place, in indices. `touched`: slices that something came to. False: no voxel is there.
+    fn splat(&mut self, at: DVec3, value: f32, splat: Splat, touched: &mut [bool]) -> bool {
+        let size = DVec3::from_array(self.size.map(|n| n as f64));
+        // No voxel is within reach. NaN is in no range.
+        if !(at.cmpgt(DVec3::NEG_ONE).all() && at.cmplt(size).all()) {
+            return false;
+        }
+        if splat == Splat::Nearest {
+            let near = (at + 0.5).floor();
+            return near.cmpge(DVec3::ZERO).all() && near.cmplt(size).all() && {
+                self.add(near.to_array().map(|n| n as usize), value, 1.0, touched);
+                true
+            };
+        }
+        let (low, mut inside) = (at.floor(), false);
+        let share = (at - low).to_array();
+        let low = low.to_array().map(|n| n as isize);
+        for corner in 0..8usize {
+            let high = [corner & 1, corner >> 1 & 1, corner >> 2 & 1];
+            let weight: f64 = (0..3).map(|a| if high[a] == 1 { share[a] } else { 1.0 - share[a] }).product();
+            let cell = [0, 1, 2].map(|a| low[a] + high[a] as isize);
+            let there = (0..3).all(|a| cell[a] >= 0 && (cell[a] as usize) < self.size[a]);
+            if weight >= MIN_WEIGHT && there {
+                self.add(cell.map(|n| n as usize), value, weight as f32, touched);
+                inside = true;
+            }
+        }
+        inside
+    }
+
+    fn add(&mut self, [x, y, z]: [usize; 3], value: f32, weight: f32, touched: &mut [bool]) {
+        let row = z * self.size[1] + y;
+        let n = row * self.size[0] + x;
+        let sums = &mut self.sums[n];
+        match self.overlap {
+            Overlap::Mean => {}
+            Overlap::Latest if self.frames[n] != self.frame => {
+                self.frames[n] = self.frame;
+                *sums = [0.0; 2];
+            }
+            Overlap::Latest => {}
+            Overlap::Maximum if weight < MIN_MAXIMUM_WEIGHT || (sums[1] > 0.0 && sums[0] >= value) => return,
+            Overlap::Maximum => *sums = [0.0; 2],
+        }
+        let weight = if self.overlap == Overlap::Maximum { 1.0 } else { weight };
+        *sums = [sums[0] + value * weight, sums[1] + weight];
+        if sums[1] > MAX_WEIGHT {
+            *sums = sums.map(|sum| sum / 2.0);
+        }
+        let [first, last] = self.rows[row];
+        self.rows[row] = [first.min(x as u32), last.max(x as u32)];
+        touched[z] = true;
+    }
+
+    /// The value of voxel `n` of all, if anything came to it.
+    fn value(&self, n: usize) -> Option<f32> {
+        self.sums.get(n).filter(|[_, weight]| *weight > 0.0).map(|[sum, weight]| sum / weight)
+    }
+
+    /// Lowest and highest lateral and depth index, ends included, that anything came to in some slices.
+    fn bounds(&self, slices: std::ops::Range<usize>) -> Option<[[usize; 2]; 2]> {
+        let depth = self.size[1];
+        let rows = self.rows.get(slices.start * depth..slices.end * depth)?;
+        let mut bounds: Option<[[usize; 2]; 2]> = None;
+        for (n, [first, last]) in rows.iter().enumerate().filter(|(_, [first, last])| first <= last) {
+            let (first, last, y) = (*first as usize, *last as usize, n % depth);
+            let [x_bounds, y_bounds] = bounds.unwrap_or([[first, last], [y, y]]);
+            let x_bounds = [x_bounds[0].min(first), x_bounds[1].max(last)];
+            bounds = Some([x_bounds, [y_bounds[0].min(y), y_bounds[1].max(y)]]);
+        }
+        bounds
+    }
+}
+
+/// Widest hole, in voxels.
+const MAX_HOLE_VOXELS: f64 = 64.0;
+
+/// Straight lines through a voxel along which a hole may be bridged.
+struct Sticks {
+    sticks: Vec<Stick>,
+}
+
+struct Stick {
+    /// Voxels along each axis, -1, 0 or 1.
+    step: [isize; 3],
+    /// Of a step, mm.
+    length: f64,
+    /// Empty voxels between both ends.
+    most: usize,
+}
+
+impl Sticks {
+    /// # Errors
+    /// A width that is no length, or of more voxels than are looked through.
+    fn new(grid: &Grid, widest: f64) -> Result<Sticks, String> {
+        let finest = grid.spacing.into_iter().fold(f64::INFINITY, f64::min);
+        if !(widest >= 0.0 && widest / finest <= MAX_HOLE_VOXELS) {
+            return Err(format!("widest hole {widest} mm: must be 0 to {MAX_HOLE_VOXELS} voxels of {finest} mm"));
+        }
+        let steps = (0..27isize).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]);
+        // Each line once, in the direction whose last step that is not 0 is 1.
+        let once = steps.filter(|s| s.iter().rev().find(|v| **v != 0) == Some(&1));
+        let stick = |step: [isize; 3]| {
+            let length = (0..3).map(|a| (step[a] as f64 * grid.spacing[a]).powi(2)).sum::<f64>().sqrt();
+            // A width of whole voxels is not one less by rounding.
+            Stick { step, length, most: (widest / length + 1e-9) as usize }
+        };
+        Ok(Sticks { sticks: once.map(stick).filter(|s| s.most > 0).collect() })
+    }
+
+    /// How many slices off a voxel may be that fills another.
+    fn reach(&self) -> usize {
+        self.sticks.iter().filter(|s| s.step[2] != 0).map(|s| s.most).max().unwrap_or(0)
+    }
+
+    /// A slice with its holes filled, little-endian.
+    fn filled(&self, voxels: &Voxels, z: usize, stored: StoredType) -> Vec<u8> {
+        let [width, height, depth] = voxels.size;
+        let mut bytes = vec![0; width * height * stored.bytes()];
+        let slices = z.saturating_sub(self.reach())..(z + self.reach() + 1).min(depth);
+        // What lies between two voxels lies within the bounds of all.
+        let Some([[left, right], [top, bottom]]) = voxels.bounds(slices) else { return bytes };
+        for y in top..=bottom {
+            for x in left..=right {
+                let n = (z * height + y) * width + x;
+                let value = voxels.value(n).or_else(|| self.bridged(voxels, [x, y, z], n));
+                if let Some(value) = value {
+                    put(&mut bytes, stored, y * width + x, value);
+                }
+            }
+        }
+        bytes
+    }
+
+    /// The mean of the ends of all sticks that are whole, weighted by one over their distance: along a single stick the straight line
+    /// between its ends.
+    fn bridged(&self, voxels: &Voxels, cell: [usize; 3], n: usize) -> Option<f32> {
+        let [width, height, _] = voxels.size;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for Stick { step, length, most } in &self.sticks {
+            let stride = step[0] + width as isize * (step[1] + height as isize * step[2]);
+            // The first voxel with a value, at most `steps` off, and how far.
+            let end = |sign: isize, steps: usize| {
+                let room = |a: usize| match step[a] * sign {
+                    0 => usize::MAX,
+                    1 => voxels.size[a] - 1 - cell[a],
+                    _ => cell[a],
+                };
+                let steps = steps.min(room(0)).min(room(1)).min(room(2));
+                let at = |s: usize| n.wrapping_add_signed(sign * stride * s as isize);
+                (1..=steps).find_map(|s| voxels.value(at(s)).map(|value| (s, f64::from(value))))
+            };
+            let Some((forth, a)) = end(1, *most) else { continue };
+            let Some((back, b)) = end(-1, most + 1 - forth) else { continue };
+            let [near, far] = [forth, back].map(|steps| 1.0 / (steps as f64 * length));
+            sum += a * near + b * far;
+            weights += near + far;
+        }
+        (weights > 0.0).then(|| (sum / weights) as f32)
+    }
+}
+
+/// Stores a value, rounded to nearest where the type is whole.
+fn put(bytes: &mut [u8], stored: StoredType, n: usize, value: f32) {
+    let at = n * stored.bytes();
+    let Some(place) = bytes.get_mut(at..at + stored.bytes()) else { return };
+    match stored {
+        StoredType::U8 => place.copy_from_slice(&[value.round() as u8]),
+        StoredType::U16 => place.copy_from_slice(&(value.round() as u16).to_le_bytes()),
+        // As no reader lets a denormal through, neither does a mean.
+        StoredType::F32 if value.is_subnormal() => {}
+        StoredType::F32 => place.copy_from_slice(&value.to_le_bytes()),
+    }
+}

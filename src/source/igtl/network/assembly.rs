@@ -1,0 +1,432 @@
+//! From messages to volumes: samples of an IMAGE, whole Cartesian volumes, and freehand sweeps of tracked frames.
+
+use super::faults::{FaultKind, Faults};
+use crate::probe::{Geometry, Grid};
+use crate::source::frame::Header;
+use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
+use crate::source::igtl::client::ClientOptions;
+use crate::source::igtl::codec::BODY_LIMIT;
+use crate::source::igtl::message::{Image, Message, Scalar};
+use crate::source::igtl::pairing::Pairing;
+use crate::source::samples::{Replaced, SampleType, StoredType, not_empty, store, widen};
+use glam::DAffine3;
+use std::time::{Duration, Instant};
+
+/// Where the pose of a 2D frame comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Poses {
+    /// TRANSFORM and TDATA messages, chosen as [`Pairing::new`](crate::source::igtl::Pairing::new) says: device, tolerance and patience in s.
+    Messages { device: Option<String>, tolerance: f64, patience: f64 },
+    /// The image's own matrix.
+    Image,
+}
+
+/// How a [`Network`] behaves.
+#[derive(Clone, Debug)]
+pub struct NetworkOptions {
+    pub client: ClientOptions,
+    pub poses: Poses,
+    pub freehand: freehand::CompoundingOptions,
+    /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
+    pub first: usize,
+    /// A sweep is given out so often, s, while frames come ...
+    pub update: f64,
+    /// ... or after so many frames.
+    pub frames: usize,
+    /// Largest volume, bytes as it is stored.
+    pub volume_bytes: usize,
+}
+
+impl Default for NetworkOptions {
+    fn default() -> NetworkOptions {
+        NetworkOptions {
+            client: ClientOptions::default(),
+            poses: Poses::Messages { device: None, tolerance: 0.1, patience: 1.0 },
+            freehand: freehand::CompoundingOptions { margin: 20.0, ..freehand::CompoundingOptions::default() },
+            first: 100,
+            update: 0.5,
+            frames: 64,
+            volume_bytes: BODY_LIMIT,
+        }
+    }
+}
+
+/// How long the first frames are waited for, and how many bytes of them.
+const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
+const MAX_FIRST_BYTES: usize = 256 << 20;
+
+/// A frame that came before there was a volume for it.
+struct BufferedFrame {
+    pose: Pose,
+    bytes: Vec<u8>,
+}
+
+pub(super) struct FreehandSweep {
+    options: NetworkOptions,
+    pairing: Pairing,
+    /// Of all frames; another one begins another sweep.
+    stored: StoredType,
+    range: [f64; 2],
+    buffered: Vec<BufferedFrame>,
+    buffered_bytes: usize,
+    compounder: Option<Compounder>,
+    /// When the first frame came that was not given out yet.
+    since: Option<Instant>,
+    frames: usize,
+    /// Of the last frame.
+    time: Option<f64>,
+}
+
+impl FreehandSweep {
+    pub fn new(options: NetworkOptions) -> FreehandSweep {
+        let pairing = match options.poses.clone() {
+            Poses::Messages { device, tolerance, patience } => Pairing::new(device, tolerance, patience),
+            Poses::Image => Pairing::new(None, 0.0, 0.0),
+        };
+        FreehandSweep {
+            options,
+            pairing,
+            stored: StoredType::U8,
+            range: [0.0, 255.0],
+            buffered: Vec::new(),
+            buffered_bytes: 0,
+            compounder: None,
+            since: None,
+            frames: 0,
+            time: None,
+        }
+    }
+
+    /// Takes what is of a sweep; other messages are passed over.
+    pub fn take(&mut self, message: Message, faults: &mut Faults) {
+        match (message, &self.options.poses) {
+            (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
+            (message, _) => {
+                let before = self.pairing.counts().dropped;
+                for paired in self.pairing.push(message) {
+                    self.frame(paired.image, paired.pose, faults);
+                }
+                let dropped = self.pairing.counts().dropped - before;
+                faults.note(FaultKind::Unpaired, dropped, "no pose came near their time");
+            }
+        }
+    }
+
+    fn frame(&mut self, image: Image, pose: DAffine3, faults: &mut Faults) {
+        let ([columns, rows, _], [i, j, _]) = (image.region.size, image.size);
+        if [columns, rows] != [i, j] {
+            let why = format!("a part of {columns} x {rows} of {i} x {j} pixels; whole frames are taken only");
+            return faults.note(FaultKind::Image, 1, &why);
+        }
+        let own = DAffine3::from_mat4(image.index_to_mm(image.coordinates));
+        let pose = Pose { to_space: pose * own, size: [usize::from(columns), usize::from(rows)] };
+        let (stored, time) = (stored(image.scalar), (image.time > 0.0).then_some(image.time));
+        let bytes = match samples(image) {
+            Ok((bytes, replaced)) => {
+                faults.note(FaultKind::Samples, replaced, "they read as 0");
+                bytes
+            }
+            Err(fault) => return faults.note(FaultKind::Image, 1, &fault),
+        };
+        if stored != self.stored {
+            // Values of two types do not mix.
+            (self.stored, self.compounder, self.buffered_bytes) = (stored, None, 0);
+            self.buffered.clear();
+        }
+        self.time = time;
+        self.since.get_or_insert_with(Instant::now);
+        self.frames += 1;
+        match &mut self.compounder {
+            Some(compounder) => push(compounder, pose, &bytes, faults),
+            None => {
+                self.buffered_bytes += bytes.len();
+                self.buffered.push(BufferedFrame { pose, bytes });
+            }
+        }
+    }
+
+    /// Brings the volume up to date if that is due; then the time of its last frame.
+    pub fn update(&mut self, faults: &mut Faults) -> Option<Option<f64>> {
+        let waited = self.since?.elapsed();
+        if self.compounder.is_none() {
+            let enough = self.buffered.len() >= self.options.first.max(1) || self.buffered_bytes >= MAX_FIRST_BYTES;
+            if !enough && waited < MAX_FIRST_WAIT {
+                return None;
+            }
+            self.begin(faults);
+        } else if waited.as_secs_f64() < self.options.update && self.frames < self.options.frames {
+            return None;
+        }
+        (self.since, self.frames) = (None, 0);
+        let changed = self.compounder.as_mut()?.changed_slices();
+        (!changed.is_empty()).then_some(self.time)
+    }
+
+    /// Lays the volume around the first frames and compounds them.
+    fn begin(&mut self, faults: &mut Faults) {
+        let buffered = std::mem::take(&mut self.buffered);
+        self.buffered_bytes = 0;
+        let poses: Vec<Pose> = buffered.iter().map(|frame| frame.pose).collect();
+        let options = &self.options.freehand;
+        let made =
+            Lattice::around(&poses, options).and_then(|lattice| Compounder::new(lattice, self.stored, options.clone()));
+        let mut compounder = match made {
+            Ok(compounder) => compounder,
+            Err(fault) => return faults.note(FaultKind::Volume, 1, &fault),
+        };
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for BufferedFrame { pose, bytes } in &buffered {
+            widen(&mut range, self.stored, bytes);
+            push(&mut compounder, *pose, bytes, faults);
+        }
+        self.range = if self.stored == StoredType::U8 { [0.0, 255.0] } else { not_empty(range) };
+        self.compounder = Some(compounder);
+    }
+
+    /// None before there is a volume.
+    pub fn header(&self) -> Option<Header> {
+        let geometry = Geometry::Cartesian(self.compounder.as_ref()?.lattice().grid);
+        Some(Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range })
+    }
+
+    /// None beyond the last.
+    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+        self.compounder.as_ref()?.slice(k)
+    }
+}
+
+fn push(compounder: &mut Compounder, pose: Pose, bytes: &[u8], faults: &mut Faults) {
+    match compounder.push(&TrackedFrame { pose, stored: compounder.stored(), bytes }) {
+        Ok(0) => faults.note(FaultKind::Outside, 1, "the volume was laid around the first frames of the sweep"),
+        Ok(_) => {}
+        Err(fault) => faults.note(FaultKind::Pose, 1, &fault),
+    }
+}
+
+/// Lengths that are no more than this share apart are the same: a volume that is turned has its spacing computed anew in f32.
+const SPACING_TOLERANCE: f64 = 1e-5;
+
+/// The volume as it is after the last message.
+pub(super) struct CartesianVolume {
+    scalar: Scalar,
+    components: u8,
+    stored: StoredType,
+    grid: Grid,
+    range: [f64; 2],
+    bytes: Vec<u8>,
+}
+
+impl CartesianVolume {
+    /// Puts an image's slices in their place, in a volume of its own if it is not of the one before; what has not come yet is 0. How many
+    /// samples read as 0 because they were not finite or denormal.
+    ///
+    /// The volume's lateral axis is the image's i, depth is j, elevation is k; lateral and elevation are centred, depth begins at 0. Where
+    /// it lies in the patient is not used. Values that are shown as 0 and 1: all of 8 bits, otherwise the smallest and
+    /// largest of the first message.
+    ///
+    /// # Errors
+    /// What is wrong with an image that is passed over; the volume stays as it is.
+    pub fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
+        let [i, j, _] = image.size;
+        let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
+        if (x, y, columns, rows) != (0, 0, i, j) {
+            return Err(format!("a part of {columns} x {rows} of {i} x {j} pixels; whole slices are taken only"));
+        }
+        let (grid, scalar, components) = (grid(&image), image.scalar, image.components);
+        grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
+        let stored = stored(scalar);
+        let slice = usize::from(i) * usize::from(j) * stored.bytes();
+        let all = slice.checked_mul(grid.size[2]).filter(|all| *all <= max_bytes);
+        let Some(all) = all else {
+            let [x, y, z] = grid.size;
+            return Err(format!("a volume of {x} x {y} x {z} voxels; at most {max_bytes} bytes are taken"));
+        };
+        let (brought, replaced) = samples(image)?;
+        let is_same = |w: &&mut CartesianVolume| {
+            w.scalar == scalar && w.components == components && w.grid.size == grid.size && w.is_at(&grid)
+        };
+        let whole = match volume.as_mut().filter(is_same) {
+            Some(whole) => whole,
+            None => {
+                let range = match stored {
+                    StoredType::U8 => [0.0, 255.0],
+                    StoredType::U16 | StoredType::F32 => {
+                        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+                        widen(&mut range, stored, &brought);
+                        not_empty(range)
+                    }
+                };
+                volume.insert(CartesianVolume { scalar, components, stored, grid, range, bytes: vec![0; all] })
+            }
+        };
+        let at = usize::from(first) * slice;
+        match whole.bytes.get_mut(at..at + usize::from(slices) * slice).filter(|part| part.len() == brought.len()) {
+            Some(part) => part.copy_from_slice(&brought),
+            None => return Err(format!("{slices} slices from {first} on, which are not all there")),
+        }
+        Ok(replaced)
+    }
+
+    fn is_at(&self, grid: &Grid) -> bool {
+        self.grid.spacing.iter().zip(grid.spacing).all(|(a, b)| (a - b).abs() <= SPACING_TOLERANCE * a.max(b))
+    }
+
+    pub fn header(&self) -> Header {
+        let geometry = Geometry::Cartesian(self.grid);
+        Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range }
+    }
+
+    /// None beyond the last.
+    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+        let [x, y, _] = self.grid.size;
+        self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
+    }
+}
+
+/// Along an axis of one pixel any step may be given, or none.
+fn grid(image: &Image) -> Grid {
+    let size = image.size.map(usize::from);
+    let mut spacing = image.spacing();
+    for axis in 0..3 {
+        if size[axis] == 1 && spacing[axis] == 0.0 {
+            spacing[axis] = 1.0;
+        }
+    }
+    let half = |axis: usize| -spacing[axis] * (size[axis] as f64 - 1.0) / 2.0;
+    Grid { size, spacing, origin: [half(0), 0.0, half(2)] }
+}
+
+/// Shares of red, green and blue in luminance (ITU-R BT.601).
+const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
+/// What is added to an i8 to store it as u8.
+const I8_SHIFT: f64 = 128.0;
+
+/// What samples of a scalar are stored as: 8 and 16 bits as they are, signed ones shifted to begin at 0, all others as f32.
+pub(super) fn stored(scalar: Scalar) -> StoredType {
+    match scalar {
+        Scalar::I8 | Scalar::U8 => StoredType::U8,
+        Scalar::I16 | Scalar::U16 => StoredType::U16,
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => StoredType::F32,
+    }
+}
+
+/// One sample a pixel, little-endian, in the image's order, and how many of them read as 0 because no pass may see them.
+///
+/// Pixels of 3 or 4 components (red, green, blue and what else there is) become their luminance.
+///
+/// # Errors
+/// Pixels of another number of components, which have no brightness.
+pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
+    let scalar = image.scalar;
+    let mut bytes = match (image.components, scalar) {
+        (1, Scalar::I8) => {
+            // Adding 128 to an i8 turns its top bit.
+            image.bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
+            image.bytes
+        }
+        (1, Scalar::U8 | Scalar::U16 | Scalar::I16 | Scalar::F32) => image.bytes,
+        (1, _) => {
+            let values = image.bytes.chunks_exact(scalar.bytes()).map(|v| value(scalar, v) as f32);
+            values.flat_map(f32::to_le_bytes).collect()
+        }
+        (components @ 3..=4, _) => {
+            let mut bytes = Vec::with_capacity(image.bytes.len() / usize::from(components));
+            for pixel in image.bytes.chunks_exact(usize::from(components) * scalar.bytes()) {
+                let colours = pixel.chunks_exact(scalar.bytes()).zip(LUMINANCE);
+                put(&mut bytes, scalar, colours.map(|(colour, share)| share * value(scalar, colour)).sum());
+            }
+            bytes
+        }
+        (components, _) => return Err(format!("pixels have {components} components, must have 1, 3 or 4")),
+    };
+    let sample = match scalar {
+        Scalar::I8 | Scalar::U8 => SampleType::U8,
+        Scalar::I16 => SampleType::I16,
+        Scalar::U16 => SampleType::U16,
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => SampleType::F32,
+    };
+    let Replaced { not_finite, denormal } = store(sample, false, &mut bytes);
+    Ok((bytes, not_finite + denormal))
+}
+
+/// Little-endian; a number beyond f32 becomes infinite later, and 0 with that.
+fn value(scalar: Scalar, bytes: &[u8]) -> f64 {
+    match (scalar, bytes) {
+        (Scalar::U8, [a]) => f64::from(*a),
+        (Scalar::I8, [a]) => f64::from(a.cast_signed()),
+        (Scalar::U16, [a, b]) => f64::from(u16::from_le_bytes([*a, *b])),
+        (Scalar::I16, [a, b]) => f64::from(i16::from_le_bytes([*a, *b])),
+        (Scalar::U32, [a, b, c, d]) => f64::from(u32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::I32, [a, b, c, d]) => f64::from(i32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::F32, [a, b, c, d]) => f64::from(f32::from_le_bytes([*a, *b, *c, *d])),
+        (Scalar::F64, _) => bytes.first_chunk().map_or(0.0, |b| f64::from_le_bytes(*b)),
+        _ => 0.0,
+    }
+}
+
+/// A luminance, as the file's type would have it; an i16 is shifted with all others of its kind.
+fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
+    match scalar {
+        Scalar::U8 => bytes.push(value.round() as u8),
+        Scalar::I8 => bytes.push((value + I8_SHIFT).round() as u8),
+        Scalar::U16 => bytes.extend((value.round() as u16).to_le_bytes()),
+        Scalar::I16 => bytes.extend((value.round() as i16).to_le_bytes()),
+        Scalar::I32 | Scalar::U32 | Scalar::F32 | Scalar::F64 => bytes.extend((value as f32).to_le_bytes()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::igtl::{Coordinates, Region};
+
+    fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
+        Image {
+            device: String::new(),
+            time: 0.0,
+            size: [1; 3],
+            region: Region { offset: [0; 3], size: [1; 3] },
+            scalar,
+            components,
+            coordinates: Coordinates::Ras,
+            axes: [[1.0; 3]; 3],
+            centre: [0.0; 3],
+            bytes,
+        }
+    }
+
+    #[test]
+    fn the_order_of_values_survives_every_type() {
+        let floats = |v: &[f32]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let words = |v: &[u16]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        for (scalar, bytes, expected, replaced) in [
+            (Scalar::U8, vec![0, 7, 255], vec![0, 7, 255], 0),
+            (Scalar::I8, vec![0x80, 0xff, 0, 127], vec![0, 127, 128, 255], 0),
+            (Scalar::U16, words(&[0, 500]), words(&[0, 500]), 0),
+            (Scalar::I16, words(&[0x8000, 0xffff, 5]), words(&[0, 32767, 32773]), 0),
+            (Scalar::I32, (-3i32).to_le_bytes().to_vec(), floats(&[-3.0]), 0),
+            (Scalar::U32, 4_000_000_000u32.to_le_bytes().to_vec(), floats(&[4e9]), 0),
+            (Scalar::F32, floats(&[1.5, f32::NAN, 1e-40]), floats(&[1.5, 0.0, 0.0]), 2),
+            (Scalar::F64, [0.25f64, 1e300].iter().flat_map(|v| v.to_le_bytes()).collect(), floats(&[0.25, 0.0]), 1),
+        ] {
+            assert_eq!(samples(image(scalar, 1, bytes)), Ok((expected, replaced)), "{scalar:?}");
+        }
+    }
+
+    #[test]
+    fn colours_become_their_luminance_and_nothing_else_passes() {
+        for (components, pixel) in [(3, vec![10, 20, 30]), (4, vec![10, 20, 30, 255])] {
+            // 2.99 + 11.74 + 3.42.
+            assert_eq!(samples(image(Scalar::U8, components, pixel.clone())), Ok((vec![18], 0)));
+            let signed: Vec<u8> = pixel.iter().map(|v| v ^ 0x80).collect();
+            assert_eq!(samples(image(Scalar::I8, components, signed)), Ok((vec![18], 0)));
+            let words: Vec<u8> = pixel.iter().flat_map(|v| (i16::from(*v) * 100).to_le_bytes()).collect();
+            let expected = (1815u16 + 32768).to_le_bytes().to_vec();
+            assert_eq!(samples(image(Scalar::I16, components, words)), Ok((expected, 0)));
+        }
+        for components in [2, 5, 255] {
+            let refused = samples(image(Scalar::U8, components, vec![0; usize::from(components)])).unwrap_err();
+            assert!(refused.contains(&format!("{components} components")), "{refused}");
+        }
+    }
+}

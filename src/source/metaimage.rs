@@ -1,0 +1,450 @@
+//! MetaImage (`.mha`, `.mhd`): plain volumes, the sequences of the PLUS toolkit, and UsTK's pre-scan sweeps.
+
+use super::layout::{Layout, LineOrder, Pixels, StoredGeometry, extent};
+use super::samples::SampleType;
+use crate::files::{InputError, quoted};
+use crate::probe::file::SLAB;
+use crate::probe::{Advance, Array, Axis, Grid, Motion, Probe};
+use std::collections::{BTreeMap, HashMap};
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+pub(super) fn read(path: &Path) -> Result<Layout, InputError> {
+    let header = Header::read(path)?;
+    if let Some(other) = header.get("ObjectType").filter(|t| *t != "Image") {
+        return header.fault("ObjectType", format!("{} is not read, only Image is", quoted(other)));
+    }
+    if header.integer("ElementNumberOfChannels")?.is_some_and(|n| n != 1) {
+        return header.fault("ElementNumberOfChannels", "must be 1: colour is not read");
+    }
+    let sample = match header.need("ElementType")? {
+        "MET_UCHAR" => SampleType::U8,
+        "MET_USHORT" => SampleType::U16,
+        "MET_SHORT" => SampleType::I16,
+        "MET_FLOAT" => SampleType::F32,
+        other => {
+            let read = "MET_UCHAR, MET_USHORT, MET_SHORT and MET_FLOAT are";
+            return header.fault("ElementType", format!("{} is not read, only {read}", quoted(other)));
+        }
+    };
+    let [width, height, frames] = dimensions(path, &header)?;
+    let mut remarks = Vec::new();
+    let grid = lattice(&header, [width, height, frames], &mut remarks)?;
+    let lines = line_order(&header)?;
+    let pre_scan = prescan_probe(&header, [width, height], frames)?;
+    let format = match &pre_scan {
+        Some(_) => "MetaImage pre-scan sweep",
+        None if header.sequence || header.get("UltrasoundImageType").is_some() => "PLUS sequence",
+        None => "MetaImage",
+    };
+    let geometry = match pre_scan {
+        Some(probe) => StoredGeometry::Sweep(Box::new(probe)),
+        None => own_pictures(path, &header, grid, &lines)?,
+    };
+    if let Some(orientation) = header.get("UltrasoundImageOrientation") {
+        remarks.push(("orientation".into(), quoted(orientation)));
+    }
+    if header.not_ok > 0 {
+        remarks.push(("frames not OK".into(), format!("{} by their ImageStatus; read all the same", header.not_ok)));
+    }
+    let mut layout = Layout {
+        format,
+        sample,
+        big_endian: header.flag("BinaryDataByteOrderMSB")?.or(header.flag("ElementByteOrderMSB")?).unwrap_or(false),
+        frame_size: [width, height],
+        frames,
+        pixels: Pixels { path: path.into(), offset: header.length, length: 0, compressed: false },
+        line_order: lines,
+        geometry,
+        times: header.times.range(..frames).map(|(k, t)| (*k, *t)).collect(),
+        remarks,
+    };
+    find_pixels(path, &header, &mut layout)?;
+    layout.check(path, "DimSize")?;
+    Ok(layout)
+}
+
+/// Width, height and frames; a single frame when there are two dimensions.
+fn dimensions(path: &Path, header: &Header) -> Result<[usize; 3], InputError> {
+    let count = match header.integer("NDims")? {
+        Some(count @ (2 | 3)) => count as usize,
+        Some(other) => return header.fault("NDims", format!("is {other}, must be 2 or 3")),
+        None => return header.fault("NDims", "is missing"),
+    };
+    let words: Vec<&str> = header.need("DimSize")?.split_whitespace().collect();
+    if words.len() != count {
+        return header.fault("DimSize", format!("has {} entries, but NDims is {count}", words.len()));
+    }
+    let mut size = [1; 3];
+    for (i, word) in words.iter().enumerate() {
+        let Ok(value) = word.parse() else {
+            return header.fault("DimSize", format!("{}{} is not a whole number", which(i, count), quoted(word)));
+        };
+        size[i] = extent(path, "DimSize", &which(i, count), value)?;
+    }
+    Ok(size)
+}
+
+/// The lattice of the voxels. A rotation in space is not applied: the volume is shown as it lies in the file.
+fn lattice(header: &Header, size: [usize; 3], remarks: &mut Vec<(String, String)>) -> Result<Grid, InputError> {
+    let count = if header.get("NDims") == Some("2") { 2 } else { 3 };
+    let mut grid = Grid { size, spacing: [1.0; 3], origin: [0.0; 3] };
+    if let Some((field, _)) = header.first_of(&["ElementSpacing", "ElementSize"]) {
+        for (i, value) in header.numbers(field, count)?.into_iter().enumerate() {
+            if value <= 0.0 {
+                return header.fault(field, format!("{}is {value}, must be above 0", which(i, count)));
+            }
+            grid.spacing[i] = value;
+        }
+    }
+    if let Some((field, _)) = header.first_of(&["Offset", "Position", "Origin"]) {
+        grid.origin[..count].copy_from_slice(&header.numbers(field, count)?);
+    }
+    if let Some((field, _)) = header.first_of(&["TransformMatrix", "Rotation", "Orientation"]) {
+        let matrix = header.numbers(field, count * count)?;
+        let identity = |i: usize| if i.is_multiple_of(count + 1) { 1.0 } else { 0.0 };
+        if matrix.iter().enumerate().any(|(i, v)| (v - identity(i)).abs() > 1e-9) {
+            remarks.push(("rotation".into(), format!("{field} is not the identity; not applied")));
+        }
+    }
+    Ok(grid)
+}
+
+/// PLUS names the axes of a frame by the way they run on the transducer: the first letter is the fastest. F is far from it,
+/// so FM is scan lines in order, FU scan lines from the last to the first; M and U first are rows of pictures.
+fn line_order(header: &Header) -> Result<LineOrder, InputError> {
+    match header.get("UltrasoundImageOrientation") {
+        None | Some("FM" | "FMA") => Ok(LineOrder::InOrder),
+        Some("FU" | "FUA") => Ok(LineOrder::Reversed),
+        Some(word) if word.starts_with(['M', 'U']) => Ok(LineOrder::Pictures(quoted(word))),
+        Some(other) => header.fault(
+            "UltrasoundImageOrientation",
+            format!("{} is not read: scan lines must be FM or FU, pictures begin with M or U", quoted(other)),
+        ),
+    }
+}
+
+/// A file without pre-scan keys holds pictures, unless it says that its frames are scan lines.
+fn own_pictures(path: &Path, header: &Header, mut grid: Grid, lines: &LineOrder) -> Result<StoredGeometry, InputError> {
+    match (header.get("UltrasoundImageType"), lines) {
+        (None | Some("US_IMG_TYPE_XX"), _) | (Some("BRIGHTNESS"), LineOrder::Pictures(_)) => {}
+        (Some(converted), _) if converted.starts_with("POSTSCAN") => {}
+        (Some("BRIGHTNESS"), _) => {
+            let fault = "BRIGHTNESS frames of scan lines need a probe geometry: give --probe FILE.toml, or put a \
+                         probe.toml beside the recording";
+            return Ok(StoredGeometry::Missing(InputError::new(path, "UltrasoundImageType", fault)));
+        }
+        (Some(other), _) => {
+            let fault = format!("{} is not read: only BRIGHTNESS is detected and compressed", quoted(other));
+            return header.fault("UltrasoundImageType", fault);
+        }
+    }
+    // Frames in time are no neighbours in space: each is a volume of one slice.
+    let in_time = header.sequence || header.get("Kinds").is_some_and(|k| k.split_whitespace().nth(2) == Some("list"));
+    let volumes = if in_time { std::mem::replace(&mut grid.size[2], 1) } else { 1 };
+    Ok(StoredGeometry::Pictures(grid, volumes))
+}
+
+/// Finds where the samples lie, and how many bytes of them there are.
+fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
+    let name = header.need("ElementDataFile")?;
+    let pixels = &mut layout.pixels;
+    if name != "LOCAL" {
+        let plain = Path::new(name).file_name().is_some_and(|n| n == name) && !name.contains('\\');
+        if name.starts_with("LIST") || name.contains('%') {
+            return header.fault("ElementDataFile", "a list of files is not read, only LOCAL or one file name");
+        }
+        if !plain {
+            let fault = format!("{} must be LOCAL or the name of a file in the same folder", quoted(name));
+            return header.fault("ElementDataFile", fault);
+        }
+        pixels.path = path.with_file_name(name);
+        pixels.offset = 0;
+    }
+    let metadata = match fs::metadata(&pixels.path) {
+        Ok(metadata) if metadata.is_file() => metadata,
+        Ok(_) => return header.fault("ElementDataFile", format!("{} is not a regular file", quoted(name))),
+        Err(error) => return header.fault("ElementDataFile", format!("{} cannot be read: {error}", quoted(name))),
+    };
+    pixels.compressed = header.flag("CompressedData")?.unwrap_or(false);
+    if !pixels.compressed && header.flag("BinaryData")? == Some(false) {
+        return header.fault("BinaryData", "numbers written as text are not read");
+    }
+    let claimed = layout.frame_bytes() * layout.frames as u64;
+    let pixels = &mut layout.pixels;
+    match header.integer("HeaderSize")? {
+        None | Some(0) => {}
+        Some(bytes @ 1..) => pixels.offset = bytes as u64,
+        // MetaIO's way to say that the samples are the last bytes of the file.
+        Some(-1) if !pixels.compressed => {
+            pixels.offset = metadata.len().saturating_sub(claimed).max(pixels.offset);
+        }
+        Some(other) => return header.fault("HeaderSize", format!("{other} is not possible here")),
+    }
+    pixels.length = metadata.len().saturating_sub(pixels.offset);
+    let known = match (pixels.compressed, header.integer("CompressedDataSize")?) {
+        (false, _) => claimed,
+        (true, None | Some(0)) => pixels.length,
+        (true, Some(bytes @ 1..)) if bytes as u64 > pixels.length => {
+            let there = pixels.length;
+            let fault = format!("cut short, {there} of {bytes} compressed bytes are there");
+            return Err(InputError::new(&pixels.path, "data", fault));
+        }
+        (true, Some(bytes @ 1..)) => bytes as u64,
+        (true, Some(other)) => return header.fault("CompressedDataSize", format!("is {other}, must be above 0")),
+    };
+    if known < pixels.length {
+        let more = format!("{} bytes behind the samples; not read", pixels.length - known);
+        layout.remarks.push(("more data".into(), more));
+        pixels.length = known;
+    }
+    Ok(())
+}
+
+/// Longest header, in bytes and in lines.
+const MAX_HEADER_BYTES: u64 = 1 << 20;
+const MAX_HEADER_LINES: usize = 100_000;
+
+/// The fields that are read. All others are passed over unseen, so that none can carry a patient's name into a message.
+const KEYS: &[&str] = &[
+    "ObjectType",
+    "NDims",
+    "DimSize",
+    "ElementType",
+    "ElementSpacing",
+    "ElementSize",
+    "Offset",
+    "Position",
+    "Origin",
+    "TransformMatrix",
+    "Rotation",
+    "Orientation",
+    "BinaryData",
+    "BinaryDataByteOrderMSB",
+    "ElementByteOrderMSB",
+    "CompressedData",
+    "CompressedDataSize",
+    "ElementNumberOfChannels",
+    "HeaderSize",
+    "ElementDataFile",
+    "Kinds",
+    "UltrasoundImageOrientation",
+    "UltrasoundImageType",
+    "IsTransducerConvex",
+    "TransducerRadius",
+    "ScanLinePitch",
+    "MotorType",
+    "MotorRadius",
+    "FramePitch",
+    "AxialResolution",
+];
+
+struct Header<'a> {
+    path: &'a Path,
+    fields: HashMap<&'static str, String>,
+    /// Time stamps by frame, s: `Seq_FrameNNNN_Timestamp`.
+    times: BTreeMap<usize, f64>,
+    /// Frames whose `Seq_FrameNNNN_ImageStatus` is not OK.
+    not_ok: usize,
+    /// There are `Seq_` fields: frames in time.
+    sequence: bool,
+    /// Bytes up to and with the line of `ElementDataFile`.
+    length: u64,
+}
+
+impl<'a> Header<'a> {
+    fn read(path: &'a Path) -> Result<Header<'a>, InputError> {
+        let file = File::open(path).map_err(|e| InputError::unreadable(path, &e))?;
+        let mut input = BufReader::new(file.take(MAX_HEADER_BYTES));
+        let mut header =
+            Header { path, fields: HashMap::new(), times: BTreeMap::new(), not_ok: 0, sequence: false, length: 0 };
+        let mut line = Vec::new();
+        for number in 1..=MAX_HEADER_LINES {
+            line.clear();
+            header.length += input.read_until(b'\n', &mut line).map_err(|e| InputError::unreadable(path, &e))? as u64;
+            if line.is_empty() || header.length >= MAX_HEADER_BYTES {
+                break;
+            }
+            let text = String::from_utf8_lossy(&line);
+            let text = text.trim();
+            if text.is_empty() {
+                continue;
+            }
+            // The text itself is not shown: it may be anything.
+            let Some((key, value)) = text.split_once('=') else {
+                return Err(InputError::new(path, format!("line {number}"), "is not 'Key = Value'"));
+            };
+            let (key, value) = (key.trim(), value.trim());
+            if let Some(known) = KEYS.iter().find(|k| **k == key) {
+                if header.fields.insert(known, value.to_string()).is_some() {
+                    return header.fault(known, "is given twice");
+                }
+            } else if let Some(of_frame) = key.strip_prefix("Seq_Frame") {
+                header.sequence = true;
+                header.frame_field(of_frame, value)?;
+            }
+            // Data begin behind this line, whatever they look like.
+            if key == "ElementDataFile" {
+                return Ok(header);
+            }
+        }
+        header.fault("ElementDataFile", "is missing, or not within the first 1 MiB and 100000 lines")
+    }
+
+    /// `0012_Timestamp` and `0012_ImageStatus`; other fields of frames are passed over.
+    fn frame_field(&mut self, key: &str, value: &str) -> Result<(), InputError> {
+        let Some((number, field)) = key.split_once('_') else { return Ok(()) };
+        let Ok(number) = number.parse::<usize>() else { return Ok(()) };
+        match field {
+            "Timestamp" => match value.parse::<f64>() {
+                Ok(time) if time.is_finite() => drop(self.times.insert(number, time)),
+                _ => {
+                    let field = format!("Seq_Frame{number:04}_Timestamp");
+                    return self.fault(&field, format!("{} is not a finite number", quoted(value)));
+                }
+            },
+            "ImageStatus" if value != "OK" => self.not_ok += 1,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn fault<T>(&self, field: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+        Err(InputError::new(self.path, field, fault))
+    }
+
+    fn get(&self, field: &str) -> Option<&str> {
+        self.fields.get(field).map(String::as_str)
+    }
+
+    /// The first of several spellings that is there, with its value.
+    fn first_of<'n>(&self, names: &[&'n str]) -> Option<(&'n str, &str)> {
+        names.iter().find_map(|name| self.get(name).map(|value| (*name, value)))
+    }
+
+    fn need(&self, field: &str) -> Result<&str, InputError> {
+        self.get(field).map_or_else(|| self.fault(field, "is missing"), Ok)
+    }
+
+    /// True, False, 1 or 0, as MetaIO writes and reads them; `None` if absent.
+    fn flag(&self, field: &str) -> Result<Option<bool>, InputError> {
+        match self.get(field) {
+            None => Ok(None),
+            Some("True" | "true" | "TRUE" | "T" | "1") => Ok(Some(true)),
+            Some("False" | "false" | "FALSE" | "F" | "0") => Ok(Some(false)),
+            Some(other) => self.fault(field, format!("{} is neither True nor False", quoted(other))),
+        }
+    }
+
+    fn integer(&self, field: &str) -> Result<Option<i64>, InputError> {
+        let Some(value) = self.get(field) else { return Ok(None) };
+        match value.parse() {
+            Ok(value) => Ok(Some(value)),
+            Err(_) => self.fault(field, format!("{} is not a whole number", quoted(value))),
+        }
+    }
+
+    /// Exactly `count` finite numbers.
+    fn numbers(&self, field: &str, count: usize) -> Result<Vec<f64>, InputError> {
+        let words: Vec<&str> = self.need(field)?.split_whitespace().collect();
+        if words.len() != count {
+            return self.fault(field, format!("has {} entries, must have {count}", words.len()));
+        }
+        let mut numbers = Vec::new();
+        for (i, word) in words.iter().enumerate() {
+            match word.parse::<f64>() {
+                Ok(number) if number.is_finite() => numbers.push(number),
+                _ => return self.fault(field, format!("{}{} is not a finite number", which(i, count), quoted(word))),
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// One number above 0, or of at least 0.
+    fn size(&self, field: &str, may_be_zero: bool) -> Result<f64, InputError> {
+        let value = self.numbers(field, 1)?[0];
+        match value > 0.0 || (may_be_zero && value == 0.0) {
+            true => Ok(value),
+            false if may_be_zero => self.fault(field, format!("is {value}, must be at least 0")),
+            false => self.fault(field, format!("is {value}, must be above 0")),
+        }
+    }
+}
+
+/// "3rd entry " of a list, nothing for a lone value.
+fn which(index: usize, count: usize) -> String {
+    match (index, count) {
+        (_, 1) => String::new(),
+        (0, _) => "1st entry ".into(),
+        (1, _) => "2nd entry ".into(),
+        (2, _) => "3rd entry ".into(),
+        _ => format!("{}th entry ", index + 1),
+    }
+}
+
+/// Any of these makes a file a pre-scan sweep; then all must be there.
+const PRESCAN_KEYS: [&str; 7] = [
+    "IsTransducerConvex",
+    "TransducerRadius",
+    "ScanLinePitch",
+    "MotorType",
+    "MotorRadius",
+    "FramePitch",
+    "AxialResolution",
+];
+/// UsTK leaves it out; soft tissue's usual value, m/s.
+const SOUND_SPEED: f64 = 1540.0;
+const MM: f64 = 1e3;
+
+/// The probe, or `None` for a file that has none of the keys.
+fn prescan_probe(header: &Header, [samples, lines]: [usize; 2], frames: usize) -> Result<Option<Probe>, InputError> {
+    let kind = header.get("UltrasoundImageType").unwrap_or("");
+    // UsTK leaves the keys in the files that it has scan-converted.
+    if kind.starts_with("POSTSCAN") || (!kind.starts_with("PRESCAN") && header.first_of(&PRESCAN_KEYS).is_none()) {
+        return Ok(None);
+    }
+    if !matches!(kind, "" | "BRIGHTNESS") && !kind.starts_with("PRESCAN") {
+        let fault = format!("{} is not read: only detected and compressed frames are", quoted(kind));
+        return header.fault("UltrasoundImageType", fault);
+    }
+    let line_pitch = header.size("ScanLinePitch", false)?;
+    let (array, lines) = match header.flag("IsTransducerConvex")? {
+        Some(true) => {
+            let radius = header.size("TransducerRadius", true)? * MM;
+            (Array::Curved { radius }, Axis::centred(line_pitch, lines))
+        }
+        Some(false) => (Array::Linear, Axis::centred(line_pitch * MM, lines)),
+        None => return header.fault("IsTransducerConvex", "is missing"),
+    };
+    let sample_pitch = header.size("AxialResolution", false)? * MM;
+    let (motion, slices) = if frames == 1 {
+        (Motion::Still { thickness: SLAB }, Axis::centred(1.0, 1))
+    } else {
+        let frame_pitch = header.size("FramePitch", false)?;
+        match header.need("MotorType")? {
+            "TiltingMotor" => {
+                let wobble_radius = header.size("MotorRadius", true)? * MM;
+                (Motion::Fan { wobble_radius }, Axis::centred(frame_pitch, frames))
+            }
+            "LinearMotor" => (Motion::Translated, Axis::centred(frame_pitch * MM, frames)),
+            other => {
+                return header.fault(
+                    "MotorType",
+                    format!("{} is not read, only TiltingMotor and LinearMotor are", quoted(other)),
+                );
+            }
+        }
+    };
+    Ok(Some(Probe {
+        array,
+        lines,
+        start_depth: 0.0,
+        sample_pitch,
+        samples,
+        motion,
+        slices,
+        advance: Advance::None,
+        sound_speed: SOUND_SPEED,
+    }))
+}

@@ -1,0 +1,491 @@
+//! Raw frames from a pipe, such as the standard output of an acquisition program.
+//!
+//! The stream begins with one line of JSON, at most 64 KiB up to its end of line:
+//!
+//! | key | what |
+//! |---|---|
+//! | `echolume` | 1, the version of this format |
+//! | `samples`, `lines`, `frames` | samples a line, lines a frame, frames a volume; each 1 to 65536 |
+//! | `type` | `"u8"`, `"u16"` or `"f32"`, little-endian |
+//! | `range` | the two values that are shown as 0 and 1; otherwise `samples.range` of the probe, otherwise all of an integer type. f32 needs one |
+//! | `both_ways` | every second volume comes swept backwards; otherwise as the probe says |
+//! | `speed_ratio` | share of the way to the next frame that the motor travels during one, 0..1; otherwise as the probe says |
+//! | `stamped` | `true`: before each frame its time, an f64 in s. One that is not finite is none |
+//! | `lines_at_once` | a frame is given on whenever so many of its lines have come |
+//! | `probe` | the tables of a probe file as objects: `{"array": {"kind": "curved", ...}, ...}`. A probe file that is given besides goes before it |
+//! | `cartesian` | instead of a probe: `{"size": [x, y, z], "spacing": [x, y, z], "origin": [x, y, z]}`, mm; `samples`, `lines` and `frames` may then be left out |
+//!
+//! Behind it come the frames in order of acquisition, line by line (samples fastest), with nothing between them but their times. The
+//! stream may end behind any frame. `tools/pipe_frames.py` writes such a stream.
+
+use super::frame::{Frame, Header};
+use super::live::{Event, Live};
+use super::samples::{self, Replaced, SampleType};
+use crate::files::InputError;
+use crate::probe::{Geometry, Grid, Probe, ProbeFile, Volumes};
+use serde::Deserialize;
+use std::collections::VecDeque;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// What the stream is called in messages.
+const NAME: &str = "pipe";
+/// Memory of the frames that wait to be taken, bytes, unless a single one is larger.
+const MAX_WAITING_BYTES: usize = 256 << 20;
+/// Frames that wait.
+const MAX_WAITING_FRAMES: usize = 4;
+
+/// A stream of frames as a live source.
+///
+/// Memory: four frames that wait, of 256 MiB together at most or else one, and the one that is being read, of at most 1 GiB and no
+/// more than twice what has come of it before the first is whole.
+pub struct Piped {
+    queue: Arc<Queue>,
+}
+
+impl Piped {
+    /// Begins to read. `probe`: the probe file to go by, before what the stream says of its probe.
+    ///
+    /// # Errors
+    /// A probe file that is none, a thread that cannot be started. What is wrong with the stream comes as [`Event::End`].
+    pub fn new(reader: impl Read + Send + 'static, probe: Option<&Path>) -> Result<Piped, InputError> {
+        let probe = probe.map(ProbeFile::read).transpose()?;
+        let queue = Arc::new(Queue::new());
+        let theirs = EndOnExit(queue.clone());
+        let started = thread::Builder::new().name(NAME.into()).spawn(move || {
+            let end = Reader::new(reader, &theirs.0).run(probe);
+            theirs.0.end(end.err().map(|error| error.to_string()));
+        });
+        started.map_err(|e| InputError::unreadable(Path::new(NAME), &e))?;
+        Ok(Piped { queue })
+    }
+}
+
+impl Live for Piped {
+    fn next(&mut self, patience: Duration) -> Event {
+        self.queue.next(patience)
+    }
+
+    fn can_wait(&self) -> bool {
+        true
+    }
+}
+
+impl Drop for Piped {
+    /// Without waiting for the thread, which may be in the middle of reading: it ends with the next byte, or with the stream.
+    fn drop(&mut self) {
+        self.queue.close();
+    }
+}
+
+/// Most samples, lines and frames each.
+const MAX_EXTENT: usize = 1 << 16;
+const VERSION: u64 = 1;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Keys {
+    #[serde(rename = "echolume")]
+    _version: u64,
+    samples: Option<usize>,
+    lines: Option<usize>,
+    frames: Option<usize>,
+    #[serde(rename = "type")]
+    sample: Sample,
+    range: Option<[f64; 2]>,
+    both_ways: Option<bool>,
+    speed_ratio: Option<f64>,
+    #[serde(default)]
+    stamped: bool,
+    lines_at_once: Option<usize>,
+    probe: Option<serde_json::Value>,
+    cartesian: Option<Lattice>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Sample {
+    U8,
+    U16,
+    F32,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Lattice {
+    size: [usize; 3],
+    spacing: [f64; 3],
+    #[serde(default)]
+    origin: [f64; 3],
+}
+
+/// What the first line says.
+struct StreamHeader {
+    header: Header,
+    sample: SampleType,
+    stamped: bool,
+    lines: usize,
+    /// As many as there are, where a frame is given in one piece.
+    lines_at_once: usize,
+    volumes: Volumes,
+}
+
+fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
+    Err(InputError::new(Path::new(NAME), key, fault))
+}
+
+impl StreamHeader {
+    /// # Errors
+    /// A line that is no such header, or whose frames cannot be: too large, without a place, without a range. Nothing is allocated for them.
+    fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
+        let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
+        let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
+            let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
+            InputError::new(Path::new(NAME), "header", fault)
+        })?;
+        // Before the keys, which another version may have others of.
+        match value.get("echolume").map(serde_json::Value::as_u64) {
+            Some(Some(VERSION)) => {}
+            Some(_) => return fault("echolume", format!("must be {VERSION}, the version that this program reads")),
+            None => return fault("header", "has no key \"echolume\": this is no stream of frames"),
+        }
+        let keys: Keys = serde_json::from_slice(line).map_err(no_json)?;
+        let size = keys.size()?;
+        let sample = match keys.sample {
+            Sample::U8 => SampleType::U8,
+            Sample::U16 => SampleType::U16,
+            Sample::F32 => SampleType::F32,
+        };
+        let (forward, backward, volumes, range) = match keys.cartesian {
+            Some(_) if keys.probe.is_some() || probe.is_some() => {
+                return fault("cartesian", "and a probe say different things; only one can be there");
+            }
+            Some(_) if keys.speed_ratio.is_some() => {
+                return fault("speed_ratio", "belongs to a probe, not to a lattice");
+            }
+            Some(Lattice { size, spacing, origin }) => {
+                let geometry = Geometry::Cartesian(Grid { size, spacing, origin });
+                let both_ways = keys.both_ways.unwrap_or(false);
+                (geometry.clone(), geometry, Volumes { both_ways, ..Volumes::forward(size[2], 1) }, None)
+            }
+            None => {
+                let of_stream = keys.probe.map(|tables| ProbeFile::from_json(Path::new(NAME), tables)).transpose()?;
+                let Some(file) = probe.or(of_stream) else {
+                    return fault(
+                        "probe",
+                        "is missing: neither it nor \"cartesian\" is there, and no probe file was given",
+                    );
+                };
+                let (forward, backward, volumes) = geometries(&file, size, keys.both_ways, keys.speed_ratio)?;
+                (forward, backward, volumes, file.range())
+            }
+        };
+        let range = match (keys.range.or(range), sample) {
+            (Some(range), _) => range,
+            (None, SampleType::U8) => [0.0, 255.0],
+            (None, SampleType::U16 | SampleType::I16) => [0.0, 65535.0],
+            (None, SampleType::F32) => return fault("range", "is missing: f32 needs the values that are 0 and 1"),
+        };
+        let header = Header { forward, backward, stored: sample.stored(), range };
+        header.check().or_else(|(key, wrong)| fault(key, wrong))?;
+        let lines = size[1];
+        let lines_at_once = match keys.lines_at_once {
+            Some(0) => return fault("lines_at_once", "is 0, must be at least 1"),
+            given => given.unwrap_or(lines).min(lines),
+        };
+        Ok(StreamHeader { header, sample, stamped: keys.stamped, lines, lines_at_once, volumes })
+    }
+
+    /// The frame of a place in the stream, from 0, without samples.
+    fn frame(&self, index: u64, time: Option<f64>) -> Frame {
+        let each = self.volumes.frames as u64;
+        let (volume, number) = (index / each, (index % each) as usize);
+        // The direction only tells even from odd.
+        let backward = self.volumes.backward((volume % 2) as usize);
+        Frame {
+            volume: u32::try_from(volume).unwrap_or(u32::MAX),
+            number: number as u32,
+            slice: if backward { self.volumes.frames - 1 - number } else { number },
+            backward,
+            time,
+            bytes: Vec::new(),
+        }
+    }
+}
+
+impl Keys {
+    /// Samples, lines and frames, each 1 to [`MAX_EXTENT`].
+    fn size(&self) -> Result<[usize; 3], InputError> {
+        let given = [("samples", self.samples), ("lines", self.lines), ("frames", self.frames)];
+        let mut size = [0; 3];
+        for (axis, (key, given)) in given.into_iter().enumerate() {
+            size[axis] = match (given, self.cartesian.as_ref().map(|lattice| lattice.size[axis])) {
+                (Some(n), None) | (None, Some(n)) => n,
+                (Some(n), Some(same)) if n == same => n,
+                (Some(n), Some(other)) => return fault(key, format!("is {n}, but cartesian.size says {other}")),
+                (None, None) => return fault(key, "is missing"),
+            };
+            if !(1..=MAX_EXTENT).contains(&size[axis]) {
+                return fault(key, format!("is {}, must be 1 to {MAX_EXTENT}", size[axis]));
+            }
+        }
+        Ok(size)
+    }
+}
+
+/// Where the samples lie swept forwards and backwards, and how frames make up volumes.
+fn geometries(
+    file: &ProbeFile,
+    [samples, lines, frames]: [usize; 3],
+    both_ways: Option<bool>,
+    speed_ratio: Option<f64>,
+) -> Result<(Geometry, Geometry, Volumes), InputError> {
+    let (probe, mut volumes) = file.geometry(samples, lines, frames)?;
+    if volumes.frames != frames {
+        return fault("frames", format!("is {frames}, but the probe has {} a volume", volumes.frames));
+    }
+    volumes.both_ways = both_ways.unwrap_or(volumes.both_ways);
+    volumes.speed_ratio = speed_ratio.unwrap_or(volumes.speed_ratio);
+    if !(0.0..=1.0).contains(&volumes.speed_ratio) {
+        return fault("speed_ratio", format!("is {}, must be 0 to 1", volumes.speed_ratio));
+    }
+    let going = |first_backward| {
+        let advance = Volumes { first_backward, ..volumes.clone() }.advance(0, &probe.slices);
+        Geometry::Sweep(Probe { advance, ..probe.clone() })
+    };
+    Ok((going(false), going(true), volumes))
+}
+
+/// Longest first line, bytes.
+const MAX_HEADER_BYTES: u64 = 64 << 10;
+/// Memory follows what came, in steps of so many bytes, until a whole piece of a frame has come once.
+const STEP: usize = 1 << 20;
+
+/// Says that nothing comes any more, however it came to that.
+struct EndOnExit(Arc<Queue>);
+
+impl Drop for EndOnExit {
+    fn drop(&mut self) {
+        self.0.end(Some(format!("{NAME}: its thread ended")));
+    }
+}
+
+struct Reader<'a, R> {
+    input: BufReader<R>,
+    queue: &'a Queue,
+    replaced: Replaced,
+    /// A whole piece has come, so that the next may be allocated at once.
+    proven: bool,
+}
+
+fn stream_error(field: &str, fault: impl AsRef<str>) -> InputError {
+    InputError::new(Path::new(NAME), field, fault)
+}
+
+impl<'a, R: Read> Reader<'a, R> {
+    fn new(input: R, queue: &'a Queue) -> Reader<'a, R> {
+        Reader { input: BufReader::new(input), queue, replaced: Replaced::default(), proven: false }
+    }
+
+    /// Until the stream ends, or nobody takes any more.
+    ///
+    /// # Errors
+    /// A first line that is no header, an end within a frame, what the operating system says.
+    fn run(&mut self, probe: Option<ProbeFile>) -> Result<(), InputError> {
+        let stream = StreamHeader::parse(&self.first_line()?, probe)?;
+        let begin = Event::Begin(Box::new(stream.header.clone()));
+        let pieces = stream.lines.div_ceil(stream.lines_at_once);
+        let frame = stream.header.frame_bytes().unwrap_or(0) as usize + pieces * weight(&Event::Idle);
+        self.queue.set_limit(MAX_WAITING_FRAMES.saturating_mul(frame).min(MAX_WAITING_BYTES));
+        let mut index = 0;
+        let mut goes_on = Ok(self.queue.push(begin));
+        while let Ok(true) = goes_on {
+            goes_on = self.frame(&stream, index);
+            index += 1;
+        }
+        let Replaced { not_finite, denormal } = self.replaced;
+        if self.replaced != Replaced::default() {
+            let what = format!("{NAME}: {not_finite} samples were not finite, {denormal} denormal; they read as 0");
+            self.queue.push(Event::Fault(what));
+        }
+        goes_on.map(|_| ())
+    }
+
+    fn first_line(&mut self) -> Result<Vec<u8>, InputError> {
+        let mut line = Vec::new();
+        let read = Read::take(&mut self.input, MAX_HEADER_BYTES).read_until(b'\n', &mut line);
+        read.map_err(|e| stream_error("header", format!("cannot be read: {e}")))?;
+        match line.pop() {
+            Some(b'\n') => Ok(line),
+            Some(_) if line.len() as u64 + 1 == MAX_HEADER_BYTES => Err(stream_error(
+                "header",
+                format!("is longer than {MAX_HEADER_BYTES} bytes; its line must end before that"),
+            )),
+            _ => Err(stream_error("header", "the stream ends before its first line does")),
+        }
+    }
+
+    /// The next frame, in one piece or in several. False: there is none, or nobody takes it.
+    fn frame(&mut self, stream: &StreamHeader, index: u64) -> Result<bool, InputError> {
+        let whole = stream.header.frame_bytes().unwrap_or(0) as usize;
+        let (line, stamp) = (whole / stream.lines, if stream.stamped { size_of::<f64>() } else { 0 });
+        let mut came = 0;
+        // Nothing at all of a frame is the end of a whole stream.
+        let cut = |error: io::Error, came: usize| match error.kind() {
+            io::ErrorKind::UnexpectedEof if came == 0 => Ok(false),
+            io::ErrorKind::UnexpectedEof => {
+                let Frame { volume, number, .. } = stream.frame(index, None);
+                let there = format!("{came} of {} bytes of frame {number} of volume {volume} came", whole + stamp);
+                Err(stream_error("samples", format!("cut short, {there} (both numbered from 0)")))
+            }
+            _ => Err(stream_error("samples", format!("cannot be read: {error}"))),
+        };
+        let mut time = None;
+        if stream.stamped {
+            let mut bytes = Vec::with_capacity(stamp);
+            if let Err(error) = self.fill(stamp, &mut bytes, &mut came) {
+                return cut(error, came);
+            }
+            time = bytes.first_chunk().map(|b| f64::from_le_bytes(*b)).filter(|t| t.is_finite());
+        }
+        let mut first = 0;
+        while first < stream.lines {
+            let lines = stream.lines_at_once.min(stream.lines - first);
+            let mut frame = stream.frame(index, time);
+            if let Err(error) = self.fill(lines * line, &mut frame.bytes, &mut came) {
+                return cut(error, came);
+            }
+            let known = self.replaced == Replaced::default();
+            self.replaced += samples::store(stream.sample, false, &mut frame.bytes);
+            if known && self.replaced != Replaced::default() {
+                let Frame { volume, number, .. } = frame;
+                let what = "has samples that are not finite or are denormal; from here on they read as 0";
+                self.queue.push(Event::Fault(format!("{NAME}: frame {number} of volume {volume} {what}")));
+            }
+            let event = match lines == stream.lines {
+                true => Event::Frame(frame),
+                false => Event::Lines { frame, first },
+            };
+            if !self.queue.push(event) {
+                return Ok(false);
+            }
+            first += lines;
+        }
+        Ok(true)
+    }
+
+    /// Appends so many bytes; `came` counts them also where they are not all there.
+    fn fill(&mut self, count: usize, bytes: &mut Vec<u8>, came: &mut usize) -> io::Result<()> {
+        if self.proven {
+            bytes.reserve_exact(count);
+        }
+        let mut left = count;
+        while left > 0 {
+            let step = left.min(STEP);
+            let before = bytes.len();
+            let read = Read::take(&mut self.input, step as u64).read_to_end(bytes);
+            *came += bytes.len() - before;
+            read?;
+            if bytes.len() - before < step {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            left -= step;
+        }
+        // A time stamp proves nothing about the samples.
+        self.proven |= count > size_of::<f64>();
+        Ok(())
+    }
+}
+
+struct Queue {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+struct State {
+    waiting: VecDeque<(Event, usize)>,
+    /// Of memory, of all that wait, bytes.
+    weight: usize,
+    limit: usize,
+    /// Nothing comes any more, and why.
+    end: Option<Option<String>>,
+    /// Nobody takes any more.
+    closed: bool,
+}
+
+impl Queue {
+    fn new() -> Queue {
+        let state = State { waiting: VecDeque::new(), weight: 0, limit: 0, end: None, closed: false };
+        Queue { state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    /// Bytes that may wait; whatever its size, one event always may.
+    fn set_limit(&self, limit: usize) {
+        self.lock().limit = limit;
+    }
+
+    /// Waits for limit. False: nobody takes any more.
+    fn push(&self, event: Event) -> bool {
+        let weight = weight(&event);
+        let mut state = self.lock();
+        while !state.closed && !state.waiting.is_empty() && state.weight.saturating_add(weight) > state.limit {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        if !state.closed {
+            state.weight += weight;
+            state.waiting.push_back((event, weight));
+            self.changed.notify_all();
+        }
+        !state.closed
+    }
+
+    /// Nothing comes any more. What is said first stays.
+    fn end(&self, why: Option<String>) {
+        self.lock().end.get_or_insert(why);
+        self.changed.notify_all();
+    }
+
+    fn close(&self) {
+        let mut state = self.lock();
+        state.closed = true;
+        state.waiting.clear();
+        self.changed.notify_all();
+    }
+
+    fn next(&self, patience: Duration) -> Event {
+        let started = Instant::now();
+        let mut state = self.lock();
+        loop {
+            if let Some((event, weight)) = state.waiting.pop_front() {
+                state.weight -= weight;
+                self.changed.notify_all();
+                return event;
+            }
+            if let Some(why) = &state.end {
+                return Event::End(why.clone());
+            }
+            let left = patience.saturating_sub(started.elapsed());
+            if left.is_zero() {
+                return Event::Idle;
+            }
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // Nothing panics while it holds the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn weight(event: &Event) -> usize {
+    let bytes = match event {
+        Event::Frame(frame) | Event::Lines { frame, .. } => frame.bytes.len(),
+        _ => 0,
+    };
+    // A line of a single byte is not free.
+    bytes + size_of::<(Event, usize)>()
+}

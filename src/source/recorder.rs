@@ -1,0 +1,556 @@
+//! Frames as they arrived, appended to a file (`.frames`), and given back byte for byte. Whatever interrupts the writing, every frame but
+//! the last is there. All numbers are little-endian.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `ECHOFRMS` |
+//! | 4 | version, 1 |
+//! | 4 | length n of what follows, at most 16 MiB |
+//! | n | JSON: where samples lie swept forwards and backwards, what is stored, which stored values are 0 and 1 |
+//! | 4 | CRC-32 (ISO-HDLC, zlib's) of everything so far |
+//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), m bytes of samples, CRC-32 of all of the frame before it |
+//! | ... | at a clean end: `INDX`, count (4), for each frame its offset (8) and volume (4), CRC-32 of the index, offset of `INDX` (8), `XEND` |
+//!
+//! Without an index, or with one that is damaged, the frames are gone through once. A frame whose checksum is wrong is left out and
+//! counted; where the lengths lead nowhere, or no frame is for 1 GiB, what is behind is lost.
+
+pub use super::frame::Header;
+
+use super::describe::{self, number};
+use super::frame::{Frame, Source};
+use super::samples::{SampleType, StoredType};
+use crate::files::InputError;
+use crate::probe::Geometry;
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+const MAGIC: &[u8; 8] = b"ECHOFRMS";
+const VERSION: u32 = 1;
+const FRAME: &[u8; 4] = b"FRAM";
+const INDEX: &[u8; 4] = b"INDX";
+const END: &[u8; 4] = b"XEND";
+/// Bytes of a frame before its samples.
+const FRAME_HEAD: usize = 40;
+/// Longest header, bytes: tables of lines and slices.
+const MAX_HEADER_BYTES: u32 = 16 << 20;
+
+static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+
+/// A recording that is being made. Dropped without [`Writer::finish`] it has no index and is read all the same.
+pub struct Writer {
+    path: PathBuf,
+    file: File,
+    header: Header,
+    /// Of each frame: its offset and its volume.
+    index: Vec<(u64, u32)>,
+    at: u64,
+    /// A frame in one piece, so that one call to the system writes it.
+    frame: Vec<u8>,
+    /// The last write failed: what it left behind is cut off before the next.
+    torn: bool,
+}
+
+impl Writer {
+    /// Begins a file. One that is there already is not written over.
+    ///
+    /// # Errors
+    /// A header that cannot be right, a file that is there or cannot be made.
+    pub fn create(path: &Path, header: Header) -> Result<Writer, InputError> {
+        header.check().map_err(|(field, fault)| InputError::new(path, field, fault))?;
+        let text = serde_json::to_vec(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
+        if text.len() > MAX_HEADER_BYTES as usize {
+            return Err(InputError::new(
+                path,
+                "header",
+                format!("has {} bytes, at most {MAX_HEADER_BYTES}", text.len()),
+            ));
+        }
+        let file =
+            OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| InputError::unwritable(path, &e))?;
+        let mut start = Vec::with_capacity(text.len() + 20);
+        start.extend(MAGIC);
+        start.extend(VERSION.to_le_bytes());
+        start.extend((text.len() as u32).to_le_bytes());
+        start.extend(text);
+        start.extend(CRC.checksum(&start).to_le_bytes());
+        let mut writer =
+            Writer { path: path.into(), file, header, index: Vec::new(), at: 0, frame: start, torn: false };
+        match writer.append() {
+            Ok(()) => Ok(writer),
+            Err(e) => {
+                writer.discard();
+                Err(e)
+            }
+        }
+    }
+
+    /// Appends a frame that arrived at `arrived` s, on the recorder's own clock. It is with the system when this returns; a volume that is
+    /// whole is on the disk.
+    ///
+    /// # Errors
+    /// A frame of another size or place than the header's, a disk that is full. The frames before it stay, and the next one may succeed.
+    pub fn frame(&mut self, frame: &Frame, arrived: f64) -> Result<(), InputError> {
+        let fault = |field: &str, fault: String| Err(InputError::new(&self.path, field, fault));
+        let expected = self.header.frame_bytes().unwrap_or(0);
+        if frame.bytes.len() as u64 != expected {
+            return fault("frame", format!("has {} bytes, {expected} are expected", frame.bytes.len()));
+        }
+        if frame.slice >= self.header.forward.slices() {
+            let slices = self.header.forward.slices();
+            return fault("slice", format!("is {}, there are {slices}, numbered from 0", frame.slice));
+        }
+        if self.index.last().is_some_and(|(_, volume)| frame.volume < *volume) {
+            return fault("volume", format!("is {}, after a later one", frame.volume));
+        }
+        let flags = u32::from(frame.backward) | u32::from(frame.time.is_some()) << 1;
+        self.frame.clear();
+        self.frame.extend(FRAME);
+        for word in [frame.volume, frame.number, frame.slice as u32, flags, frame.bytes.len() as u32] {
+            self.frame.extend(word.to_le_bytes());
+        }
+        for time in [frame.time.unwrap_or(0.0), arrived] {
+            self.frame.extend(time.to_le_bytes());
+        }
+        debug_assert_eq!(self.frame.len(), FRAME_HEAD);
+        self.frame.extend(&frame.bytes);
+        self.frame.extend(CRC.checksum(&self.frame).to_le_bytes());
+        let offset = self.at;
+        self.append()?;
+        let begins = self.index.last().is_some_and(|(_, volume)| *volume != frame.volume);
+        self.index.push((offset, frame.volume));
+        // Once a volume: a frame in the system's hands outlives this process, and a power cut costs a volume at most.
+        match begins {
+            true => self.file.sync_data().map_err(|e| InputError::unwritable(&self.path, &e)),
+            false => Ok(()),
+        }
+    }
+
+    /// Takes it back: what is there is not to be taken for all of it.
+    pub fn discard(self) {
+        // Nothing more can be done about a file that will not go.
+        let _ = std::fs::remove_file(&self.path);
+    }
+
+    /// Frames so far.
+    pub fn frames(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Ends the file with its index, all of it on the disk.
+    ///
+    /// # Errors
+    /// A disk that is full; the file is then one without an index.
+    pub fn finish(mut self) -> Result<(), InputError> {
+        let offset = self.at;
+        self.frame.clear();
+        self.frame.extend(INDEX);
+        self.frame.extend((self.index.len() as u32).to_le_bytes());
+        for (offset, volume) in &self.index {
+            self.frame.extend(offset.to_le_bytes());
+            self.frame.extend(volume.to_le_bytes());
+        }
+        self.frame.extend(CRC.checksum(&self.frame).to_le_bytes());
+        self.frame.extend(offset.to_le_bytes());
+        self.frame.extend(END);
+        self.append()?;
+        self.file.sync_all().map_err(|e| InputError::unwritable(&self.path, &e))
+    }
+
+    /// Writes what is in hand at the end of what is whole.
+    fn append(&mut self) -> Result<(), InputError> {
+        let unwritten = |e| InputError::unwritable(&self.path, &e);
+        if std::mem::replace(&mut self.torn, true) {
+            self.file.set_len(self.at).map_err(unwritten)?;
+            self.file.seek(SeekFrom::Start(self.at)).map_err(unwritten)?;
+        }
+        self.file.write_all(&self.frame).map_err(unwritten)?;
+        self.torn = false;
+        self.at += self.frame.len() as u64;
+        Ok(())
+    }
+}
+
+/// Bytes of the index behind its entries: its checksum, where it begins, and the end's mark.
+const TAIL: u64 = 16;
+/// Bytes of an entry.
+const ENTRY: u64 = 12;
+/// Longest index that is believed, entries: a file with holes in it has room for any. A longer one is made anew.
+const MAX_ENTRIES: u64 = 1 << 24;
+/// Where there was no frame for so many bytes, none is looked for behind.
+const MAX_GAP: u64 = 1 << 30;
+
+/// A file of frames that is read.
+pub struct Reader {
+    path: PathBuf,
+    file: File,
+    header: Header,
+    /// Of each frame that is whole: its offset and its volume.
+    index: Vec<(u64, u32)>,
+    /// First frame of each volume, in order.
+    volumes: Vec<usize>,
+    next: usize,
+    arrived: f64,
+    damaged: u64,
+    lost: u64,
+    rebuilt: bool,
+}
+
+impl Reader {
+    /// Whether a file begins as ours do.
+    pub fn is_one(start: &[u8]) -> bool {
+        start.starts_with(MAGIC)
+    }
+
+    /// # Errors
+    /// A file that cannot be read, is of another format or version, or whose header is damaged.
+    pub fn open(path: &Path) -> Result<Reader, InputError> {
+        let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
+        let fault = |field: &str, fault: String| InputError::new(path, field, fault);
+        let mut file = File::open(path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        let mut start = [0; 16];
+        file.read_exact(&mut start).map_err(|_| fault("header", "the file ends before it".into()))?;
+        let word = |at: usize| u32::from_le_bytes([start[at], start[at + 1], start[at + 2], start[at + 3]]);
+        if !Reader::is_one(&start) {
+            return Err(fault("file", "is no file of frames".into()));
+        }
+        let (version, size) = (word(8), word(12));
+        if version != VERSION {
+            return Err(fault("version", format!("is {version}, this program reads {VERSION}")));
+        }
+        if size > MAX_HEADER_BYTES || u64::from(size) + 20 > length {
+            return Err(fault(
+                "header",
+                format!("claims {size} bytes; the file has {length}, a header at most {MAX_HEADER_BYTES}"),
+            ));
+        }
+        let mut text = vec![0; size as usize + 4];
+        file.read_exact(&mut text).map_err(unreadable)?;
+        let (text, sum) = text.split_at(size as usize);
+        let mut digest = CRC.digest();
+        digest.update(&start);
+        digest.update(text);
+        if digest.finalize().to_le_bytes() != sum {
+            return Err(fault("header", "its checksum is wrong".into()));
+        }
+        let header: Header = serde_json::from_slice(text).map_err(|e| fault("header", e.to_string()))?;
+        header.check().map_err(|(field, wrong)| fault(field, wrong))?;
+        let mut replay = Reader {
+            path: path.into(),
+            file,
+            header,
+            index: Vec::new(),
+            volumes: Vec::new(),
+            next: 0,
+            arrived: 0.0,
+            damaged: 0,
+            lost: 0,
+            rebuilt: false,
+        };
+        let first = u64::from(size) + 20;
+        match replay.stored_index(first, length) {
+            Some(index) => replay.index = index,
+            None => replay.rebuild(first, length).map_err(unreadable)?,
+        }
+        let mut before = None;
+        for (n, (_, volume)) in replay.index.iter().enumerate() {
+            if before.replace(*volume) != Some(*volume) {
+                replay.volumes.push(n);
+            }
+        }
+        Ok(replay)
+    }
+
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Frames that are whole.
+    pub fn frames(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Frames that were left out because their checksum is wrong.
+    pub fn damaged(&self) -> u64 {
+        self.damaged
+    }
+
+    /// Bytes at the end that are no whole frame.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// The index was not there or not right, and was made anew.
+    pub fn rebuilt(&self) -> bool {
+        self.rebuilt
+    }
+
+    /// When the frame that was given last arrived, s on the recorder's clock.
+    pub fn arrived(&self) -> f64 {
+        self.arrived
+    }
+
+    fn record_bytes(&self) -> u64 {
+        FRAME_HEAD as u64 + self.header.frame_bytes().unwrap_or(0) + 4
+    }
+
+    /// The index at the file's end, if every word of it can be true.
+    fn stored_index(&mut self, first: u64, length: u64) -> Option<Vec<(u64, u32)>> {
+        let mut tail = [0; TAIL as usize];
+        self.file.seek(SeekFrom::Start(length.checked_sub(TAIL)?)).ok()?;
+        self.file.read_exact(&mut tail).ok()?;
+        let at = u64::from_le_bytes(tail[4..12].try_into().ok()?);
+        if tail[12..] != *END || at < first || at > length - TAIL || length - TAIL - at > 8 + ENTRY * MAX_ENTRIES {
+            return None;
+        }
+        let mut index = vec![0; usize::try_from(length - TAIL - at).ok()?];
+        self.file.seek(SeekFrom::Start(at)).ok()?;
+        self.file.read_exact(&mut index).ok()?;
+        if CRC.checksum(&index).to_le_bytes() != tail[..4] || !index.starts_with(INDEX) {
+            return None;
+        }
+        let count = u32::from_le_bytes(index.get(4..8)?.try_into().ok()?);
+        if index.len() as u64 != 8 + ENTRY * u64::from(count) {
+            return None;
+        }
+        let entry = |e: &[u8; ENTRY as usize]| {
+            let [a, b, c, d, e, f, g, h, i, j, k, l] = *e;
+            (u64::from_le_bytes([a, b, c, d, e, f, g, h]), u32::from_le_bytes([i, j, k, l]))
+        };
+        let entries: Vec<_> = index[8..].as_chunks::<{ ENTRY as usize }>().0.iter().map(entry).collect();
+        let record = self.record_bytes();
+        let fits = entries.iter().all(|(offset, _)| *offset >= first && offset.saturating_add(record) <= at);
+        let rises = entries.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 <= w[1].1);
+        (fits && rises).then_some(entries)
+    }
+
+    /// Goes through the frames from the first. All have the same length, so one that is damaged hides none behind it.
+    fn rebuild(&mut self, first: u64, length: u64) -> std::io::Result<()> {
+        self.rebuilt = true;
+        let record = self.record_bytes();
+        // A header may claim frames that the file has no room for.
+        let mut bytes = vec![0; if first + record <= length { record as usize } else { 0 }];
+        let (mut at, mut empty_from) = (first, first);
+        self.file.seek(SeekFrom::Start(at))?;
+        while at + record <= length {
+            self.file.read_exact(&mut bytes)?;
+            // The index of a file that was cut behind it.
+            if bytes.starts_with(INDEX) {
+                break;
+            }
+            match parsed(&bytes) {
+                Some((frame, _)) if self.index.last().is_none_or(|(_, volume)| frame.volume >= *volume) => {
+                    self.index.push((at, frame.volume));
+                    empty_from = at + record;
+                }
+                _ => self.damaged += 1,
+            }
+            at += record;
+            if at - empty_from > MAX_GAP.max(4 * record) {
+                break;
+            }
+        }
+        self.lost = length - at;
+        Ok(())
+    }
+
+    fn read(&mut self, n: usize) -> Result<Option<(Frame, f64)>, InputError> {
+        let mut bytes = vec![0; self.record_bytes() as usize];
+        let read = self.file.seek(SeekFrom::Start(self.index[n].0)).and_then(|_| self.file.read_exact(&mut bytes));
+        read.map_err(|e| InputError::unreadable(&self.path, &e))?;
+        let slices = self.header.forward.slices();
+        Ok(parsed(&bytes).filter(|(frame, _)| frame.slice < slices))
+    }
+}
+
+/// A frame and when it arrived; none if its checksum or its words are wrong.
+fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
+    let (body, sum) = record.split_at_checked(record.len().checked_sub(4)?)?;
+    let word = |n: usize| body.get(4 * n..4 * n + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let time = |at: usize| body.get(at..at + 8)?.try_into().ok().map(f64::from_le_bytes);
+    if !body.starts_with(FRAME) || CRC.checksum(body).to_le_bytes() != sum {
+        return None;
+    }
+    let samples = body.get(FRAME_HEAD..)?;
+    if word(5)? as usize != samples.len() {
+        return None;
+    }
+    let flags = word(4)?;
+    let frame = Frame {
+        volume: word(1)?,
+        number: word(2)?,
+        slice: word(3)? as usize,
+        backward: flags & 1 != 0,
+        time: if flags & 2 != 0 { Some(time(24)?) } else { None },
+        bytes: samples.to_vec(),
+    };
+    Some((frame, time(32)?))
+}
+
+impl Source for Reader {
+    fn geometry(&self, volume: usize) -> Geometry {
+        // Which way it was swept, its first frame says; that is looked up without moving on.
+        let backward = self.volumes.get(volume).is_some_and(|n| self.backward(*n));
+        if backward { self.header.backward.clone() } else { self.header.forward.clone() }
+    }
+
+    fn stored_type(&self) -> StoredType {
+        self.header.stored
+    }
+
+    fn range(&self) -> [f64; 2] {
+        self.header.range
+    }
+
+    fn volumes(&self) -> usize {
+        self.volumes.len()
+    }
+
+    fn frames_per_volume(&self) -> usize {
+        self.header.forward.slices()
+    }
+
+    fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
+        self.next = self.volumes.get(volume).copied().unwrap_or(self.index.len());
+        Ok(())
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
+        while self.next < self.index.len() {
+            let n = self.next;
+            self.next += 1;
+            match self.read(n)? {
+                Some((frame, arrived)) => {
+                    self.arrived = arrived;
+                    return Ok(Some(frame));
+                }
+                None => self.damaged += 1,
+            }
+        }
+        Ok(None)
+    }
+
+    fn header(&self) -> Header {
+        self.header.clone()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        vec![self.path.clone()]
+    }
+
+    fn arrival(&self) -> Option<f64> {
+        Some(self.arrived)
+    }
+}
+
+impl Reader {
+    /// Whether a frame was swept backwards; what cannot be read was not.
+    fn backward(&self, n: usize) -> bool {
+        let mut flags = [0; 4];
+        let read = File::open(&self.path).and_then(|mut file| {
+            file.seek(SeekFrom::Start(self.index[n].0 + 16))?;
+            file.read_exact(&mut flags)
+        });
+        read.is_ok() && flags[0] & 1 != 0
+    }
+}
+
+impl Reader {
+    /// What the file is, for people to read: title and value. Goes through all frames once, since only then is it known which are whole.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
+        let summary = self.summarize()?;
+        let mut facts: Vec<(String, String)> = Vec::new();
+        let mut say = |title: &str, value: String| facts.push((title.into(), value));
+        let header = self.header();
+        say("format", "frames as they arrived".into());
+        say("samples", SampleType::from(header.stored).to_string());
+        let ([first, second], each) = (header.forward.frame_size(), header.forward.slices());
+        match header.forward {
+            Geometry::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
+            Geometry::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
+        }
+        say("frames", summary.frames.to_string());
+        let backward =
+            if summary.backward > 0 { format!(", {} swept backwards", summary.backward) } else { String::new() };
+        say("volumes", format!("{} of {each} frames, {} whole{backward}", summary.volumes, summary.whole));
+        match &header.forward {
+            Geometry::Sweep(probe) => facts.extend(describe::probe(probe)),
+            Geometry::Cartesian(grid) => facts.extend(describe::grid(grid)),
+        }
+        let mut say = |title: &str, value: String| facts.push((title.into(), value));
+        let [low, high] = self.header().range.map(number);
+        say("value range", format!("{low} .. {high}"));
+        if let Some([first, last]) = summary.times {
+            say("time stamps", format!("{} .. {} s, {} of them", number(first), number(last), summary.stamped));
+        }
+        if let Some([first, last]) = summary.arrivals {
+            let rate = match last - first {
+                span if span > 0.0 && span.is_finite() => {
+                    let (rate, gap) = ((summary.frames - 1) as f64 / span, summary.gap * 1e3);
+                    format!("{} frames a second, at most {} ms apart", number(rate), number(gap))
+                }
+                _ => "all at once".into(),
+            };
+            say("arrival", format!("{} .. {} s, {rate}", number(first), number(last)));
+        }
+        say("damaged", format!("{} frames", self.damaged()));
+        say("lost", format!("{} bytes at the end", self.lost()));
+        say("index", if self.rebuilt() { "missing or wrong; made anew" } else { "as it was written" }.into());
+        Ok(facts)
+    }
+
+    fn summarize(&mut self) -> Result<Summary, InputError> {
+        self.skip_to_volume(0)?;
+        let mut summary = Summary::default();
+        let each = self.frames_per_volume();
+        let (mut volume, mut of_volume) = (None, 0);
+        while let Some(frame) = self.next_frame()? {
+            summary.frames += 1;
+            if volume.replace(frame.volume) != Some(frame.volume) {
+                of_volume = 0;
+                summary.volumes += 1;
+                summary.backward += usize::from(frame.backward);
+            }
+            of_volume += 1;
+            summary.whole += usize::from(of_volume == each);
+            if let Some(time) = frame.time.filter(|t| t.is_finite()) {
+                summary.stamped += 1;
+                widen(&mut summary.times, time);
+            }
+            let arrived = self.arrived();
+            if arrived.is_finite() {
+                if let Some([_, last]) = summary.arrivals {
+                    summary.gap = summary.gap.max(arrived - last);
+                }
+                widen(&mut summary.arrivals, arrived);
+            }
+        }
+        Ok(summary)
+    }
+}
+
+#[derive(Default)]
+struct Summary {
+    frames: usize,
+    volumes: usize,
+    /// Volumes with as many frames as they must have.
+    whole: usize,
+    /// Volumes.
+    backward: usize,
+    stamped: usize,
+    /// First and last, s.
+    times: Option<[f64; 2]>,
+    arrivals: Option<[f64; 2]>,
+    /// Longest time between the arrival of two frames, s.
+    gap: f64,
+}
+
+fn widen(span: &mut Option<[f64; 2]>, time: f64) {
+    let [first, last] = span.unwrap_or([time; 2]);
+    *span = Some([first.min(time), last.max(time)]);
+}

@@ -1,0 +1,177 @@
+//! A SPIR-V module as words: the embedded shaders, and the decoding and encoding of instructions. Numbers are those of the
+//! SPIR-V 1.5 specification.
+
+/// Every embedded shader: its name and variant, and its words as bytes.
+pub const EMBEDDED: &[(&str, &[u8])] = include!("../../spirv/embedded.rs");
+
+/// Opcodes.
+pub(super) mod op {
+    pub const UNDEF: u32 = 1;
+    pub const NAME: u32 = 5;
+    pub const MEMBER_NAME: u32 = 6;
+    pub const LINE: u32 = 8;
+    pub const EXT_INST: u32 = 12;
+    pub const ENTRY_POINT: u32 = 15;
+    pub const EXECUTION_MODE: u32 = 16;
+    pub const CAPABILITY: u32 = 17;
+    pub const TYPE_VOID: u32 = 19;
+    pub const TYPE_BOOL: u32 = 20;
+    pub const TYPE_INT: u32 = 21;
+    pub const TYPE_FLOAT: u32 = 22;
+    pub const TYPE_VECTOR: u32 = 23;
+    pub const TYPE_IMAGE: u32 = 25;
+    pub const TYPE_SAMPLER: u32 = 26;
+    pub const TYPE_SAMPLED_IMAGE: u32 = 27;
+    pub const TYPE_ARRAY: u32 = 28;
+    pub const TYPE_RUNTIME_ARRAY: u32 = 29;
+    pub const TYPE_STRUCT: u32 = 30;
+    pub const TYPE_POINTER: u32 = 32;
+    pub const CONSTANT: u32 = 43;
+    pub const CONSTANT_COMPOSITE: u32 = 44;
+    pub const SPEC_CONSTANT: u32 = 50;
+    pub const FUNCTION: u32 = 54;
+    pub const FUNCTION_CALL: u32 = 57;
+    pub const VARIABLE: u32 = 59;
+    pub const LOAD: u32 = 61;
+    pub const STORE: u32 = 62;
+    pub const COPY_MEMORY_SIZED: u32 = 64;
+    pub const ACCESS_CHAIN: u32 = 65;
+    pub const IN_BOUNDS_ACCESS_CHAIN: u32 = 66;
+    pub const PTR_ACCESS_CHAIN: u32 = 67;
+    pub const ARRAY_LENGTH: u32 = 68;
+    pub const DECORATE: u32 = 71;
+    pub const MEMBER_DECORATE: u32 = 72;
+    pub const VECTOR_EXTRACT_DYNAMIC: u32 = 77;
+    pub const VECTOR_SHUFFLE: u32 = 79;
+    pub const COMPOSITE_EXTRACT: u32 = 81;
+    pub const COPY_OBJECT: u32 = 83;
+    pub const SAMPLED_IMAGE: u32 = 86;
+    pub const IMAGE_SAMPLE_EXPLICIT_LOD: u32 = 88;
+    pub const IMAGE_FETCH: u32 = 95;
+    pub const IMAGE_READ: u32 = 98;
+    pub const IMAGE_WRITE: u32 = 99;
+    pub const IMAGE: u32 = 100;
+    pub const IMAGE_QUERY_SIZE_LOD: u32 = 103;
+    pub const IMAGE_QUERY_SIZE: u32 = 104;
+    pub const IMAGE_QUERY_SAMPLES: u32 = 107;
+    pub const QUANTIZE_TO_F16: u32 = 116;
+    pub const F_ADD: u32 = 129;
+    pub const F_SUB: u32 = 131;
+    pub const F_MUL: u32 = 133;
+    pub const F_DIV: u32 = 136;
+    pub const VECTOR_TIMES_SCALAR: u32 = 142;
+    pub const SELECT: u32 = 169;
+    pub const PHI: u32 = 245;
+    pub const LABEL: u32 = 248;
+    pub const NO_LINE: u32 = 317;
+    pub const EXECUTION_MODE_ID: u32 = 331;
+}
+
+/// Decorations.
+pub(super) mod decoration {
+    pub const SPEC_ID: u32 = 1;
+    pub const NON_WRITABLE: u32 = 24;
+    pub const NON_READABLE: u32 = 25;
+    pub const BINDING: u32 = 33;
+    pub const OFFSET: u32 = 35;
+}
+
+/// Capabilities.
+pub(super) mod capability {
+    pub const IMAGE_BUFFER: u32 = 47;
+    pub const STORAGE_IMAGE_EXTENDED_FORMATS: u32 = 49;
+}
+
+/// Storage classes.
+pub(super) mod storage_class {
+    pub const UNIFORM_CONSTANT: u32 = 0;
+    pub const UNIFORM: u32 = 2;
+    pub const STORAGE_BUFFER: u32 = 12;
+}
+
+/// The upper limit of identifiers that every consumer of SPIR-V accepts.
+pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
+/// Words of a module's header; word 3 is the bound of its identifiers.
+pub(super) const HEADER_WORDS: usize = 5;
+pub(super) const BOUND: usize = 3;
+
+/// A module that breaks the format, or that a rewrite cannot handle.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("SPIR-V: {0}")]
+pub struct SpirvError(String);
+
+/// The words of a module.
+pub fn words(bytes: &[u8]) -> Vec<u32> {
+    bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+/// The embedded shader of this name, as bytes.
+pub fn embedded(name: &str) -> Option<&'static [u8]> {
+    EMBEDDED.iter().find(|(n, _)| *n == name).map(|(_, bytes)| *bytes)
+}
+
+pub(super) fn error<T>(fault: impl Into<String>) -> Result<T, SpirvError> {
+    Err(SpirvError(fault.into()))
+}
+
+/// A literal string: UTF-8, terminated by a zero byte.
+pub(super) fn text(words: &[u32]) -> String {
+    let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).take_while(|b| *b != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// One instruction: its opcode and its operands.
+pub(super) struct Instruction<'a> {
+    pub opcode: u32,
+    pub operands: &'a [u32],
+}
+
+/// Decodes every instruction. Each has at least the operands that the code of this module indexes without a check.
+pub(super) fn decode(words: &[u32]) -> Result<Vec<Instruction<'_>>, SpirvError> {
+    if words.len() < HEADER_WORDS || words[0] != 0x0723_0203 {
+        return error("not a SPIR-V module");
+    }
+    let mut instructions = Vec::new();
+    let mut at = HEADER_WORDS;
+    while at < words.len() {
+        let length = (words[at] >> 16) as usize;
+        let Some(instruction) = words.get(at..at + length).filter(|i| !i.is_empty()) else {
+            return error(format!("the instruction at word {at} runs past the end"));
+        };
+        let (opcode, operands) = (words[at] & 0xffff, &instruction[1..]);
+        let required = match opcode {
+            op::NAME | op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_STRUCT => 1,
+            op::MEMBER_NAME
+            | op::EXECUTION_MODE
+            | op::TYPE_INT
+            | op::TYPE_FLOAT
+            | op::TYPE_SAMPLED_IMAGE
+            | op::FUNCTION
+            | op::DECORATE
+            | op::EXECUTION_MODE_ID => 2,
+            op::TYPE_VECTOR
+            | op::TYPE_POINTER
+            | op::CONSTANT
+            | op::SPEC_CONSTANT
+            | op::VARIABLE
+            | op::MEMBER_DECORATE
+            | op::IMAGE_QUERY_SIZE_LOD => 3,
+            op::IMAGE_SAMPLE_EXPLICIT_LOD | op::IMAGE_FETCH => 4,
+            op::TYPE_IMAGE => 8,
+            _ => 0,
+        };
+        if operands.len() < required {
+            return error(format!("the instruction at word {at} is too short"));
+        }
+        instructions.push(Instruction { opcode, operands });
+        at += length;
+    }
+    Ok(instructions)
+}
+
+/// Encodes one instruction.
+pub(super) fn encode(opcode: u32, operands: &[u32]) -> Vec<u32> {
+    let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode];
+    words.extend_from_slice(operands);
+    words
+}

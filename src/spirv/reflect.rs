@@ -1,0 +1,325 @@
+//! Reflection: the bindings, parameters, constants and workgroup size that a SPIR-V module declares. Passes bind their
+//! slots by these names, never by order. Only the instructions that this needs are read. A module that breaks the format is
+//! an error, not a panic.
+
+use super::module::{SpirvError, decode, decoration, error, op, storage_class, text};
+use std::collections::HashMap;
+
+/// Name of the uniform block that holds the numbers of a pass.
+pub const PARAMS: &str = "Params";
+
+/// What a binding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The uniform block with the numbers of a pass.
+    Params,
+    /// A texture read texel by texel, without a sampler.
+    Sampled,
+    /// A texture read through a linear sampler.
+    Filtered,
+    /// A storage image.
+    Storage,
+    /// A storage buffer.
+    Buffer,
+    /// A storage texel buffer; its texels have this many floats (1, 2 or 4).
+    Texels(u32),
+}
+
+/// How a shader accesses a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    Read,
+    Write,
+    ReadWrite,
+}
+
+/// Dimensionality of an image binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    Two,
+    /// An array of 2D images.
+    Layers,
+    Three,
+    /// Not an image.
+    None,
+}
+
+/// One resource that a module binds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Binding {
+    pub name: String,
+    pub binding: u32,
+    pub kind: Kind,
+    pub access: Access,
+    pub dimension: Dimension,
+}
+
+/// A scalar or vector of 32-bit words in the parameter block; `offset` is in bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Member {
+    pub name: String,
+    pub offset: u32,
+    pub components: u32,
+    pub is_float: bool,
+    pub is_signed: bool,
+}
+
+/// A specialization constant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Constant {
+    pub name: String,
+    /// Its `constant_id`.
+    pub id: u32,
+}
+
+/// The interface of a module.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Module {
+    /// By binding number.
+    pub bindings: Vec<Binding>,
+    pub params: Vec<Member>,
+    /// Size of the parameter block, bytes.
+    pub params_size: u32,
+    /// By id.
+    pub constants: Vec<Constant>,
+    /// Invocations of a workgroup along x, y, z.
+    pub local_size: [u32; 3],
+}
+
+/// Execution modes.
+const LOCAL_SIZE: u32 = 17;
+const LOCAL_SIZE_ID: u32 = 38;
+
+#[derive(Clone, Debug)]
+enum Type {
+    Int { signed: bool },
+    Float,
+    Vector(u32, u32),
+    Image { dimension: u32, arrayed: bool, sampled: u32, format: u32 },
+    SampledImage(u32),
+    Struct(Vec<u32>),
+    Pointer(u32),
+    Other,
+}
+
+/// What the instructions of a module declare, by identifier.
+#[derive(Default)]
+struct Declarations {
+    names: HashMap<u32, String>,
+    member_names: HashMap<(u32, u32), String>,
+    offsets: HashMap<(u32, u32), u32>,
+    /// By struct: how many of its members are read-only.
+    read_only_members: HashMap<u32, u32>,
+    bindings: HashMap<u32, u32>,
+    constant_ids: HashMap<u32, u32>,
+    not_writable: Vec<u32>,
+    not_readable: Vec<u32>,
+    types: HashMap<u32, Type>,
+    constants: HashMap<u32, u32>,
+    /// Identifier, pointer type, storage class.
+    variables: Vec<(u32, u32, u32)>,
+    local_size: [u32; 3],
+    local_size_ids: Option<[u32; 3]>,
+}
+
+/// Reads the interface of a module.
+///
+/// # Errors
+/// A module that breaks the format, or declares something that no pass uses.
+pub fn reflect(words: &[u32]) -> Result<Module, SpirvError> {
+    let declared = scan(words)?;
+    let mut module = Module { local_size: declared.local_size, ..Module::default() };
+    if let Some(ids) = declared.local_size_ids {
+        module.local_size = ids.map(|id| declared.constants.get(&id).copied().unwrap_or(1));
+    }
+    for (&id, &constant) in &declared.constant_ids {
+        let name = declared.names.get(&id).cloned().unwrap_or_default();
+        module.constants.push(Constant { name, id: constant });
+    }
+    module.constants.sort_by_key(|c| c.id);
+    for &(id, pointer, storage) in &declared.variables {
+        if let Some(binding) = declared.bindings.get(&id) {
+            declared.add_binding(&mut module, id, pointer, storage, *binding)?;
+        }
+    }
+    module.bindings.sort_by_key(|b| b.binding);
+    Ok(module)
+}
+
+fn scan(words: &[u32]) -> Result<Declarations, SpirvError> {
+    let mut declarations = Declarations { local_size: [1; 3], ..Declarations::default() };
+    for i in decode(words)? {
+        declarations.add(i.opcode, i.operands);
+    }
+    Ok(declarations)
+}
+
+impl Declarations {
+    fn add(&mut self, opcode: u32, a: &[u32]) {
+        match opcode {
+            op::NAME => drop(self.names.insert(a[0], text(&a[1..]))),
+            op::MEMBER_NAME => drop(self.member_names.insert((a[0], a[1]), text(&a[2..]))),
+            op::EXECUTION_MODE if a[1] == LOCAL_SIZE && a.len() >= 5 => self.local_size = [a[2], a[3], a[4]],
+            op::EXECUTION_MODE_ID if a[1] == LOCAL_SIZE_ID && a.len() >= 5 => {
+                self.local_size_ids = Some([a[2], a[3], a[4]]);
+            }
+            op::TYPE_INT => drop(self.types.insert(a[0], Type::Int { signed: a.get(2) == Some(&1) })),
+            op::TYPE_FLOAT => drop(self.types.insert(a[0], Type::Float)),
+            op::TYPE_VECTOR => drop(self.types.insert(a[0], Type::Vector(a[1], a[2]))),
+            op::TYPE_IMAGE => {
+                let image = Type::Image { dimension: a[2], arrayed: a[4] == 1, sampled: a[6], format: a[7] };
+                self.types.insert(a[0], image);
+            }
+            op::TYPE_SAMPLED_IMAGE => drop(self.types.insert(a[0], Type::SampledImage(a[1]))),
+            op::TYPE_STRUCT => drop(self.types.insert(a[0], Type::Struct(a[1..].to_vec()))),
+            op::TYPE_POINTER => drop(self.types.insert(a[0], Type::Pointer(a[2]))),
+            op::TYPE_VOID | op::TYPE_BOOL | op::TYPE_SAMPLER | op::TYPE_ARRAY | op::TYPE_RUNTIME_ARRAY
+                if !a.is_empty() =>
+            {
+                self.types.insert(a[0], Type::Other);
+            }
+            op::CONSTANT | op::SPEC_CONSTANT => drop(self.constants.insert(a[1], a[2])),
+            op::VARIABLE => self.variables.push((a[1], a[0], a[2])),
+            op::DECORATE => match (a[1], a.get(2)) {
+                (decoration::BINDING, Some(&binding)) => drop(self.bindings.insert(a[0], binding)),
+                (decoration::SPEC_ID, Some(&id)) => drop(self.constant_ids.insert(a[0], id)),
+                (decoration::NON_WRITABLE, _) => self.not_writable.push(a[0]),
+                (decoration::NON_READABLE, _) => self.not_readable.push(a[0]),
+                _ => {}
+            },
+            op::MEMBER_DECORATE => match (a[2], a.get(3)) {
+                (decoration::OFFSET, Some(&offset)) => drop(self.offsets.insert((a[0], a[1]), offset)),
+                (decoration::NON_WRITABLE, _) => *self.read_only_members.entry(a[0]).or_default() += 1,
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
+    fn add_binding(
+        &self,
+        module: &mut Module,
+        id: u32,
+        pointer: u32,
+        storage: u32,
+        binding: u32,
+    ) -> Result<(), SpirvError> {
+        let Some(&Type::Pointer(pointee)) = self.types.get(&pointer) else {
+            return error(format!("variable {id} is not a pointer"));
+        };
+        let mut name = self.names.get(&id).cloned().unwrap_or_default();
+        let declared = if self.not_writable.contains(&id) {
+            Access::Read
+        } else if self.not_readable.contains(&id) {
+            Access::Write
+        } else {
+            Access::ReadWrite
+        };
+        let shape = |id: &u32| match self.types.get(id) {
+            Some(Type::Image { dimension: 1, arrayed: false, .. }) => Dimension::Two,
+            Some(Type::Image { dimension: 1, arrayed: true, .. }) => Dimension::Layers,
+            Some(Type::Image { dimension: 2, .. }) => Dimension::Three,
+            _ => Dimension::None,
+        };
+        let (kind, access, dimension) = match self.types.get(&pointee) {
+            Some(Type::SampledImage(image)) => (Kind::Filtered, Access::Read, shape(image)),
+            // Dimension Buffer (5), in a format that lookup tables have: R32f, Rg32f, Rgba32f.
+            Some(Type::Image { dimension: 5, sampled: 2, format, .. }) => {
+                let components = match format {
+                    3 => 1,
+                    6 => 2,
+                    1 => 4,
+                    _ => return error(format!("the format of texel buffer '{name}' is not one of a lookup table")),
+                };
+                (Kind::Texels(components), declared, Dimension::None)
+            }
+            Some(Type::Image { sampled: 1, .. }) => (Kind::Sampled, Access::Read, shape(&pointee)),
+            Some(Type::Image { .. }) => (Kind::Storage, declared, shape(&pointee)),
+            Some(Type::Struct(members)) if storage == storage_class::UNIFORM => {
+                name = self.names.get(&pointee).cloned().unwrap_or_default();
+                if name != PARAMS {
+                    return error(format!("uniform block '{name}': the numbers of a pass must be in '{PARAMS}'"));
+                }
+                self.add_params(module, pointee, members)?;
+                (Kind::Params, Access::Read, Dimension::None)
+            }
+            Some(Type::Struct(members)) => {
+                let all_read_only = self.read_only_members.get(&pointee).copied() == Some(members.len() as u32);
+                (Kind::Buffer, if all_read_only { Access::Read } else { declared }, Dimension::None)
+            }
+            _ => return error(format!("binding '{name}' has an unsupported type")),
+        };
+        module.bindings.push(Binding { name, binding, kind, access, dimension });
+        Ok(())
+    }
+
+    fn add_params(&self, module: &mut Module, block: u32, members: &[u32]) -> Result<(), SpirvError> {
+        for (i, member) in members.iter().enumerate() {
+            let key = (block, i as u32);
+            let name = self.member_names.get(&key).cloned().unwrap_or_default();
+            let (scalar, components) = match self.types.get(member) {
+                Some(Type::Vector(scalar, n)) => (self.types.get(scalar), *n),
+                scalar => (scalar, 1),
+            };
+            let (is_float, is_signed) = match scalar {
+                Some(Type::Float) => (true, true),
+                Some(Type::Int { signed }) => (false, *signed),
+                _ => return error(format!("parameter '{name}' is neither a scalar nor a vector")),
+            };
+            let Some(&offset) = self.offsets.get(&key) else {
+                return error(format!("parameter '{name}' has no offset"));
+            };
+            // Every device allows at least this size for a uniform block.
+            let Some(end) = components.checked_mul(4).and_then(|size| size.checked_add(offset)).filter(|e| *e <= 16384)
+            else {
+                return error(format!("parameter '{name}' ends after 16384 bytes"));
+            };
+            module.params_size = module.params_size.max(end);
+            module.params.push(Member { name, offset, components, is_float, is_signed });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spirv::module::{embedded, words};
+
+    #[test]
+    fn reflection_reads_names_types_offsets_and_workgroup() {
+        let module = reflect(&words(embedded("filter/sigma.slice").unwrap())).unwrap();
+        assert_eq!(module.local_size, [8, 8, 1]);
+        let constants = [("RADIUS", 0), ("MULTIPLICATIVE", 1)].map(|(name, id)| Constant { name: name.into(), id });
+        assert_eq!(module.constants, constants);
+        let names: Vec<_> = module.params.iter().map(|p| (p.name.as_str(), p.offset, p.is_float)).collect();
+        assert_eq!(
+            names,
+            [
+                ("range", 0, true),
+                ("few", 4, true),
+                ("slice", 8, false),
+                ("first_column", 12, false),
+                ("first_row", 16, false)
+            ]
+        );
+        let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
+        assert_eq!((target.kind, target.access, target.dimension), (Kind::Storage, Access::Write, Dimension::Three));
+        let source = module.bindings.iter().find(|b| b.name == "source").unwrap();
+        assert_eq!((source.kind, source.dimension), (Kind::Sampled, Dimension::Two));
+    }
+
+    #[test]
+    fn a_malformed_module_is_an_error_and_not_a_panic() {
+        let intact = words(embedded("raycast/surface.moved").unwrap());
+        assert!(reflect(&[]).is_err());
+        for cut in 1..intact.len() {
+            let _ = reflect(&intact[..cut]);
+        }
+        for at in 5..intact.len() {
+            let mut corrupted = intact.clone();
+            corrupted[at] ^= 0x0003_0001;
+            let _ = reflect(&corrupted);
+        }
+    }
+}
