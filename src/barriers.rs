@@ -1,20 +1,20 @@
-//! From what each operation touches to the barriers between them. One rule: where an operation conflicts with one that came
-//! before and no barrier lies between, a global memory barrier goes in front of it; nowhere else. The order is a ring: a
-//! tracker lives as long as its slots, so the end of one picture feeds the start of the next.
+//! Derives pipeline barriers from the memory accesses of each operation. There is one rule: if an operation conflicts with an earlier
+//! one and no barrier separates them, a global memory barrier is placed before it. A tracker lives as long as its slots, so the
+//! accesses of one picture also count for the next.
 
 use crate::passes::{DispatchArgs, Part, Pass, Slot};
 use crate::scene::Scene;
 use std::ops::Range;
 
-/// What a barrier orders accesses of. Volume images that take turns are told apart by their index.
+/// A resource whose accesses are ordered. Each image of a multibuffered slot is a resource of its own, by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Resource {
     Slot(Slot, u32),
-    /// The buffer that results come back in.
+    /// The buffer for results that the host reads.
     Readback,
 }
 
-/// Who touches it.
+/// The pipeline stage of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PipelineStage {
     Compute,
@@ -22,13 +22,13 @@ pub enum PipelineStage {
     Host,
 }
 
-/// A set of workers.
+/// A set of pipeline stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct PipelineStages(u8);
 
 impl PipelineStages {
-    /// What runs on the device. The host is left out: making memory visible to it can cost a cache flush, so only a host
-    /// access asks for it.
+    /// All stages on the device. The host is not included: making memory visible to it can cost a cache flush, so only a host access
+    /// requests it.
     pub const DEVICE: PipelineStages = PipelineStages(0b011);
 
     pub fn has(self, worker: PipelineStage) -> bool {
@@ -50,7 +50,7 @@ impl From<PipelineStage> for PipelineStages {
     }
 }
 
-/// One access of an operation: the parts are slices of a 3D image, layers of an array, or the one part of anything else.
+/// One memory access of an operation. The parts are slices of a 3D image or layers of an array; anything else has a single part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
     pub resource: Resource,
@@ -59,7 +59,7 @@ pub struct Access {
     pub stage: PipelineStage,
 }
 
-/// A global memory barrier: everything `from` did so far is done and visible to whatever `to` does next.
+/// A global memory barrier: all earlier accesses of the stages `from` are complete and visible to all later ones of the stages `to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Barrier {
     pub from: PipelineStages,
@@ -71,8 +71,8 @@ impl Access {
         Access { resource: Resource::Slot(slot, image), parts, write, stage }
     }
 
-    /// Two accesses whose order matters. Slices of a 3D image are no sub-resources to Vulkan: two writers of different slices
-    /// may overlap, but a reader (who may filter across slices, and whose caches know no slices) and a writer may not.
+    /// True if the order of two accesses matters. Slices of a 3D image are not subresources in Vulkan: two writers of different slices
+    /// may overlap, but a reader, which may filter across slices, and a writer may not.
     pub fn conflicts(&self, later: &Access) -> bool {
         if self.resource != later.resource || !(self.write || later.write) {
             return false;
@@ -83,7 +83,7 @@ impl Access {
     }
 }
 
-/// What a dispatch of a pass touches.
+/// The memory accesses of a dispatch.
 pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> {
     let access = |bind: crate::passes::Bind, write| {
         let parts = match bind.part {
@@ -103,16 +103,16 @@ pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> 
     reads.chain(writes).collect()
 }
 
-/// Accesses that no barrier has covered yet.
+/// Tracks the accesses that no barrier has covered yet.
 #[derive(Clone, Debug, Default)]
 pub struct BarrierTracker {
     pending: Vec<(Access, PipelineStages)>,
-    /// Something that was recorded may never have run.
+    /// Some recorded operations may never have run.
     is_invalid: bool,
 }
 
 impl BarrierTracker {
-    /// The barrier that must come before an operation with these accesses, if any; the operation is then taken as recorded.
+    /// Records an operation with these accesses. Returns the barrier that it needs before it, if any.
     pub fn record(&mut self, accesses: &[Access]) -> Option<Barrier> {
         let hazard = accesses.iter().any(|later| {
             self.pending.iter().any(|(earlier, covered)| !covered.has(later.stage) && earlier.conflicts(later))
@@ -124,7 +124,7 @@ impl BarrierTracker {
         barrier
     }
 
-    /// What was recorded last was not submitted, so its barriers do not count: the next operation waits for everything.
+    /// The last recording was not submitted, so its barriers do not count: the next operation waits for everything.
     pub fn invalidate(&mut self) {
         self.is_invalid = true;
     }
@@ -137,7 +137,7 @@ impl BarrierTracker {
         for (_, covered) in &mut self.pending {
             *covered = covered.with(to);
         }
-        // Only the readback buffer is ever touched by the host while the device runs.
+        // The host only accesses the readback buffer while the device runs.
         self.pending.retain(|(access, covered)| match access.resource {
             Resource::Readback => !covered.has(PipelineStage::Host),
             Resource::Slot(..) => false,
@@ -146,8 +146,8 @@ impl BarrierTracker {
     }
 
     fn add(&mut self, access: &Access) {
-        let known = self.pending.iter().any(|(a, covered)| a == access && *covered == PipelineStages::default());
-        if !known {
+        let is_pending = self.pending.iter().any(|(a, covered)| a == access && *covered == PipelineStages::default());
+        if !is_pending {
             self.pending.push((access.clone(), PipelineStages::default()));
         }
     }
@@ -160,8 +160,8 @@ mod tests {
 
     type Operation = Vec<Access>;
 
-    /// A second opinion, with nothing in common with the tracker: every pair of conflicting operations must have a barrier
-    /// between them that goes from the first one's worker to the second one's.
+    /// An independent check: every pair of conflicting operations must be separated by a barrier from the stage of the first to the stage
+    /// of the second.
     fn uncovered(operations: &[Operation], barriers: &[Option<Barrier>]) -> Option<(usize, usize)> {
         for (j, later) in operations.iter().enumerate() {
             for (i, earlier) in operations[..j].iter().enumerate() {
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn volume_images_that_take_turns_are_independent() {
+    fn multibuffered_volume_images_are_independent() {
         let mut tracker = BarrierTracker::default();
         let on = |image, write| Access::of_slot(Slot::Volume, image, 0..4, write, PipelineStage::Compute);
         assert!(tracker.record(&[on(0, true)]).is_none());

@@ -1,15 +1,15 @@
-//! Every slot as a picture, so that each stage can be seen.
+//! Draws the contents of a slot as a picture, to inspect the stages.
 
 use crate::passes::slots::Initializer;
 use crate::passes::{Slot, Texels, is_hit};
 use crate::picture::Picture;
 use crate::scene::Scene;
 
-/// Edge of a drawn table, pixels.
+/// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
 
-/// Draws a slot: colours as they are, a volume as a sheet of its slices, a distance map near bright and far dark, a table as
-/// curves. One channel is stretched from its least to its largest value unless it lies in 0..1.
+/// Draws a slot: colours unchanged, a volume as a sheet of its slices, a distance map with near bright and far dark, a table as
+/// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
     match (texels, slot.filled()) {
         (Some(texels), _) if texels.channels == 4 => colours(texels),
@@ -52,7 +52,7 @@ fn distances(texels: &Texels) -> Vec<f64> {
     texels.values.iter().map(|v| if is_hit(*v) { near(*v) } else { 0.0 }).collect()
 }
 
-/// Slices side by side, as square a sheet as it goes, at most 2048 pixels wide.
+/// A sheet of all slices, as square as possible, at most 2048 pixels wide.
 fn sheet(texels: &Texels, grey: &[f64]) -> Picture {
     let [width, height, slices] = texels.size;
     let across = (((slices * height) as f64 / width as f64).sqrt().ceil() as usize).clamp(1, slices);
@@ -73,7 +73,7 @@ fn sheet(texels: &Texels, grey: &[f64]) -> Picture {
     picture
 }
 
-/// One curve a channel over the entries, each stretched to the height by itself.
+/// One curve per channel over the entries, each stretched to the full height.
 fn curves(values: &[f32], channels: usize) -> Picture {
     const COLOURS: [[u8; 3]; 4] = [[230, 80, 70], [90, 200, 90], [90, 140, 255], [240, 240, 240]];
     let [width, height] = GRAPH;

@@ -1,22 +1,168 @@
-//! Echolume renders the polar frames of a mechanically wobbling ultrasound probe as volumes, on bare Vulkan.
+//! Echolume turns the polar frames of a mechanically wobbling ultrasound probe into rendered volumes, on bare Vulkan.
 //!
-//! The tour, in the order in which a frame travels:
+//! # Modules
 //!
-//! - [`source`] reads recordings into frames; [`probe`] says where their samples lie in space, in f64, and drives its motor.
+//! In the order in which a frame travels:
+//!
+//! - [`source`] reads recordings and live sources into frames. [`probe`] defines where their samples lie in space and drives the probe's
+//!   motor.
 //! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
-//! - [`passes`] declares every compute pass in one place: its slots, parameters, constants, tolerance and f64 reference.
-//!   The four stages are its folders: preprocess, raycast, shade, postprocess; filters that several stages use lie beside them.
-//! - [`plan`] turns a scene into the passes and slots it needs, and a change into what runs again; [`barriers`] derives the
-//!   order between them (and has a second opinion on it) and [`queues`] that between queues; [`spirv`] reflects the shaders and rewrites how they read texels. All of these are pure and tested
-//!   without a GPU.
-//! - [`files`] reads up to a limit and writes whole or not at all; [`picture`] is what is drawn, as a file.
-//! - [`ui`] is the live volume on a screen, and the hands that turn it.
-//! - [`kiosk`] is what a cart needs around that: its configuration, its logs, and what it tells whoever is to help.
-//! - [`live`] is the loop between a source that does not wait and the device.
-//! - [`gpu`] is the only folder that knows Vulkan; [`report`] says in words and pictures what came of it; [`measuring`] runs the
-//!   one to fill the other, and [`verify`] to say whether a device and its driver still do what they should.
+//! - [`passes`] declares every compute pass in one place: its slots (GPU resources), parameters, constants, tolerance and f64 reference.
+//!   Its folders are the four stages preprocess, raycast, shade and postprocess, and the filters that several stages share.
+//! - [`plan`] derives the passes and slots that a scene needs, and what must run again after a change. [`barriers`] derives the barriers
+//!   between passes, [`queues`] the waits between queues. [`spirv`] reflects and rewrites shaders. These modules need no GPU.
+//! - [`gpu`] is the only module that uses Vulkan and the only one with unsafe code.
+//! - [`live`] renders frames while they arrive. [`mod@ui`] shows the pictures and handles input. [`kiosk`] holds the configuration, the logs
+//!   and the support bundle of a kiosk display.
+//! - [`reference`](mod@reference) renders on the CPU in f64. [`profile`] measures GPU times, [`error_report`] error against run time,
+//!   [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
+//! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures. [`cli`] is the command line.
+//!
+//! # Render a file
+//!
+//! ```
+//! use echolume::scene::{Input, load::Layers};
+//! use echolume::{Context, ContextOptions, Renderer, RendererOptions, Scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut recording = echolume::source::open("tests/data/bone-l14/bone.mha".as_ref(), None)?;
+//! let mut layers = Layers::default();
+//! layers.preset("bone")?;
+//! layers.set("picture.size=[96,64]")?;
+//! let input = Input { stored: recording.stored_type(), range: recording.range() };
+//! let scene = Scene::new(recording.geometry(0), input, layers.finish()?)?;
+//!
+//! let context = Context::new(&ContextOptions::default())?;
+//! let mut renderer = Renderer::new(&context, scene, &RendererOptions::default())?;
+//! recording.skip_to_volume(0)?;
+//! for _ in 0..recording.frames_per_volume() {
+//!     let Some(frame) = recording.next_frame()? else { break };
+//!     renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
+//! }
+//! renderer.show(0)?;
+//! let picture = renderer.picture()?;
+//! assert_eq!([picture.width, picture.height], [96, 64]);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Stream from an own source
+//!
+//! A source implements [`source::live::Live`]: it states the geometry once, then hands over frames on its own clock.
+//!
+//! ```
+//! use echolume::live::{Feed, Step};
+//! use echolume::probe::{Geometry, Grid};
+//! use echolume::scene::load::Layers;
+//! use echolume::source::live::{Event, Live};
+//! use echolume::source::{Frame, StoredType, recorder::Header};
+//! use echolume::{Context, ContextOptions, Stream, StreamOptions};
+//! use std::time::Duration;
+//!
+//! /// Eight slices of 16 x 16 pixels that become brighter.
+//! struct Ramp {
+//!     sent: usize,
+//! }
+//!
+//! impl Live for Ramp {
+//!     fn next(&mut self, _: Duration) -> Event {
+//!         self.sent += 1;
+//!         match self.sent {
+//!             1 => {
+//!                 let grid = Grid { size: [16, 16, 8], spacing: [1.0; 3], origin: [0.0; 3] };
+//!                 let (forward, backward) = (Geometry::Cartesian(grid), Geometry::Cartesian(grid));
+//!                 Event::Begin(Box::new(Header { forward, backward, stored: StoredType::U8, range: [0.0, 255.0] }))
+//!             }
+//!             n @ 2..10 => {
+//!                 let slice = n - 2;
+//!                 let (number, bytes) = (slice as u32, vec![30 * slice as u8; 16 * 16]);
+//!                 Event::Frame(Frame { volume: 0, number, slice, backward: false, time: None, bytes })
+//!             }
+//!             _ => Event::End(None),
+//!         }
+//!     }
+//!
+//!     fn can_wait(&self) -> bool {
+//!         true
+//!     }
+//! }
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut layers = Layers::default();
+//! layers.set("mode=mip")?;
+//! layers.set("picture.size=[32,32]")?;
+//! let context = Context::new(&ContextOptions::default())?;
+//! let feed = Feed::new(Box::new(Ramp { sent: 0 }), None)?;
+//! let mut stream = Stream::new(&context, feed, layers.finish()?, StreamOptions::default());
+//! let mut pictures = 0;
+//! loop {
+//!     match stream.step(Duration::from_millis(50))? {
+//!         Step::Picture(_) => pictures += 1,
+//!         Step::End(_) => break,
+//!         _ => {}
+//!     }
+//! }
+//! assert_eq!(pictures, 1);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Run one pass alone
+//!
+//! ```
+//! use echolume::gpu::pass_runner::PassRunner;
+//! use echolume::passes::{Arrays, DispatchArgs, Texels, by_name};
+//! use echolume::probe::{Geometry, Grid};
+//! use echolume::scene::{Input, load::Layers};
+//! use echolume::source::StoredType;
+//! use echolume::{Context, ContextOptions, Scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut layers = Layers::default();
+//! layers.set("slices.median=true")?;
+//! let grid = Grid { size: [8, 8, 1], spacing: [1.0; 3], origin: [0.0; 3] };
+//! let input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
+//! let scene = Scene::new(Geometry::Cartesian(grid), input, layers.finish()?)?;
+//!
+//! // A dark slice with one bright pixel, which the median filter removes.
+//! let median = by_name("median_slice").ok_or("no such pass")?;
+//! let args = DispatchArgs::default();
+//! let source = (median.reads)(&scene, &args)[0].name;
+//! let target = (median.writes)(&scene, &args)[0].name;
+//! let mut inputs = Arrays::default();
+//! inputs.insert(source, Texels::from_fn([8, 8, 1], 1, |at, _| if at == [4, 4, 0] { 1.0 } else { 0.25 }));
+//! let context = Context::new(&ContextOptions::default())?;
+//! let outputs = PassRunner::new(&context)?.run(&scene, median, &args, &inputs, 0.0)?;
+//! assert_eq!(outputs.get(target).get([4, 4, 0])[0], 0.25);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Explain a plan
+//!
+//! Needs no device.
+//!
+//! ```
+//! use echolume::plan::Plan;
+//! use echolume::probe::{Geometry, Grid};
+//! use echolume::scene::{Input, load::Layers};
+//! use echolume::Scene;
+//! use echolume::source::StoredType;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut layers = Layers::default();
+//! layers.set("mode=mip")?;
+//! let grid = Grid { size: [64, 64, 32], spacing: [0.5; 3], origin: [0.0; 3] };
+//! let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+//! let scene = Scene::new(Geometry::Cartesian(grid), input, layers.finish()?)?;
+//! let text = Plan::new(&scene).explain(&scene);
+//! assert!(text.contains("+ raycast_projection"), "a projection casts rays");
+//! assert!(text.contains("- light"), "a projection has no surface to light");
+//! # Ok(())
+//! # }
+//! ```
 
-// Elsewhere than in `gpu` nobody can allow it again.
+// No module but `gpu` may allow it again.
 #![deny(unsafe_code)]
 
 #[forbid(unsafe_code)]
@@ -77,3 +223,8 @@ pub mod thesis_tables;
 pub mod ui;
 #[forbid(unsafe_code)]
 pub mod verify;
+
+pub use gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
+pub use live::{Stream, StreamOptions};
+pub use scene::Scene;
+pub use source::Recording;

@@ -1,4 +1,4 @@
-//! From a scene to the passes and slots it needs, and from a change of scene to what has to run again. Pure.
+//! Plans a scene: which passes and slots it needs, and after a change of scene, what has to run again. Needs no GPU.
 
 use crate::passes::slots::Initializer;
 use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
@@ -7,31 +7,32 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 
-/// One dispatch of a plan; a pass that repeats has several.
+/// One dispatch of a plan. A pass that repeats has several steps.
 #[derive(Clone, Copy)]
 pub struct Step {
     pub pass: &'static Pass,
     pub iteration: u32,
 }
 
-/// What a scene needs, in the order in which it runs.
+/// The steps that a scene needs, in order, and the slots that they use.
 pub struct Plan {
     pub steps: Vec<Step>,
     pub slots: Vec<Slot>,
 }
 
-/// What a change of scene makes run again.
+/// What has to run again after a change of scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Rerun {
-    /// Slots or pipelines differ: the plan is built anew, and frames have to arrive again.
+    /// Slots or pipelines differ: the plan is rebuilt, and all frames have to be sent again.
     Everything,
-    /// Frames have to go through stage 1 again.
+    /// All frames have to be sent again, through stage 1.
     Frames,
-    /// These steps of the volume and the picture, by their index in [`Plan::steps`], and these slots made from the scene.
+    /// These steps over the volume and the picture, by their index in [`Plan::steps`], and these slots that the CPU computes.
     Steps { steps: Vec<usize>, slots: Vec<Slot> },
 }
 
 impl Plan {
+    /// The plan of a scene.
     pub fn new(scene: &Scene) -> Plan {
         let mut steps = Vec::new();
         for pass in PASSES.iter().filter(|p| p.is_needed(scene)) {
@@ -43,16 +44,17 @@ impl Plan {
         Plan { steps, slots }
     }
 
+    /// The steps that run at this frequency, with their indices.
     pub fn steps_of(&self, frequency: Frequency) -> impl Iterator<Item = (usize, &Step)> {
         self.steps.iter().enumerate().filter(move |(_, s)| s.pass.frequency == frequency)
     }
 
-    /// What the passes of this plan keep on the device, bytes; volume images that take turns counted once.
+    /// Device memory of all slots, bytes; a multibuffered slot counts once.
     pub fn bytes(&self, scene: &Scene) -> u64 {
         self.slots.iter().map(|s| s.bytes(scene)).sum()
     }
 
-    /// Passes, bytes, and why each pass is there or not.
+    /// A description of the plan: passes with the reason why each is needed or not, the visible region, and slots with their bytes.
     pub fn explain(&self, scene: &Scene) -> String {
         let mut text = String::new();
         let mut stage = None;
@@ -78,14 +80,14 @@ impl Plan {
                     let names = |slots: Vec<crate::passes::Bind>| {
                         slots.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ")
                     };
-                    // A pass that repeats may take several shaders in turn: each once.
-                    let mut told = Vec::new();
+                    // A pass that repeats may use several shaders; each is listed once.
+                    let mut listed = Vec::new();
                     for args in
                         (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
                     {
                         let shader = (pass.shader)(scene, &args);
-                        if !told.contains(&shader) {
-                            told.push(shader);
+                        if !listed.contains(&shader) {
+                            listed.push(shader);
                             let (reads, writes) = ((pass.reads)(scene, &args), (pass.writes)(scene, &args));
                             let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
                         }
@@ -99,11 +101,11 @@ impl Plan {
         if self.slots.contains(&Slot::Volume) {
             let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
         }
-        let (seen, [columns, rows, slices]) = (&scene.seen, scene.volume_size());
-        let span = |axis: usize| format!("{}..{}", seen.low[axis], seen.high[axis]);
+        let (bounds, [columns, rows, slices]) = (&scene.seen, scene.volume_size());
+        let span = |axis: usize| format!("{}..{}", bounds.low[axis], bounds.high[axis]);
         let _ = writeln!(
             text,
-            "seen: columns {} of {columns}, rows {} of {rows}, slices {} of {slices}: {:.1} % of the volume; frames {:?}",
+            "visible: columns {} of {columns}, rows {} of {rows}, slices {} of {slices}: {:.1} % of the volume; frames {:?}",
             span(0),
             span(1),
             span(2),
@@ -115,15 +117,15 @@ impl Plan {
             let shape = format!("{:?} {:?}", slot.shape(scene), slot.format(scene));
             let _ = writeln!(text, "    {:<15} {:>12} bytes  {shape}", slot.name(), slot.bytes(scene));
         }
-        let _ = writeln!(text, "    {:<15} {:>12} bytes", "in all", self.bytes(scene));
+        let _ = writeln!(text, "    {:<15} {:>12} bytes", "total", self.bytes(scene));
         text
     }
 
-    /// What has to run after `old` became `new`, this being the plan of `new`. Nothing here knows what a camera or a light is:
-    /// steps are compared by their numbers, structure and slots, and what reads a changed slot changes too.
+    /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. This does not depend on the meaning of
+    /// settings: steps are compared by their parameters, shaders and slots, and a step that reads a changed slot changes too.
     pub fn rerun(&self, old: &Scene, new: &Scene) -> Rerun {
         let before = Plan::new(old);
-        // What frames leave behind; whatever follows from a volume can be made again from it.
+        // The slots that frames fill. Everything else can be computed again from them.
         let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
             let slots = plan.steps.iter().filter(|s| s.pass.frequency == Frequency::Frame).flat_map(|s| s.slots(scene));
             let slots = slots.chain(chain::copied(scene));
@@ -133,16 +135,16 @@ impl Plan {
         if stored(&before, old) != stored(self, new) || moved || old.input != new.input {
             return Rerun::Everything;
         }
-        // Less to be seen changes nothing that is there; more needs frames.
+        // A smaller visible region needs nothing new; a larger one needs frames.
         if !old.seen.holds(&new.seen) {
             return Rerun::Frames;
         }
         let old = &Scene { seen: new.seen, ..old.clone() };
-        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| made_differently(*s, old, new)).collect();
+        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| content_changes(*s, old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
-            let same = before.steps.iter().any(|s| s.is(step) && s.same_work(step, old, new));
+            let same = before.steps.iter().any(|s| s.is_same(step) && s.same_work(step, old, new));
             let reads = (step.pass.reads)(new, &step.args());
             if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
                 continue;
@@ -174,12 +176,12 @@ impl Plan {
     }
 }
 
-/// Which step (pass and iteration) wrote a slot last.
+/// By slot: the step (pass and iteration) that wrote it last.
 pub type Contents = BTreeMap<Slot, (&'static str, u32)>;
 
 impl Plan {
-    /// Adds to `stale` (one entry a step) the steps whose results a stale step reads but that are no longer in their slot,
-    /// because a later filter of the same chain has used the slot since. `contents` is what the slots hold now.
+    /// Marks in `stale` (one entry per step) further steps that have to run: those whose results a stale step reads, but that a later
+    /// filter of the same chain has overwritten. `contents` is what the slots hold now.
     pub fn complete(&self, scene: &Scene, stale: &mut [bool], contents: &Contents) {
         'again: loop {
             let mut now = contents.clone();
@@ -204,7 +206,7 @@ impl Plan {
     }
 }
 
-/// Runs of slices that have to be made anew where those marked have changed and each depends on `reach` on either side.
+/// Ranges of slices that have to be recomputed if the marked ones have changed and each depends on `reach` neighbours on either side.
 pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
     let mut runs: Vec<Range<u32>> = Vec::new();
     for slice in (0..changed.len() as u32).filter(|s| changed[*s as usize]) {
@@ -218,26 +220,28 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 }
 
 impl Step {
-    /// How many slices on either side a pass over the volume looks at.
+    /// Number of neighbouring slices on either side that a pass over the volume reads.
     pub fn reach(&self, scene: &Scene) -> u32 {
         let reads = (self.pass.reads)(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
+    /// Its pass and iteration.
     pub fn id(&self) -> (&'static str, u32) {
         (self.pass.name, self.iteration)
     }
 
-    /// Slots that it reads.
+    /// The slots that it reads.
     pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
         (self.pass.reads)(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
-    /// Slots that it writes.
+    /// The slots that it writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
         (self.pass.writes)(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
+    /// Its dispatch arguments, for layer, slice and image 0.
     pub fn args(&self) -> DispatchArgs {
         DispatchArgs { iteration: self.iteration, ..DispatchArgs::default() }
     }
@@ -248,7 +252,7 @@ impl Step {
         reads.iter().chain(&writes).map(|b| b.slot).collect()
     }
 
-    fn is(&self, other: &Step) -> bool {
+    fn is_same(&self, other: &Step) -> bool {
         self.id() == other.id()
     }
 
@@ -264,21 +268,21 @@ impl Step {
     }
 }
 
-/// Whether a slot that the CPU makes from the scene has other content now.
-fn made_differently(slot: Slot, old: &Scene, new: &Scene) -> bool {
+/// True if the content of a slot that the CPU computes differs between the scenes.
+fn content_changes(slot: Slot, old: &Scene, new: &Scene) -> bool {
     let Initializer::ByScene(make) = slot.filled() else { return false };
     match slot {
         Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
-        // Follows from the other, which is shorter.
-        Slot::PreIntegrated => return made_differently(Slot::Transfer, old, new),
+        // Computed from the transfer table, which is shorter.
+        Slot::PreIntegrated => return content_changes(Slot::Transfer, old, new),
         Slot::BrickTable => {
             return !old.geometry.equals_except_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
         }
         Slot::SliceTable => return old.geometry != new.geometry,
         _ => {}
     }
-    // The rest follow from the geometry, and their content is too long to compare. The way that the motor goes during a frame stretches
-    // the sweep's span and nothing else.
+    // The rest are computed from the geometry, and their content is too long to compare. The motor's direction during a frame changes
+    // the span of the sweep and nothing else.
     let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
     let stays = match slot {
         Slot::SweepLut => old.geometry.equals_except_direction(&new.geometry),
@@ -292,7 +296,7 @@ mod tests {
     use super::affected;
 
     #[test]
-    fn a_changed_slice_affects_its_neighbours_and_runs_that_touch_are_one() {
+    fn a_changed_slice_affects_its_neighbours_and_adjacent_ranges_merge() {
         let changed = |which: &[usize]| (0..10).map(|i| which.contains(&i)).collect::<Vec<_>>();
         assert_eq!(affected(&changed(&[]), 2), []);
         assert_eq!(affected(&changed(&[5]), 0), vec![5..6; 1]);

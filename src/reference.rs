@@ -1,5 +1,5 @@
-//! The four stages in f64 on the CPU: every step of a plan by its reference, slots as plain arrays. What goldens are made of,
-//! and what error is measured against where it is fast enough.
+//! The CPU reference renderer: all four stages in f64, every step of a plan by the reference of its pass, slots as plain arrays.
+//! Goldens are made with it, and errors are measured against it.
 
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain};
@@ -7,7 +7,8 @@ use crate::plan::{Plan, Step};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 
-/// Renders `frames` (values as the frame's texture yields them, one array a slice, in geometric order). Returns every slot.
+/// Renders a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields. Returns the
+/// contents of all slots of the plan.
 pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     let plan = Plan::new(scene);
     let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
@@ -28,7 +29,7 @@ pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
     slots
 }
 
-/// A slot as the device holds it before any pass: zero, or made from the scene.
+/// Initial contents of a slot on the device: zeros, or values computed from the scene.
 fn empty(slot: Slot, scene: &Scene) -> Texels {
     let format = slot.format(scene);
     let size = match slot.shape(scene) {
@@ -47,7 +48,7 @@ fn empty(slot: Slot, scene: &Scene) -> Texels {
 fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>) {
     let (reads, writes) = ((step.pass.reads)(scene, args), (step.pass.writes)(scene, args));
     let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
-    // A plan lists every slot that its steps name, and no step reads what it writes.
+    // A plan lists every slot of its steps, and no step reads a slot that it writes.
     let missing = || Texels::untouched([0; 3], 1);
     for bind in &reads {
         inputs.insert(bind.name, slots.get(&bind.slot).cloned().unwrap_or_else(missing));

@@ -172,7 +172,7 @@ impl SourceArgs {
         }
         let phantom = FreeRunning::phantom(options, sweep.speed).map_err(input)?;
         let motor = sweep.start()?;
-        let source = FreeRunning::new(phantom, motor.watch().clone());
+        let source = FreeRunning::new(phantom, motor.positions().clone());
         Ok(sweep.track(Box::new(source), motor, false))
     }
 

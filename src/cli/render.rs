@@ -2,7 +2,7 @@
 
 use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
-use crate::error_report::command::{nanoseconds, read};
+use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
@@ -96,8 +96,8 @@ impl Render {
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
     fn open(&self) -> Result<(Box<dyn Source>, Scene), Failure> {
         let (Some(budget), Some(file)) = (&self.budget, &self.report) else { return self.input.open() };
-        let time = nanoseconds("--budget", budget)?;
-        let report = read(file)?;
+        let time = parse_nanoseconds("--budget", budget)?;
+        let report = read_report(file)?;
         let (_, scene) = self.input.open()?;
         let (there, here) = (report.sizes.volume, scene.volume_size());
         if there != here {
@@ -113,7 +113,7 @@ impl Render {
         let measure = Measure::Rmse;
         let choice = choose::most_accurate_under(&report, measure, time, 0.1)
             .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
-        say!("budget {budget}: {}, measured on {}", choice.say(measure), report.device);
+        say!("budget {budget}: {}, measured on {}", choice.describe(measure), report.device);
         self.input.open_with(&choice.set)
     }
 

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant, SystemTime};
 /// Time-out for listing the devices. A driver that takes longer is itself a finding.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Longest text about devices, bytes.
-const LONGEST: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -91,7 +91,7 @@ fn answer(mut child: Child) -> String {
             let mut bytes = Vec::new();
             let mut stream = stream;
             if let Some(stream) = &mut stream {
-                let _ = stream.take(LONGEST).read_to_end(&mut bytes);
+                let _ = stream.take(MAX_BYTES).read_to_end(&mut bytes);
             }
             String::from_utf8_lossy(&bytes).into_owned()
         })

@@ -1,8 +1,8 @@
 //! `echolume view`.
 
-use super::view_config::{ConsoleConfig, WindowConfig};
+use super::view_config::{ConsoleConfig, WindowConfig, rungs};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
-use crate::error_report::command::{nanoseconds, read};
+use crate::error_report::command::parse_nanoseconds;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, GpuError, Wake};
@@ -10,7 +10,6 @@ use crate::kiosk::config::{self, Config};
 use crate::live::cine::CineLimits;
 use crate::terminal::{Failure, failed, input, say};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
-use crate::ui::quality_ladder::{self, Rung};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -235,7 +234,7 @@ impl View {
     fn budget(&self) -> Result<Option<Duration>, Failure> {
         match self.budget.as_str() {
             "none" => Ok(None),
-            time => nanoseconds("--budget", time).map(|ns| Some(Duration::from_nanos(ns as u64))),
+            time => parse_nanoseconds("--budget", time).map(|ns| Some(Duration::from_nanos(ns as u64))),
         }
     }
 
@@ -244,16 +243,6 @@ impl View {
         let view = self.clone();
         let is_resolved = Box::new(move || view.console_config().is_ok());
         StartupFault { title: "The configuration cannot be used".into(), why, is_resolved }
-    }
-}
-
-/// The quality steps that hold the frame budget: those of a report, or the built-in ones.
-pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
-    match report {
-        None => Ok(quality_ladder::built_in()),
-        Some(file) => {
-            quality_ladder::measured(&read(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display())))
-        }
     }
 }
 

@@ -1,16 +1,18 @@
 //! The configuration of a view: device, window and console, from flags or from a configuration file.
 
-use super::view::rungs;
 use crate::args::{SceneArgs, SourceArgs};
+use crate::error_report::command::read_report;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Wake};
 use crate::kiosk::config::{Config, Present};
 use crate::live::cine::CineLimits;
 use crate::source::live::Live;
-use crate::terminal::{Failure, input};
+use crate::terminal::{Failure, failed, input};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
+use crate::ui::quality_ladder::{self, Rung};
 use crate::ui::source_supervisor::OpenSource;
 use crate::ui::window::{self, MakeConsole, WindowOptions};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
@@ -153,4 +155,13 @@ impl ConsoleConfig {
 /// The current time, formatted for file names.
 fn stamp() -> String {
     crate::ui::export::timestamp(SystemTime::now())
+}
+
+/// The quality steps that hold the frame budget: those of a report, or the built-in ones.
+pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
+    match report {
+        None => Ok(quality_ladder::built_in()),
+        Some(file) => quality_ladder::measured(&read_report(file)?)
+            .map_err(|e| failed(format!("--report {}: {e}", file.display()))),
+    }
 }

@@ -57,9 +57,9 @@ impl ErrorReport {
             "degrees" => Measure::Degrees,
             other => return Err(input(format!("--measure {other}: must be rmse, mm or degrees"))),
         };
-        let time = self.under_time.as_deref().map(|time| nanoseconds("--under-time", time)).transpose()?;
+        let time = self.under_time.as_deref().map(|time| parse_nanoseconds("--under-time", time)).transpose()?;
         let report = match &self.from {
-            Some(file) => read(file)?,
+            Some(file) => read_report(file)?,
             None => self.measured()?,
         };
         say!("{}", export::summary_table(&report, measure).trim_end());
@@ -67,10 +67,10 @@ impl ErrorReport {
             write(&report, measure, folder)?;
         }
         if let Some(error) = self.under_error {
-            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.say(measure));
+            say!("{}", choose::cheapest_under(&report, measure, error, 0.1).map_err(failed)?.describe(measure));
         }
         if let Some(time) = time {
-            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.say(measure));
+            say!("{}", choose::most_accurate_under(&report, measure, time, 0.1).map_err(failed)?.describe(measure));
         }
         Ok(())
     }
@@ -150,14 +150,14 @@ fn write(report: &error_report::Report, measure: Measure, folder: &Path) -> Resu
 }
 
 /// Reads a stored report.
-pub(crate) fn read(file: &Path) -> Result<error_report::Report, Failure> {
+pub(crate) fn read_report(file: &Path) -> Result<error_report::Report, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
     let text = read_text(file, MAX_REPORT, "report").map_err(|e| fault(&e))?;
     error_report::Report::from_json(&text).map_err(|e| fault(&e))
 }
 
 /// Parses a time such as 16ms, 0.25s or 250us, in ns.
-pub(crate) fn nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
+pub(crate) fn parse_nanoseconds(flag: &str, text: &str) -> Result<f64, Failure> {
     let units = [("ms", 1e6), ("us", 1e3), ("ns", 1.0), ("s", 1e9)];
     let parsed =
         units.iter().find_map(|(unit, ns)| text.strip_suffix(unit)?.trim().parse::<f64>().ok().map(|v| v * ns));

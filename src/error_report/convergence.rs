@@ -6,19 +6,20 @@ use crate::passes::raycast::composite::{March, Medium, Place, Rule};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// What is fitted, and what is not: an order shows only between the steps that are too coarse to be in the limit and the
-/// errors that are too small to be the step's.
+/// The range of a fit. An order shows only between steps that are too coarse for the asymptotic range and errors that are too small
+/// to be caused by the step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// Least and largest step, in the dial's unit.
+    /// Minimum and maximum step, in the dial's unit.
     pub step: [f64; 2],
-    /// What the error goes to whatever the step (rounding, the texture's format). Points below `ABOVE_FLOOR` times it are
-    /// left out: there it bends the line by more than 5 %.
+    /// The limit of the error for small steps (rounding, the texture format). Points below `ABOVE_FLOOR` times it are left out:
+    /// there it bends the line by more than 5 %.
     pub floor: f64,
 }
 
-/// Errors that add as squares: at three times the floor the step's own part is sqrt(1 - 1/9) = 94 % of the whole.
+/// Factor over the floor from which points are fitted. Squared errors add: at three times the floor the step's share is
+/// sqrt(1 - 1/9) = 94 % of the total.
 pub const ABOVE_FLOOR: f64 = 3.0;
 
 /// error = coefficient * step^order, by least squares on the logarithms.
@@ -26,30 +27,31 @@ pub const ABOVE_FLOOR: f64 = 3.0;
 #[serde(deny_unknown_fields)]
 pub struct Fit {
     pub order: f64,
-    /// Standard error of the order, from how far the points lie off the line.
+    /// Standard error of the order, from the residuals of the fit.
     pub standard_error: f64,
     pub coefficient: f64,
-    /// What was fitted.
+    /// The range of the fit.
     pub range: Range,
-    /// Points within it.
+    /// Number of points in it.
     pub points: usize,
 }
 
 impl Fit {
+    /// The fitted error at a step.
     pub fn at(&self, step: f64) -> f64 {
         self.coefficient * step.powf(self.order)
     }
 }
 
-/// Fits pairs of step and error within a range.
+/// Fits an order to pairs of step and error within a range.
 ///
 /// # Errors
-/// One line when fewer than three different steps are left in the range: a line through two points has no standard error.
+/// One line: fewer than three different steps are in the range. A line through two points has no standard error.
 pub fn fit(pairs: &[[f64; 2]], range: Range) -> Result<Fit, String> {
     let [low, high] = range.step;
     let fitted = |[step, error]: &&[f64; 2]| {
         let counts = error.is_finite() && *error > 0.0 && *error >= ABOVE_FLOOR * range.floor;
-        // A share of 1e-9 forgives steps that were computed.
+        // A relative tolerance of 1e-9 accepts steps with rounding errors.
         counts && *step > 0.0 && *step >= low * (1.0 - 1e-9) && *step <= high * (1.0 + 1e-9)
     };
     let logs: Vec<[f64; 2]> = pairs.iter().filter(fitted).map(|p| p.map(f64::ln)).collect();
@@ -73,19 +75,20 @@ pub fn fit(pairs: &[[f64; 2]], range: Range) -> Result<Fit, String> {
     Ok(Fit { order, standard_error, coefficient: level.exp(), range, points: logs.len() })
 }
 
-/// The ball that rays go through, voxels. All lengths here are in voxels; absorption is given for one.
+/// Radius of the ball that rays pass through, voxels. All lengths here are in voxels; absorption is per voxel.
 pub const RADIUS: f64 = 12.0;
 
-/// What fills the ball.
+/// The field that fills the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// Waves of 10 to 20 voxels on a slope, 0.25..0.85: rays enter and leave where something is.
+    /// Waves of 10 to 20 voxels on a slope, 0.25..0.85: not zero where rays enter and leave.
     Open,
-    /// The same, times what falls to nothing at the ball's surface: an end that is forgotten is not missed.
+    /// The same, multiplied by a factor that vanishes at the surface of the ball: a missing last step has no effect.
     Vanishing,
 }
 
 impl Field {
+    /// The value at a place, voxels.
     pub fn at(self, p: DVec3) -> f64 {
         let waves = (0.43 * p.x + 0.21 * p.y).sin() + (0.34 * p.y - 0.27 * p.z + 1.0).sin() + (0.39 * p.z + 0.5).cos();
         let value = 0.55 + 0.09 * waves + 0.03 * (p.x / RADIUS);
@@ -96,7 +99,7 @@ impl Field {
     }
 }
 
-/// Polynomials of a sample's value, so that a mean between two values is exact by Gauss and Legendre's rule.
+/// Absorption and colour are polynomials of the value, so that Gauss-Legendre quadrature of a mean between two values is exact.
 fn absorption(v: f64) -> f64 {
     0.5 * v * v * (3.0 - 2.0 * v)
 }
@@ -105,7 +108,7 @@ fn colour(v: f64) -> [f64; 3] {
     [0.1 + 0.9 * v * v, 0.2 + 0.6 * v, 0.9 - 0.8 * v + 0.3 * v * v]
 }
 
-/// Nodes in 0..1 and weights, exact for polynomials up to degree 7; absorption times colour has degree 5.
+/// Gauss-Legendre nodes in 0..1 and weights, exact for polynomials up to degree 7; absorption times colour has degree 5.
 const GAUSS: [[f64; 2]; 4] = [
     [0.069_431_844_202_973_71, 0.173_927_422_568_726_93],
     [0.330_009_478_207_571_87, 0.326_072_577_431_273_07],
@@ -113,20 +116,21 @@ const GAUSS: [[f64; 2]; 4] = [
     [0.930_568_155_797_026_3, 0.173_927_422_568_726_93],
 ];
 
-/// What is made differently from how it should be.
+/// A deliberate error in the compositing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flaw {
     /// The last, partial step is left out.
     pub drops_last_step: bool,
-    /// Weights of the trilinear filter have this many bits: places are rounded to 2^-bits voxels along each axis.
+    /// Weights of the trilinear filter have this many bits: positions are rounded to 2^-bits voxels along each axis.
     pub weight_bits: Option<i32>,
-    /// Absorption is this many times what it should be.
+    /// Factor on the absorption; 1 is correct.
     pub absorption: f64,
 }
 
+/// Correct compositing.
 pub const NONE: Flaw = Flaw { drops_last_step: false, weight_bits: None, absorption: 1.0 };
 
-/// A ray through the ball, from where it enters.
+/// A ray through the ball, from its entry point.
 #[derive(Clone, Copy, Debug)]
 struct Ray {
     enter: DVec3,
@@ -134,8 +138,8 @@ struct Ray {
     path: f64,
 }
 
-/// Rays of every direction and of many lengths, 4 voxels and longer, by the additive recurrence of the plastic number's
-/// four-dimensional kin (Roberts 2018): even, and the same at every run.
+/// Rays of all directions and many lengths, at least 4 voxels, by the additive recurrence with the four-dimensional generalization of
+/// the plastic number (Roberts 2018): evenly distributed, and the same in every run.
 fn rays(count: usize) -> Vec<Ray> {
     // The root of x^5 = x + 1.
     let g: f64 = 1.167_303_978_261_418_7;
@@ -145,9 +149,9 @@ fn rays(count: usize) -> Vec<Ray> {
         i += 1.0;
         let [a, b, c, d] = [1, 2, 3, 4].map(|k| (0.5 + i / g.powi(k)).fract());
         let on_sphere = |u: f64, v: f64| {
-            let (z, turn) = (1.0 - 2.0 * u, std::f64::consts::TAU * v);
+            let (z, angle) = (1.0 - 2.0 * u, std::f64::consts::TAU * v);
             let r = (1.0 - z * z).max(0.0).sqrt();
-            DVec3::new(r * turn.cos(), r * turn.sin(), z)
+            DVec3::new(r * angle.cos(), r * angle.sin(), z)
         };
         let (from, to) = (on_sphere(a, b) * RADIUS, on_sphere(c, d) * RADIUS);
         let path = from.distance(to);
@@ -158,24 +162,25 @@ fn rays(count: usize) -> Vec<Ray> {
     found
 }
 
-struct Through {
+/// The field along a ray.
+struct FieldAlongRay {
     field: Field,
     ray: Ray,
     flaw: Flaw,
 }
 
-impl Through {
+impl FieldAlongRay {
     fn value(&self, offset: f64) -> f64 {
         let place = self.ray.enter + self.ray.along * offset;
         self.field.at(match self.flaw.weight_bits {
-            // A weight that is rounded is the sample of a place that is rounded.
+            // A rounded weight gives the sample at a rounded position.
             Some(bits) => (place * f64::powi(2.0, bits)).round() * f64::powi(2.0, -bits),
             None => place,
         })
     }
 }
 
-impl Medium for Through {
+impl Medium for FieldAlongRay {
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let v = self.value(place.offset);
         let [r, g, b] = colour(v);
@@ -187,25 +192,25 @@ impl Medium for Through {
         let mut sums = [0.0; 4];
         for [share, weight] in GAUSS {
             let v = front + (back - front) * share;
-            let (absorbed, seen) = (weight * absorption(v), colour(v));
-            (0..3).for_each(|c| sums[c] += absorbed * seen[c]);
+            let (absorbed, rgb) = (weight * absorption(v), colour(v));
+            (0..3).for_each(|c| sums[c] += absorbed * rgb[c]);
             sums[3] += absorbed;
         }
-        // The value of what absorbs nothing is 0, and so is its light.
+        // Without absorption there is no light.
         let mean = |c: usize| if sums[3] > 0.0 { sums[c] / sums[3] } else { 0.0 };
         Some([mean(0), mean(1), mean(2), sums[3] * self.flaw.absorption])
     }
 }
 
-/// Light of a ray by the equation itself, dC/ds = exp(-K) kappa c, dK/ds = kappa, by the classical method of Runge and Kutta
-/// (order 4) in steps of at most `step`. Red, green, blue.
+/// Light of a ray (red, green, blue) by integrating dC/ds = exp(-K) kappa c, dK/ds = kappa with the classical Runge-Kutta method of
+/// order 4, in steps of at most `step` voxels.
 fn integrated(field: Field, ray: Ray, step: f64) -> [f64; 3] {
-    let through = Through { field, ray, flaw: NONE };
+    let through = FieldAlongRay { field, ray, flaw: NONE };
     let rate = |offset: f64, depth: f64| {
         let v = through.value(offset);
         let (kappa, left) = (absorption(v), (-depth).exp());
-        let seen = colour(v);
-        [left * kappa * seen[0], left * kappa * seen[1], left * kappa * seen[2], kappa]
+        let rgb = colour(v);
+        [left * kappa * rgb[0], left * kappa * rgb[1], left * kappa * rgb[2], kappa]
     };
     let steps = (ray.path / step).ceil();
     let h = ray.path / steps;
@@ -226,26 +231,26 @@ fn rms(differences: impl Iterator<Item = f64>) -> f64 {
     f64::sqrt(sum / n)
 }
 
-/// Steps from `low` to `high` voxels, evenly in their logarithm.
+/// `count` steps from `low` to `high` voxels, logarithmically spaced.
 pub fn steps(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..count).map(|i| low * (high / low).powf(i as f64 / (count - 1) as f64)).collect()
 }
 
-/// RMSE of the light of `count` rays at each step: pairs of step and error, and the error of the truth that they are taken
-/// against (its difference from the same at half the step).
+/// RMSE of the light of `count` rays at each step: pairs of step and error, and the error of the exact solution used (its difference
+/// from the solution at half the step).
 pub fn errors(rule: Rule, field: Field, flaw: Flaw, steps: &[f64], count: usize) -> (Vec<[f64; 2]>, f64) {
     const FINE: f64 = 1.0 / 32.0;
     let rays = rays(count);
     let truth: Vec<[f64; 3]> = rays.iter().map(|ray| integrated(field, *ray, FINE / 2.0)).collect();
-    let apart = |a: &[f64; 3], b: &[f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let coarser = rays.iter().zip(&truth).flat_map(|(ray, truth)| apart(&integrated(field, *ray, FINE), truth));
+    let difference = |a: &[f64; 3], b: &[f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let coarser = rays.iter().zip(&truth).flat_map(|(ray, truth)| difference(&integrated(field, *ray, FINE), truth));
     let own = rms(coarser);
     let pairs = steps.iter().map(|h| {
         let light = rays.iter().zip(&truth).flat_map(|(ray, truth)| {
             let path = if flaw.drops_last_step { (ray.path / h).floor() * h } else { ray.path };
             let march = March { rule, path, reference_length: 1.0, early_end: 0.0, hit: f64::INFINITY };
-            let ([r, g, b, _], _) = march.through(&Through { field, ray: *ray, flaw }, |n| n * h);
-            apart(&[r, g, b], truth)
+            let ([r, g, b, _], _) = march.through(&FieldAlongRay { field, ray: *ray, flaw }, |n| n * h);
+            difference(&[r, g, b], truth)
         });
         [*h, rms(light)]
     });

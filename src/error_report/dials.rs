@@ -1,31 +1,33 @@
-//! The dials of a scene: settings that trade error for time, each with the places it is turned to and the place that every
-//! other is held against.
+//! The dials of a scene: settings that trade error for time, each with the values to measure and the settings of its reference.
 
 use crate::scene::{Mode, Sampling, Scene, Scheme, VolumeFormat};
 
-/// One place of a dial.
+/// One setting of a dial.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// For plots.
+    /// Short label for plots.
     pub label: String,
-    /// `key=value` of `--set`; empty for the scene as it is.
+    /// `key=value` as `--set` takes them; empty for the scene itself.
     pub set: Vec<String>,
-    /// On the dial's axis, in its unit.
+    /// Value on the dial's axis, in its unit.
     pub value: f64,
 }
 
+/// A setting that trades error for time.
 #[derive(Clone, Debug)]
 pub struct Dial {
     pub name: &'static str,
     pub unit: &'static str,
-    /// The first is the scene as it is.
+    /// The settings to measure. The first is the scene itself.
     pub places: Vec<Place>,
-    /// What the places are held against: the scene with these settings.
+    /// Assignments that give the reference.
     pub best: Vec<String>,
-    /// A step from there: how much that would still change is the reference's own error where it is a picture of the device's.
+    /// Assignments of the next coarser setting. Its difference from the reference estimates the error of the reference if the device
+    /// renders it.
     pub nearly: Vec<String>,
 }
 
+/// Names of all dials.
 pub const NAMES: &[&str] = &[
     "step",
     "compositing",
@@ -43,17 +45,20 @@ pub const NAMES: &[&str] = &[
     "brick",
 ];
 
-/// The dial of that name, or why this scene has none.
+/// The dial of that name.
+///
+/// # Errors
+/// Why this scene has no such dial, as the end of a sentence that begins "this scene".
 pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let s = &scene.settings;
     let step = scene.step;
     let marches = !scene.is_flat() && s.mode != Mode::Cube;
     let composites = scene.composites();
     let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
-    let made = |name, unit, as_it_is: Place, others: Vec<Place>, best: &[String], nearly: &[String]| Dial {
+    let made = |name, unit, default: Place, others: Vec<Place>, best: &[String], nearly: &[String]| Dial {
         name,
         unit,
-        places: std::iter::once(as_it_is).chain(others).collect(),
+        places: std::iter::once(default).chain(others).collect(),
         best: best.to_vec(),
         nearly: nearly.to_vec(),
     };
@@ -62,7 +67,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let dial = match name {
         "step" => {
             need(marches, "casts no ray")?;
-            // Down to an eighth, up to four times; the reference is four times finer than the finest.
+            // From an eighth to four times the step; the reference is four times finer than the finest.
             let places = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
             let others =
                 places.map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step));
@@ -98,14 +103,14 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = all.iter().enumerate().filter(|(_, w)| **w != s.ray.sampling);
             let set = |w: &Sampling| [format!("ray.sampling={}", serde_word(w))];
             let others = others.map(|(n, w)| at(serde_word(w), &set(w), n as f64));
-            // `auto` is one of them.
+            // `auto` is resolved to one of them.
             let value = all.iter().position(|w| *w == scene.sampling).unwrap_or(0) as f64;
             let exact = set(&Sampling::Exact);
             made("sampling", "", is(serde_word(&s.ray.sampling), value), others.collect(), &exact, &exact)
         }
         "filter3d" => {
             need(marches, "casts no ray")?;
-            // Held against the separable filter of the larger window: ahead of time and on the way are to agree.
+            // The reference is the separable filter in stage 1: it and the sliding filter along the ray should agree.
             let ahead = |n: u32| ["slices.smooth=none".to_string(), format!("slices.smooth={{kernel={n}}}")];
             let sliding = |n: u32| ["slices.smooth=none".to_string(), format!("ray.sliding={n}")];
             let others = vec![
@@ -169,7 +174,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             made("sigma", "pixels", is("as it is".into(), 0.0), others, &best, &nearly)
         }
         "perona-malik" => {
-            // The same time of diffusion, T = 2, in ever fewer and longer steps.
+            // The same diffusion time, T = 2, in different numbers of steps.
             let diffused = |scheme: Scheme, n: u32| {
                 let (word, step) = (serde_word(&scheme), 2.0 / f64::from(n));
                 vec![format!("slices.perona_malik={{scheme='{word}',edge=0.1,step={step},repeat={n}}}")]
@@ -246,14 +251,14 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let word = |n: u32| if n == 0 { "none".to_string() } else { format!("{n} texels") };
             let others = [0, 4, 8, 16, 32].into_iter().filter(|n| *n != now);
             let others = others.map(|n| at(word(n), &[format!("ray.brick={n}")], f64::from(n)));
-            // Held against every sample.
+            // The reference takes every sample.
             let all = ["ray.brick=0".to_string()];
             made("brick", "texels", is(word(now), f64::from(now)), others.collect(), &all, &all)
         }
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;
             need(s.ray.rays == 1, "casts several rays for each pixel")?;
-            // `ray.rays` is named, so that the two are never turned together.
+            // Assigning `ray.rays` too keeps the two dials from being combined.
             let half = |on: bool| [format!("ray.half={on}"), "ray.rays=1".to_string()];
             let (word, value) = if s.ray.half { ("half", 0.25) } else { ("whole", 1.0) };
             let other =
@@ -266,7 +271,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     Ok(dial)
 }
 
-/// A setting's word as a scene file has it.
+/// The name of a setting value as in a scene file.
 fn serde_word(value: &impl serde::Serialize) -> String {
     toml::Value::try_from(value).ok().and_then(|v| v.as_str().map(str::to_string)).unwrap_or_default()
 }

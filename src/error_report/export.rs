@@ -4,8 +4,8 @@ use super::metrics::SurfaceError;
 use super::{Measure, Reference, Report, Time};
 use std::fmt::Write as _;
 
-/// One line a point after a line of names (RFC 4180). What does not apply is empty; times are in ms. `on_front`: no other
-/// point of the report has both a smaller RMSE and a shorter time.
+/// The report as CSV (RFC 4180): a header, then one line per point. Fields that do not apply are empty; times are in ms. `on_front`:
+/// no other point of the report has both a smaller RMSE and a shorter time.
 pub fn csv(report: &Report) -> String {
     let front = report.pareto_front(Measure::Rmse);
     let mut text = String::from(
@@ -47,7 +47,7 @@ fn quoted(field: &str) -> String {
     }
 }
 
-/// Places by dial: error, time, and both in shares of the scene's as it is.
+/// The points of each dial as a table: errors, time, and the ratio of the time to that of the default.
 pub fn summary_table(report: &Report, measure: Measure) -> String {
     let mut text = String::new();
     let [w, h, k] = report.sizes.volume;

@@ -1,5 +1,5 @@
-//! Error against run time (SPEC of the thesis' trade-offs): every dial of a scene turned, each place rendered, timed, and reference
-//! against the f64 reference, or where that is too slow against a converged picture whose own error is shown.
+//! Measures error against run time: renders and times every setting of every dial, and compares it with the f64 reference or, if that
+//! is too slow, with a converged picture whose own error is estimated.
 
 use super::dials::{Dial, Place};
 use crate::error_report::convergence::{self, Range};
@@ -16,6 +16,7 @@ use crate::scene::{Scene, SceneError};
 use crate::source::Frame;
 use std::sync::Arc;
 
+/// Why a measurement failed.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     #[error("{0}")]
@@ -24,30 +25,32 @@ pub enum MeasureError {
     Place { dial: &'static str, set: String, fault: String },
 }
 
-/// The f64 reference takes a minute for so many samples.
-const AFFORDABLE: f64 = 6e7;
+/// Samples that the f64 reference takes in about a minute.
+const MAX_F64_SAMPLES: f64 = 6e7;
 
+/// Which reference to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// Against f64 where it is affordable.
+    /// F64 if it takes about a minute or less, otherwise converged.
     Auto,
     F64,
     Converged,
 }
 
+/// What to measure, and on which device.
 pub struct ErrorMeasurement<'a> {
     pub context: &'a Arc<Context>,
-    /// Settings before any dial is turned.
+    /// Settings before any dial is changed.
     pub layers: &'a Layers,
     pub scene: &'a Scene,
     pub frames: &'a [Frame],
-    /// What the frames came from, in words.
+    /// Description of the input.
     pub input: &'a str,
     pub repeats: u32,
     pub reference: ReferenceChoice,
 }
 
-/// What one scene looks like: the picture before stage 4's tone, and the distance map after its filters.
+/// A rendered scene: the picture before the tone mapping of stage 4, and the filtered distance map.
 struct Rendering {
     scene: Scene,
     picture: Texels,
@@ -56,7 +59,10 @@ struct Rendering {
 }
 
 impl ErrorMeasurement<'_> {
-    /// Turns the dials one after the other. `progress` hears of each place before it is rendered.
+    /// Measures the dials one after the other. `progress` is called with dial and label before each setting is rendered.
+    ///
+    /// # Errors
+    /// A setting is refused, or the device fails.
     pub fn report(&self, dials: &[Dial], mut progress: impl FnMut(&str, &str)) -> Result<Report, MeasureError> {
         let mut measured = Vec::new();
         for dial in dials {
@@ -85,7 +91,7 @@ impl ErrorMeasurement<'_> {
         let exact = match self.reference {
             ReferenceChoice::F64 => true,
             ReferenceChoice::Converged => false,
-            ReferenceChoice::Auto => cost(&best) <= AFFORDABLE,
+            ReferenceChoice::Auto => cost(&best) <= MAX_F64_SAMPLES,
         };
         let (expected, reference) = match exact {
             true => (self.in_f64(&best), Reference::F64),
@@ -104,7 +110,7 @@ impl ErrorMeasurement<'_> {
             points.push(point(place, errors, &rendering, n == 0));
         }
         let steps = dial.name == "step";
-        // What the device is off by where nothing but its arithmetic differs.
+        // The error of the device if only its arithmetic differs.
         let floor = match exact && steps {
             true => Some(compare(dial, &[], &self.rendered(&best, 0)?, &expected)?.rmse),
             false => None,
@@ -122,7 +128,7 @@ impl ErrorMeasurement<'_> {
         let fault = |fault: String| MeasureError::Place { dial: dial.name, set: set.join(" "), fault };
         let layered = || -> Result<_, LoadError> {
             let mut layers = self.layers.clone();
-            // What is already off cannot be switched off.
+            // `none` is refused for a setting that is already off.
             set.iter()
                 .filter(|s| !s.ends_with("=none") || layers.has(s))
                 .cloned()
@@ -140,7 +146,7 @@ impl ErrorMeasurement<'_> {
         let scene = &in_floats(scene);
         let mut renderer = Renderer::new(self.context, scene.clone(), &RendererOptions::default())?;
         let mut times = Vec::new();
-        // The first, which compiles, is not counted.
+        // The first run compiles shaders and is not counted.
         for n in 0..=repeats {
             for frame in self.frames {
                 renderer.frame(frame.slice as u32, &frame.bytes, 0)?;
@@ -175,14 +181,14 @@ impl ErrorMeasurement<'_> {
     }
 }
 
-/// The scene with its picture before it becomes 8 bits, whose steps are as large as many an error.
+/// The scene with a picture of floats: steps of 8 bits are as large as many errors.
 fn in_floats(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.settings.post.floats = true;
     scene
 }
 
-/// Samples that the f64 reference of a scene takes, filters of slices included.
+/// Number of samples that the f64 reference of a scene takes, filters of slices included.
 fn cost(scene: &Scene) -> f64 {
     let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
     let taps = f64::from(scene.settings.ray.sliding.max(1)).powi(3);
@@ -191,7 +197,7 @@ fn cost(scene: &Scene) -> f64 {
     let slices = &scene.settings.slices;
     let window = slices.sigma.map_or(0, |s| s.window.pow(2)) + slices.enhanced_sigma.map_or(0, |s| s.largest.pow(2));
     let diffused = slices.perona_malik.map_or(0, |p| 8 * p.repeat);
-    // A tap of a filter is a tenth of a sample through the inverse map.
+    // A filter tap costs a tenth of a sample through the inverse map.
     rays * steps * taps + 0.1 * pixels * f64::from(16 + window + diffused)
 }
 
@@ -217,7 +223,7 @@ fn normals(scene: &Scene, distances: &Texels) -> Texels {
     texels
 }
 
-/// A smaller picture as it would be shown: stretched, linearly between pixels.
+/// A picture scaled to another size by bilinear interpolation.
 fn enlarged(picture: &Texels, size: [usize; 3]) -> Texels {
     if picture.size == size {
         return picture.clone();

@@ -1,4 +1,4 @@
-//! How far what was measured lies from its reference: pictures, distance maps and normals.
+//! Error metrics of pictures (RMSE, PSNR, SSIM), distance maps and normals against a reference.
 
 use crate::passes::{Texels, is_hit};
 use serde::{Deserialize, Serialize};
@@ -9,32 +9,32 @@ const DEVIATION: f64 = 1.5;
 /// SSIM's (K L)^2 for K1 = 0.01, K2 = 0.03 and values in 0..1 (L = 1).
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
-/// Luminance of red, green and blue (Rec. ITU-R BT.709), taken of the values as they are.
+/// Luminance of red, green and blue (Rec. ITU-R BT.709), applied to the stored values.
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Differences of two pictures over red, green and blue; alpha is not seen on a screen and left out.
+/// Differences of two pictures over red, green and blue. Alpha is not visible on a screen and is ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureError {
     pub rmse: f64,
     /// Largest difference of any channel of any pixel.
     pub max: f64,
-    /// 20 log10(1 / rmse), dB; none (infinite) where the pictures are equal.
+    /// 20 log10(1 / rmse), dB; None (infinite) if the pictures are equal.
     pub psnr: Option<f64>,
-    /// Mean structural similarity of the luminance over every window that lies within the picture, at most 1; none when
-    /// the picture is smaller than the window of 11 x 11 pixels.
+    /// Mean structural similarity of the luminance over all windows within the picture, at most 1; None if the picture
+    /// is smaller than the window of 11 x 11 pixels.
     pub ssim: Option<f64>,
 }
 
-/// Sizes of errors: of their magnitudes, so that neither sign cancels the other.
+/// Statistics of the magnitudes of errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spread {
     pub rms: f64,
     pub median: f64,
-    /// Between neighbours in rank, linearly.
+    /// 95th percentile, interpolated linearly.
     pub p95: f64,
     pub max: f64,
-    /// Pixels compared.
+    /// Number of pixels compared.
     pub count: usize,
 }
 
@@ -42,7 +42,7 @@ pub struct Spread {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceError {
-    /// Over the pixels that both hit, mm or degrees; none when there are none.
+    /// Over the pixels that are hit in both, mm or degrees; None if there are none.
     pub error: Option<Spread>,
     /// Share of all pixels that are hit, but missed in the reference.
     pub false_hits: f64,
@@ -60,8 +60,8 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     }
     check("picture", measured, reference)?;
     let channels = measured.channels;
-    let seen = |t: &Texels| t.values.chunks_exact(channels).flat_map(|p| [p[0], p[1], p[2]]).collect::<Vec<_>>();
-    let (a, b) = (seen(measured), seen(reference));
+    let rgb = |t: &Texels| t.values.chunks_exact(channels).flat_map(|p| [p[0], p[1], p[2]]).collect::<Vec<_>>();
+    let (a, b) = (rgb(measured), rgb(reference));
     let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
     let rmse = (squares / a.len() as f64).sqrt();
     let max = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -71,7 +71,7 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     Ok(PictureError { rmse, max, psnr, ssim: ssim(&grey(&a), &grey(&b), measured.size) })
 }
 
-/// Compares distance maps in mm; a miss is as in a distance map.
+/// Compares distance maps in mm.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -81,8 +81,8 @@ pub fn distances(measured: &Texels, reference: &Texels) -> Result<SurfaceError, 
     Ok(surface(&first(measured), &first(reference), |a, b| (a - b).abs()))
 }
 
-/// Compares maps of normals, x y z first, by the angle between them in degrees. A normal need not have unit length; one of length
-/// 0 is none.
+/// Compares maps of normals (first three channels x, y, z) by the angle between them, degrees. Normals need not have unit length; a
+/// zero vector is a miss.
 ///
 /// # Errors
 /// As [`pictures`].
@@ -95,7 +95,7 @@ pub fn normals(measured: &Texels, reference: &Texels) -> Result<SurfaceError, St
         let vectors = t.values.chunks_exact(t.channels).map(|v| glam::DVec3::new(v[0], v[1], v[2]));
         vectors.map(|v| v.try_normalize()).collect::<Vec<_>>()
     };
-    // By the tangent: the cosine of a small angle has lost its digits.
+    // atan2 rather than acos, which is inaccurate for small angles.
     Ok(surface(&read(measured), &read(reference), |a, b| a.cross(*b).length().atan2(a.dot(*b)).to_degrees()))
 }
 
@@ -117,12 +117,12 @@ fn check(what: &str, measured: &Texels, reference: &Texels) -> Result<(), String
     Ok(())
 }
 
-fn surface<T>(measured: &[Option<T>], reference: &[Option<T>], apart: impl Fn(&T, &T) -> f64) -> SurfaceError {
+fn surface<T>(measured: &[Option<T>], reference: &[Option<T>], difference: impl Fn(&T, &T) -> f64) -> SurfaceError {
     let mut errors = Vec::new();
     let (mut false_hits, mut missed_hits) = (0, 0);
     for pair in measured.iter().zip(reference) {
         match pair {
-            (Some(a), Some(b)) => errors.push(apart(a, b)),
+            (Some(a), Some(b)) => errors.push(difference(a, b)),
             (Some(_), None) => false_hits += 1,
             (None, Some(_)) => missed_hits += 1,
             (None, None) => {}
@@ -140,14 +140,14 @@ fn spread(mut errors: Vec<f64>) -> Option<Spread> {
     Some(Spread { rms, median: quantile(&errors, 0.5), p95: quantile(&errors, 0.95), max, count })
 }
 
-/// The value below which a share of the sorted values lies, between neighbours in rank by a straight line.
+/// The quantile of sorted values, interpolated linearly.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let at = share * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     low + (high - low) * at.fract()
 }
 
-/// Wang et al. 2004, equation 13, weighted by the Gaussian window, averaged over its places within the picture.
+/// Mean SSIM (Wang et al. 2004, equation 13), weighted by the Gaussian window, averaged over all windows within the picture.
 fn ssim(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     if width < WINDOW || height < WINDOW {
         return None;
@@ -164,7 +164,7 @@ fn ssim(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     Some(each.sum::<f64>() / ma.len() as f64)
 }
 
-/// Means under the Gaussian window at every place where it lies within the picture: rows, then columns.
+/// Means under the Gaussian window at every position within the picture: rows, then columns.
 fn windowed(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     let away = |i: usize| i as f64 - (WINDOW / 2) as f64;
     let bell: [f64; WINDOW] = std::array::from_fn(|i| (-0.5 * (away(i) / DEVIATION).powi(2)).exp());

@@ -1,5 +1,6 @@
-//! Error against run time: what a measurement of the dials is, as a file, as a table, as a picture, and as the settings to use.
-//! Every approximation is a dial; a dial's points are its settings, each with its errors and its time on the device.
+//! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
+//! errors and its time on the device. [`measure`] fills a [`Report`], which is stored as JSON; [`export`] and [`plot`] write it as
+//! text and as a diagram, [`choose`] picks settings from it.
 
 pub mod choose;
 pub(crate) mod command;
@@ -14,7 +15,7 @@ use convergence::Fit;
 use metrics::{PictureError, SurfaceError};
 use serde::{Deserialize, Serialize};
 
-/// What the first line of a stored report must say; another version is refused, not guessed.
+/// Format version of a stored report; other versions are refused.
 pub const FORMAT: &str = "echolume error report 1";
 
 /// A measurement of one scene on one device.
@@ -25,52 +26,53 @@ pub struct Report {
     pub format: String,
     pub device: String,
     pub driver: String,
-    /// When it was measured, ISO 8601.
+    /// Time of the measurement, ISO 8601.
     pub date: String,
-    /// In words on its first line, then all settings, resolved, as TOML.
+    /// Description of the input on the first line, then all settings, resolved, as TOML.
     pub scene: String,
     pub sizes: Sizes,
-    /// Runs of which a time is the median.
+    /// Number of runs of which each time is the median.
     pub repeats: u32,
     pub dials: Vec<Dial>,
 }
 
+/// Sizes of what was rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
     /// Texels of the volume.
     pub volume: [u32; 3],
-    /// Pixels of the picture by default.
+    /// Pixels of the picture by default (a dial may change it).
     pub picture: [u32; 2],
 }
 
-/// One approximation, turned while all else stays as it is by default.
+/// Measurements of one approximation, varied while all other settings keep their defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
-    /// Unit of the points' values, empty where they are counts or names.
+    /// Unit of the values of the points; empty for counts and names.
     pub unit: String,
     pub reference: Reference,
     pub points: Vec<Point>,
-    /// Error against the value, where it has an order.
+    /// Order of the error over the value, if it has one.
     pub order: Option<Fit>,
-    /// RMSE of the device against f64 where nothing but its arithmetic and formats differ.
+    /// RMSE of the device against f64 if only its arithmetic and formats differ.
     #[serde(default)]
     pub floor: Option<f64>,
 }
 
-/// What the errors of a dial are taken against.
+/// The reference of the errors of a dial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Reference {
     /// The four stages in f64 on the CPU.
     F64,
-    /// A picture of the device's own, converged as far as it goes.
+    /// A picture by the device itself, converged as far as possible.
     Converged {
-        /// The assignments that make it.
+        /// The assignments that give it.
         set: Vec<String>,
-        /// Its RMSE against the next coarser one, an upper bound for its own error where it converges.
+        /// Its RMSE against the next coarser picture: an upper bound of its own error if it converges.
         rmse: f64,
     },
 }
@@ -79,31 +81,31 @@ pub enum Reference {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
-    /// As short as a plot needs: "0.25", "pre-integrated".
+    /// Short label for plots: "0.25", "pre-integrated".
     pub label: String,
-    /// The assignments that make it, each "key=value" as `--set` takes them.
+    /// Its assignments, each "key=value" as `--set` takes them.
     pub set: Vec<String>,
-    /// Where it lies on the dial, in the dial's unit; for names their number in order.
+    /// Value on the dial's axis, in the dial's unit; for names their index.
     pub value: f64,
     pub errors: Errors,
-    /// None on a device without time stamps.
+    /// Time on the device; None without time stamps.
     pub time: Option<Time>,
-    /// Whether this is what the scene has without any assignment.
+    /// True for the setting of the scene itself, without assignments.
     pub is_default: bool,
 }
 
-/// Pictures on a scale of 0..1; the surface where there is one.
+/// Errors of a picture on a scale of 0..1, and of the surface if there is one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
     pub rmse: f64,
     pub max: f64,
-    /// dB; none (infinite) for equal pictures.
+    /// Peak signal-to-noise ratio, dB; None (infinite) for equal pictures.
     pub psnr: Option<f64>,
     pub ssim: Option<f64>,
-    /// Of the distance map, mm.
+    /// Error of the distance map, mm.
     pub mm: Option<SurfaceError>,
-    /// Of the normals, degrees.
+    /// Error of the normals, degrees.
     pub degrees: Option<SurfaceError>,
 }
 
@@ -113,7 +115,7 @@ impl From<PictureError> for Errors {
     }
 }
 
-/// Time on the device over the repeats, ns.
+/// Time on the device over the repeats, ns: median, minimum, maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
@@ -123,7 +125,7 @@ pub struct Time {
 }
 
 impl Time {
-    /// None of no run.
+    /// The statistics of the runs, ns; None without runs.
     pub fn of(runs: &[f64]) -> Option<Time> {
         let mut sorted = runs.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -133,19 +135,19 @@ impl Time {
     }
 }
 
-/// Which error is meant where one is enough.
+/// The error measure of a plot or choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// Of the picture, 0..1.
+    /// RMSE of the picture, 0..1.
     Rmse,
-    /// RMS of the distance map.
+    /// RMS error of the distance map, mm.
     Mm,
-    /// RMS of the normals.
+    /// RMS error of the normals, degrees.
     Degrees,
 }
 
 impl Measure {
-    /// None where it was not measured, or is no number.
+    /// The error by this measure; None if it was not measured or is not finite.
     pub fn of(self, errors: &Errors) -> Option<f64> {
         let rms = |surface: &Option<SurfaceError>| surface.and_then(|s| s.error).map(|e| e.rms);
         let error = match self {
@@ -164,8 +166,8 @@ impl Measure {
         }
     }
 
-    /// An error with its unit.
-    pub fn say(self, error: f64) -> String {
+    /// An error with its name and unit, for messages.
+    pub fn format(self, error: f64) -> String {
         match self {
             Measure::Rmse => format!("RMSE {error:.3e}"),
             Measure::Mm => format!("{error:.3e} mm"),
@@ -175,15 +177,19 @@ impl Measure {
 }
 
 impl Report {
+    /// The report as JSON.
+    ///
     /// # Errors
-    /// One line: a number is not finite or an error or time is negative, named by dial and point. JSON has no words for them.
+    /// One line: a number is not finite, or an error or time is negative; it names the dial and the point.
     pub fn to_json(&self) -> Result<String, String> {
         self.check()?;
         serde_json::to_string_pretty(self).map_err(|e| format!("error report: {e}"))
     }
 
+    /// Reads a report.
+    ///
     /// # Errors
-    /// One line: no JSON, of another format or version, or with numbers that no measurement gives.
+    /// One line: no JSON, another format or version, or numbers that no measurement gives.
     pub fn from_json(text: &str) -> Result<Report, String> {
         Report::read(text).map_err(|e| crate::text::single_line(&e))
     }
@@ -194,7 +200,7 @@ impl Report {
             format: String,
         }
         let unread = |e: serde_json::Error| format!("error report: cannot be read: {e}");
-        // The version first: a newer one would fail by its fields, and say so less clearly.
+        // The version first: a newer report would otherwise fail by its fields, with a less clear message.
         let version: Version = serde_json::from_str(text).map_err(unread)?;
         if version.format != FORMAT {
             return Err(format!("error report: format is '{}', this program reads '{FORMAT}'", version.format));
@@ -206,12 +212,12 @@ impl Report {
 
     fn check(&self) -> Result<(), String> {
         for dial in &self.dials {
-            let own = match &dial.reference {
+            let reference_rmse = match &dial.reference {
                 Reference::F64 => 0.0,
                 Reference::Converged { rmse, .. } => *rmse,
             };
-            if !(own.is_finite() && own >= 0.0) {
-                return Err(format!("error report: dial '{}': its reference's RMSE is {own}", dial.name));
+            if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
+                return Err(format!("error report: dial '{}': its reference's RMSE is {reference_rmse}", dial.name));
             }
             for point in &dial.points {
                 let (e, bad) = (&point.errors, |v: f64| !v.is_finite() || v < 0.0);
@@ -233,25 +239,25 @@ impl Report {
         Ok(())
     }
 
-    /// The front over all dials of a report: dial and point, from the fastest to the most accurate. Points without a time or
+    /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
     /// without this error are not on it.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
-        let mut places = Vec::new();
+        let mut indices = Vec::new();
         let mut pairs = Vec::new();
         for (d, dial) in self.dials.iter().enumerate() {
             for (p, point) in dial.points.iter().enumerate() {
                 if let (Some(time), Some(error)) = (point.time, measure.of(&point.errors)) {
-                    places.push((d, p));
+                    indices.push((d, p));
                     pairs.push([time.median, error]);
                 }
             }
         }
-        pareto_front(&pairs).into_iter().map(|i| places[i]).collect()
+        pareto_front(&pairs).into_iter().map(|i| indices[i]).collect()
     }
 }
 
-/// Indices of the pairs that no other pair dominates (is at most as large in both and smaller in one), in order of the first
-/// value; equal pairs all stay, in the order given. Pairs that are not finite are never on it.
+/// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order
+/// of the first value. Equal pairs all stay, in the order given. Pairs that are not finite are never on the front.
 pub fn pareto_front(pairs: &[[f64; 2]]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..pairs.len()).filter(|i| pairs[*i].iter().all(|v| v.is_finite())).collect();
     // A stable sort: equal pairs keep their order.

@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 use std::sync::LazyLock;
 
-/// Okabe and Ito's colours, told apart with any colour vision, without the yellow that is lost on white.
+/// Colours by Okabe and Ito, distinguishable with any colour vision; without yellow, which is hard to see on white.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -21,13 +21,16 @@ const COLOURS: [RGBColor; 7] = [
 const FRONT: RGBColor = RGBColor(255, 214, 120);
 /// Width of the legend, pixels.
 const LEGEND: f64 = 250.0;
-/// Least width and height, pixels.
-const SMALLEST: [u32; 2] = [640, 400];
-const LARGEST: u32 = 4096;
-/// SVG has letters where they belong; plotters' own rendering has them too high.
+/// Minimum width and height, pixels.
+const MIN_SIZE: [u32; 2] = [640, 400];
+/// Maximum width and height, pixels.
+const MAX_SIZE: u32 = 4096;
+/// In SVG the text is at the right height; the bitmap rendering of plotters places it too high.
 const LINES: Medium = Medium { scale: 1, raised: 0.0 };
 const PIXELS: Medium = Medium { scale: 3, raised: 0.12 };
 
+/// The diagram as SVG, `size` in pixels.
+///
 /// # Errors
 /// One line: no point has a time and such an error, or the size is not within 640x400..4096x4096.
 pub fn svg(report: &Report, measure: Measure, size: [u32; 2]) -> Result<String, String> {
@@ -39,7 +42,7 @@ pub fn svg(report: &Report, measure: Measure, size: [u32; 2]) -> Result<String, 
     Ok(text)
 }
 
-/// The same in pixels.
+/// The diagram as a picture, `size` in pixels.
 ///
 /// # Errors
 /// As [`svg`].
@@ -54,7 +57,7 @@ pub fn picture(report: &Report, measure: Measure, size: [u32; 2]) -> Result<Pict
     Ok(Picture { width, height, rgba: averaged(&rgb, size, PIXELS.scale as usize) })
 }
 
-/// Means of squares of pixels, opaque.
+/// Downsamples by averaging squares of `edge` pixels; opaque.
 fn averaged(rgb: &[u8], [width, height]: [u32; 2], edge: usize) -> Vec<u8> {
     let (width, height) = (width as usize, height as usize);
     let mut rgba = Vec::with_capacity(4 * width * height);
@@ -73,29 +76,29 @@ fn averaged(rgb: &[u8], [width, height]: [u32; 2], edge: usize) -> Vec<u8> {
 }
 
 fn check([width, height]: [u32; 2]) -> Result<(), String> {
-    let [w, h] = SMALLEST;
-    if width < w || height < h || width > LARGEST || height > LARGEST {
-        return Err(format!("plot: size is {width}x{height}, must lie in {w}x{h}..={LARGEST}x{LARGEST}"));
+    let [w, h] = MIN_SIZE;
+    if width < w || height < h || width > MAX_SIZE || height > MAX_SIZE {
+        return Err(format!("plot: size is {width}x{height}, must lie in {w}x{h}..={MAX_SIZE}x{MAX_SIZE}"));
     }
     Ok(())
 }
 
-/// A point that can be shown: where, and of what.
-struct Shown {
+/// A point of the diagram.
+struct PlottedPoint {
     dial: usize,
     point: usize,
-    /// ms: least, median, largest.
+    /// Minimum, median, maximum, ms.
     time: [f64; 3],
     error: f64,
 }
 
-fn shown(report: &Report, measure: Measure) -> Vec<Shown> {
+fn plotted_points(report: &Report, measure: Measure) -> Vec<PlottedPoint> {
     let mut all = Vec::new();
     for (d, dial) in report.dials.iter().enumerate() {
         for (p, point) in dial.points.iter().enumerate() {
             if let (Some(time), Some(error)) = (point.time.filter(|t| t.low > 0.0), measure.of(&point.errors)) {
                 let time = [time.low, time.median, time.high].map(|t| t * 1e-6);
-                all.push(Shown { dial: d, point: p, time, error });
+                all.push(PlottedPoint { dial: d, point: p, time, error });
             }
         }
     }
@@ -103,11 +106,11 @@ fn shown(report: &Report, measure: Measure) -> Vec<Shown> {
 }
 
 fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report: &Report, measure: Measure) -> Drawn {
-    let mut all = shown(report, measure);
+    let mut all = plotted_points(report, measure);
     if all.is_empty() {
         return Err(format!("plot: no setting has a time and an {}", measure.name()));
     }
-    // A logarithmic axis has no 0: what agrees exactly lies on the axis, half a decade below all else.
+    // A logarithmic axis has no 0: exact agreement is drawn half a decade below all other points.
     let positive = all.iter().map(|s| s.error).filter(|e| *e > 0.0).fold(f64::MAX, f64::min);
     let exact = if positive == f64::MAX { 1e-9 } else { positive / 3.0 };
     let zeros = all.iter().filter(|s| s.error == 0.0).count();
@@ -126,8 +129,8 @@ fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report:
     }
 
     let fronts = report.pareto_front(measure);
-    let place = |s: &Shown| axes.place([s.time[1], s.error]);
-    let on_front = |s: &Shown| fronts.contains(&(s.dial, s.point));
+    let place = |s: &PlottedPoint| axes.place([s.time[1], s.error]);
+    let on_front = |s: &PlottedPoint| fronts.contains(&(s.dial, s.point));
     let mut labels = Labels::default();
     let steps = staircase(
         &fronts.iter().filter_map(|at| all.iter().find(|s| (s.dial, s.point) == *at)).map(place).collect::<Vec<_>>(),
@@ -135,7 +138,7 @@ fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report:
     canvas.line(&steps, FRONT.stroke_width(6))?;
     labels.keep_off_line(&steps);
     for (d, dial) in report.dials.iter().enumerate() {
-        let mut of_dial: Vec<&Shown> = all.iter().filter(|s| s.dial == d).collect();
+        let mut of_dial: Vec<&PlottedPoint> = all.iter().filter(|s| s.dial == d).collect();
         of_dial.sort_by(|a, b| dial.points[a.point].value.total_cmp(&dial.points[b.point].value));
         let line: Vec<[f64; 2]> = of_dial.iter().map(|s| place(s)).collect();
         canvas.line(&line, colour(d).mix(0.5).stroke_width(1))?;
@@ -157,9 +160,9 @@ fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report:
         canvas.mark(place(s), s.dial, colour(s.dial))?;
     }
 
-    // What matters most finds room first.
-    let rank = |s: &Shown| (!on_front(s), !report.dials[s.dial].points[s.point].is_default);
-    let mut order: Vec<&Shown> = all.iter().collect();
+    // The most important points get their labels first.
+    let rank = |s: &PlottedPoint| (!on_front(s), !report.dials[s.dial].points[s.point].is_default);
+    let mut order: Vec<&PlottedPoint> = all.iter().collect();
     order.sort_by_key(|s| rank(s));
     let mut unnamed = 0;
     for s in order {
@@ -182,16 +185,16 @@ fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, width: f64) -> D
     canvas.text(&canvas.cut(&device, 15, width - 48.0)?, [24.0, 64.0], 15, INK, [0, 0])
 }
 
-/// A row for every dial: its unit, its order, and what it is compared with unless that is the reference in f64.
+/// One row per dial: its unit, its order, and its reference unless that is f64.
 fn legend<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, left: f64, unnamed: usize) -> Drawn {
     let mut y = 106.0;
-    let room = LEGEND - 30.0;
+    let width = LEGEND - 30.0;
     for (d, dial) in report.dials.iter().enumerate() {
         canvas.mark([left + 6.0, y], d, colour(d))?;
-        canvas.text(&canvas.cut(&title(dial), 15, room)?, [left + 20.0, y], 15, INK, [0, 1])?;
+        canvas.text(&canvas.cut(&title(dial), 15, width)?, [left + 20.0, y], 15, INK, [0, 1])?;
         y += 18.0;
         for line in notes(dial) {
-            canvas.text(&canvas.cut(&line, 12, room)?, [left + 20.0, y], 12, INK, [0, 1])?;
+            canvas.text(&canvas.cut(&line, 12, width)?, [left + 20.0, y], 12, INK, [0, 1])?;
             y += 15.0;
         }
         y += 6.0;
@@ -226,7 +229,7 @@ fn notes(dial: &Dial) -> Vec<String> {
     order.into_iter().chain(against).collect()
 }
 
-/// What has been reached at each time: level until the next better point.
+/// The front as a staircase: level until the next better point.
 fn staircase(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut steps: Vec<[f64; 2]> = Vec::new();
     for point in points {
@@ -240,17 +243,17 @@ fn colour(dial: usize) -> RGBColor {
     COLOURS[dial % COLOURS.len()]
 }
 
-/// Of a pale colour, small letters are hard to read.
+/// A darker colour for labels: small text in a pale colour is hard to read.
 fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
     let [r, g, b] = [r, g, b].map(|c| (f64::from(c) * 0.7) as u8);
     RGBColor(r, g, b)
 }
 
-/// What an SVG asks its viewer for; under this very name the embedded DejaVu Sans Condensed is known here, by which text is
-/// measured and PNGs are lettered. A bare system has no font at all.
+/// The font family that an SVG names. The embedded DejaVu Sans Condensed is registered under the same name; it measures text and
+/// draws it in PNGs, since a bare system has no font.
 const FONT: &str = "DejaVu Sans Condensed, DejaVu Sans, sans-serif";
 
-static LETTERED: LazyLock<bool> =
+static FONT_REGISTERED: LazyLock<bool> =
     LazyLock::new(|| register_font(FONT, FontStyle::Normal, dejavu::sans_condensed::regular()).is_ok());
 
 const INK: RGBColor = RGBColor(40, 40, 40);
@@ -261,16 +264,16 @@ type Drawn = Result<(), String>;
 /// Left, top, right, bottom, pixels.
 type Frame = [f64; 4];
 
-/// What a picture is drawn into.
+/// The kind of output.
 #[derive(Clone, Copy, Debug)]
 struct Medium {
-    /// Its pixels for one of the picture's, along each edge: letters and slanted lines need finer ones than are shown.
+    /// Supersampling factor along each edge, for smooth text and slanted lines.
     pub scale: u32,
-    /// How far plotters sets letters too high in it, as a share of their size.
+    /// How far plotters places text too high, as a share of its size.
     pub raised: f64,
 }
 
-/// A picture being drawn. Places and sizes are in the pixels that are shown.
+/// The diagram being drawn. Positions and sizes are in output pixels.
 struct Canvas<'a, B: DrawingBackend> {
     area: &'a DrawingArea<B, Shift>,
     medium: Medium,
@@ -280,7 +283,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
     /// # Errors
     /// One line: the embedded font or the drawing failed.
     pub fn new(area: &'a DrawingArea<B, Shift>, medium: Medium) -> Result<Self, String> {
-        if !*LETTERED {
+        if !*FONT_REGISTERED {
             return Err("plot: the embedded font cannot be read".into());
         }
         area.fill(&WHITE).map_err(|e| fault(&e))?;
@@ -333,7 +336,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         }
     }
 
-    /// Text with its anchor's place: `across` and `down` are 0 at left and top, 1 in the middle, 2 at right and bottom.
+    /// Text at its anchor: `across` and `down` are 0 for left and top, 1 for the middle, 2 for right and bottom.
     pub fn text(&self, text: &str, at: [f64; 2], size: u32, colour: RGBColor, [across, down]: [usize; 2]) -> Drawn {
         let h = [HPos::Left, HPos::Center, HPos::Right][across.min(2)];
         let v = [VPos::Top, VPos::Center, VPos::Bottom][down.min(2)];
@@ -342,7 +345,7 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         self.area.draw(&Text::new(text.to_string(), at, style)).map_err(|e| fault(&e))
     }
 
-    /// Text that reads upwards, about its middle.
+    /// Vertical text, read upwards, centred.
     pub fn upright(&self, text: &str, at: [f64; 2], size: u32) -> Drawn {
         let font = (FONT, size * self.medium.scale).into_font().transform(FontTransform::Rotate270);
         let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
@@ -356,10 +359,10 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         Ok([w, h].map(|n| f64::from(n) / f64::from(self.medium.scale)))
     }
 
-    /// The text, cut off with an ellipsis where it is wider than there is room.
-    pub fn cut(&self, text: &str, size: u32, room: f64) -> Result<String, String> {
+    /// The text, cut with an ellipsis if it is wider than `max_width` pixels.
+    pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
         let mut cut = text.to_string();
-        while self.measure(&cut, size)?[0] > room && cut.chars().count() > 1 {
+        while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {
             cut = cut
                 .trim_end_matches('…')
                 .chars()
@@ -379,18 +382,19 @@ fn fault(e: &dyn std::fmt::Display) -> String {
 #[derive(Clone, Copy, Debug)]
 struct Axes {
     pub frame: Frame,
-    /// Least and largest value across and up.
+    /// Minimum and maximum of the horizontal axis.
     pub x: [f64; 2],
+    /// Minimum and maximum of the vertical axis.
     pub y: [f64; 2],
 }
 
 impl Axes {
-    /// Axes that leave some room about all values, of which there is one at least; all must be positive.
+    /// Axes with a margin around all points. There must be at least one point, and all values must be positive.
     pub fn about(frame: Frame, points: &[[f64; 2]]) -> Axes {
         let around = |axis: usize| {
             let (low, high) = points.iter().fold((f64::MAX, 0.0f64), |(l, h), p| (l.min(p[axis]), h.max(p[axis])));
-            let room = (high / low).powf(0.06).max(1.3);
-            [low / room, high * room]
+            let margin = (high / low).powf(0.06).max(1.3);
+            [low / margin, high * margin]
         };
         Axes { frame, x: around(0), y: around(1) }
     }
@@ -401,7 +405,7 @@ impl Axes {
         [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
     }
 
-    /// Grid, ticks and names.
+    /// Draws grid, ticks and axis titles.
     pub fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, across: &str, up: &str) -> Drawn {
         let [left, top, right, bottom] = self.frame;
         for (value, named) in ticks(self.x) {
@@ -424,7 +428,7 @@ impl Axes {
     }
 }
 
-/// Values 1 to 9 of every decade within a range, and whether each is named: the more the fewer decades there are.
+/// Tick values 1 to 9 of every decade within a range, and whether each has a label: more labels for fewer decades.
 fn ticks([low, high]: [f64; 2]) -> Vec<(f64, bool)> {
     let decades = (high / low).log10();
     let named: &[u32] = match decades {
@@ -437,7 +441,7 @@ fn ticks([low, high]: [f64; 2]) -> Vec<(f64, bool)> {
     all.filter(|(v, _)| *v >= low && *v <= high).map(|(v, m)| (v, named.contains(&m))).collect()
 }
 
-/// 0.005, 2, 500 as they are; beyond, as powers of ten.
+/// A tick label: decimal from 0.001 to 9999, otherwise scientific.
 fn number(value: f64) -> String {
     match value {
         v if (0.000_99..9_999.0).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
@@ -445,12 +449,12 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Where labels go: beside their marks, on top of nothing.
+/// Placement of labels next to their marks without overlap.
 #[derive(Default)]
 struct Labels {
-    /// What is covered.
+    /// Covered rectangles.
     taken: Vec<Frame>,
-    /// Places along lines, which a label rather keeps clear of.
+    /// Points along lines, which labels avoid if possible.
     lines: Vec<[f64; 2]>,
 }
 
@@ -469,9 +473,9 @@ impl Labels {
         }
     }
 
-    /// Top left of a label of this size for a mark, within the frame; none where there is no room.
+    /// Top left of a label of this size for a mark, within the frame; None if there is no free place.
     pub fn place(&mut self, at: [f64; 2], [w, h]: [f64; 2], frame: Frame) -> Option<[f64; 2]> {
-        let beside = |gap: f64| {
+        let around = |gap: f64| {
             let (east, west) = (at[0] + gap, at[0] - gap - w);
             let (above, below, level) = (at[1] - gap - h, at[1] + gap, at[1] - h / 2.0);
             let middle = at[0] - w / 2.0;
@@ -480,7 +484,7 @@ impl Labels {
             let (se, sw) = ([at[0] + near, at[1] + near], [at[0] - near - w, at[1] + near]);
             [[east, level], ne, [middle, above], [middle, below], se, nw, [west, level], sw]
         };
-        let candidates: Vec<[f64; 2]> = [11.0, 15.0, 20.0].into_iter().flat_map(beside).collect();
+        let candidates: Vec<[f64; 2]> = [11.0, 15.0, 20.0].into_iter().flat_map(around).collect();
         let boxed = |[x, y]: [f64; 2]| [x - 1.0, y - 1.0, x + w + 1.0, y + h + 1.0];
         let free = |b: Frame| {
             let inside = b[0] >= frame[0] && b[1] >= frame[1] && b[2] <= frame[2] && b[3] <= frame[3];

@@ -1,16 +1,16 @@
-//! What is wrong with an input, on one line.
+//! Errors of input files: one line that names the file, the field and the fault.
 
 use std::io;
 use std::path::Path;
 
-/// Longest quotation from a file, in characters.
-const QUOTE: usize = 60;
-/// Longest part of a message, in characters.
-const PART: usize = 300;
+/// Longest quotation from a file, characters.
+const MAX_QUOTE: usize = 60;
+/// Longest part of a message, characters.
+const MAX_PART: usize = 300;
 
-/// A fault of an input file: one line naming the file, the field and what is wrong with it.
+/// An error of an input file: one line that names the file, the field and what is wrong with it.
 ///
-/// Whatever was taken from the file is escaped and shortened on the way in, so that no file can write to a terminal.
+/// Everything that comes from the file is escaped and shortened, so that a file cannot send control characters to a terminal.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: {field}: {fault}")]
 pub struct InputError {
@@ -20,39 +20,42 @@ pub struct InputError {
 }
 
 impl InputError {
+    /// An error of `field` in `file`. All three parts are escaped and shortened.
     pub fn new(file: &Path, field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
         InputError {
-            file: escaped(&file.display().to_string(), PART),
-            field: escaped(field.as_ref(), PART),
-            fault: escaped(fault.as_ref(), PART),
+            file: escaped(&file.display().to_string(), MAX_PART),
+            field: escaped(field.as_ref(), MAX_PART),
+            fault: escaped(fault.as_ref(), MAX_PART),
         }
     }
 
-    /// The operating system would not let the file be read.
+    /// The operating system cannot read the file.
     pub(crate) fn unreadable(file: &Path, error: &io::Error) -> InputError {
         InputError::new(file, "file", format!("cannot be read: {error}"))
     }
 
-    /// The operating system would not let the file be written.
+    /// The operating system cannot write the file.
     pub(crate) fn unwritable(file: &Path, error: &io::Error) -> InputError {
         InputError::new(file, "file", format!("cannot be written: {error}"))
     }
 
+    /// The field that is wrong.
     pub fn field(&self) -> &str {
         &self.field
     }
 
+    /// What is wrong with it.
     pub fn fault(&self) -> &str {
         &self.fault
     }
 }
 
-/// A value of the file in quotes, shortened.
+/// A value from a file in quotes, escaped and shortened.
 pub(crate) fn quoted(value: &str) -> String {
-    format!("'{}'", escaped(value, QUOTE))
+    format!("'{}'", escaped(value, MAX_QUOTE))
 }
 
-/// Control characters and other invisible ones as escapes, at most `longest` characters of the original.
+/// Text with control characters and other invisible ones escaped, at most `longest` characters of the original.
 pub(crate) fn escaped(text: &str, longest: usize) -> String {
     let mut line = String::new();
     for (i, c) in text.chars().enumerate() {

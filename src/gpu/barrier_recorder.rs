@@ -1,4 +1,4 @@
-//! The barrier derivation in Vulkan's words: which barrier goes in front of an operation, if any.
+//! Records the barriers that [`crate::barriers`] derives as Vulkan commands.
 
 use super::context::Context;
 use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages};
@@ -6,16 +6,16 @@ use crate::queues::oracle::SubmissionLog;
 use crate::queues::{QueueTracker, Wait};
 use ash::vk;
 
-/// The barrier derivation of everything that uses the same slots, and a count of what was recorded.
+/// The barriers and waits of everything that uses the same slots, and a count of the barriers.
 #[derive(Default)]
 pub struct BarrierRecorder {
     pub queues: QueueTracker,
     pub count: u32,
-    /// Names and extents of the passes dispatched, in order, while someone counts them.
+    /// The names and invocations of the dispatched passes, in order, while they are counted.
     pub dispatched: Option<Vec<(&'static str, [u32; 3])>>,
-    /// Leaves out the n-th barrier, to show that something notices.
+    /// Fault injection: leaves out the n-th barrier.
     pub drop_barrier: Option<u32>,
-    /// All that is recorded and submitted, while someone looks at it.
+    /// Everything recorded and submitted, if it is logged.
     pub log: Option<SubmissionLog>,
 }
 
@@ -25,10 +25,10 @@ impl BarrierRecorder {
         let barrier = self.queues.record(queue, accesses);
         self.count += u32::from(barrier.is_some());
         let is_dropped = self.drop_barrier == Some(self.count);
-        // A queue that only copies knows no shaders.
+        // A transfer queue has no shader stages.
         let computes = context.queue(queue).computes;
-        let known = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
-        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: known(b.from), to: known(b.to) });
+        let supported = |all: PipelineStages| if computes { all } else { all.without(PipelineStage::Compute) };
+        let barrier = barrier.filter(|_| !is_dropped).map(|b| Barrier { from: supported(b.from), to: supported(b.to) });
         if let Some(log) = &mut self.log {
             log.record(queue, barrier, accesses);
         }
@@ -43,13 +43,13 @@ impl BarrierRecorder {
         unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
     }
 
-    /// A submission of this queue is recorded from here on.
+    /// Begins the recording of a submission to this queue.
     pub(super) fn begin(&mut self, queue: usize) {
         self.queues.begin(queue);
         self.log.iter_mut().for_each(|log| log.begin(queue));
     }
 
-    /// What was recorded on this queue is on its way, behind these waits, and done at this value of its timeline.
+    /// The recording of this queue was submitted with these waits; it is done at this value of the queue's timeline.
     pub(super) fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.queues.submitted(queue, waits, value);
         self.log.iter_mut().for_each(|log| log.submit(queue, waits, value));

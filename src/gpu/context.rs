@@ -20,8 +20,9 @@ const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 const TIMELINE_VALIDATION: u32 = vk::make_api_version(0, 1, 3, 297);
 
 /// Which device a [`Context`] uses, and how.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ContextOptions {
+    /// The device. The default is the best one.
     pub device: DeviceChoice,
     /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
     pub validation: bool,
@@ -407,8 +408,8 @@ fn create_instance(
     }
 }
 
-/// `shows`: the device will present pictures with panels drawn over them.
-fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -> Result<ash::Device, GpuError> {
+/// `presents`: the device will present pictures with panels drawn over them.
+fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool) -> Result<ash::Device, GpuError> {
     let priorities = [1.0; MAX_QUEUES];
     let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
     let queues: Vec<_> = families
@@ -421,7 +422,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -
     let mut extensions = Vec::new();
     extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
-    extensions.extend(shows.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    extensions.extend(presents.then_some(ash::khr::swapchain::NAME.as_ptr()));
     let core = vk::PhysicalDeviceFeatures::default()
         .pipeline_statistics_query(candidate.pipeline_statistics)
         .shader_storage_image_extended_formats(true)
@@ -433,7 +434,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, shows: bool) -
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
         .synchronization2(true)
         .maintenance4(true)
-        .dynamic_rendering(shows);
+        .dynamic_rendering(presents);
     let create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

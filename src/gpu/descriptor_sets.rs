@@ -1,4 +1,4 @@
-//! Descriptor sets of one command buffer, on a device that cannot have descriptors pushed: taken from pools, given back all at once.
+//! Descriptor sets of one command buffer, for a device without push descriptors. They are allocated from pools and freed all at once.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -7,28 +7,29 @@ use crate::spirv::Kind;
 use ash::vk;
 use std::sync::Arc;
 
-/// DescriptorSets of one pool: more than most pictures need dispatches.
+/// Number of sets in a pool; few pictures need more dispatches.
 const SETS: u32 = 64;
-/// Descriptors of each type in one pool.
+/// Number of descriptors of each type in a pool.
 const DESCRIPTORS: u32 = 4 * SETS;
 const KINDS: [Kind; 6] = [Kind::Params, Kind::Sampled, Kind::Filtered, Kind::Storage, Kind::Buffer, Kind::Texels(1)];
 
-/// What is left in a pool. It is counted here: a driver may hand out more than it was made for, and another may not.
+/// What is left in a pool. It is counted here, because drivers differ in whether they allocate beyond the size of a pool.
 #[derive(Clone, Copy)]
 struct PoolSpace {
     sets: u32,
-    of: [u32; KINDS.len()],
+    /// Descriptors, in the order of [`KINDS`].
+    descriptors: [u32; KINDS.len()],
 }
 
-const FULL: PoolSpace = PoolSpace { sets: SETS, of: [DESCRIPTORS; KINDS.len()] };
+const FULL: PoolSpace = PoolSpace { sets: SETS, descriptors: [DESCRIPTORS; KINDS.len()] };
 
 impl PoolSpace {
-    /// What is left behind a set with a descriptor for each of these; none if there is no room for it.
+    /// What is left after a set with these descriptors is allocated; `None` if there is not enough.
     fn after(mut self, kinds: impl Iterator<Item = Kind>) -> Option<PoolSpace> {
         self.sets = self.sets.checked_sub(1)?;
         for kind in kinds {
             let of = KINDS.iter().position(|k| descriptor_type(*k) == descriptor_type(kind))?;
-            self.of[of] = self.of[of].checked_sub(1)?;
+            self.descriptors[of] = self.descriptors[of].checked_sub(1)?;
         }
         Some(self)
     }
@@ -37,36 +38,36 @@ impl PoolSpace {
 pub struct DescriptorSets {
     context: Arc<Context>,
     pools: Vec<vk::DescriptorPool>,
-    /// Of the pool that sets are taken from now.
+    /// What is left in the current pool.
     left: PoolSpace,
     current: usize,
 }
 
 impl DescriptorSets {
-    /// Makes nothing: what is pushed needs no pool.
+    /// Allocates no pool yet: push descriptors need none.
     pub fn new(context: &Arc<Context>) -> DescriptorSets {
         DescriptorSets { context: context.clone(), pools: Vec::new(), left: FULL, current: 0 }
     }
 
-    /// Gives all sets back. The device must be done with the command buffer.
+    /// Frees all sets. The device must be done with the command buffer.
     pub fn begin(&mut self) -> Result<(), GpuError> {
         for pool in &self.pools {
             // SAFETY: the pool is alive, and the device is done with what was taken from it.
             unsafe { self.context.device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()) }
-                .context(|| "give descriptor sets back".into())?;
+                .context(|| "reset a descriptor pool".into())?;
         }
         (self.left, self.current) = (FULL, 0);
         Ok(())
     }
 
-    /// A set for a pipeline; valid until [`DescriptorSets::begin`].
+    /// Allocates a set for a pipeline; it is valid until [`DescriptorSets::begin`].
     pub fn take(&mut self, pipeline: &Pipeline) -> Result<vk::DescriptorSet, GpuError> {
         let kinds = || pipeline.module.bindings.iter().map(|binding| binding.kind);
         let (current, left) = match self.left.after(kinds()) {
             Some(left) => (self.current, left),
             None => {
                 let left = FULL.after(kinds()).ok_or_else(|| GpuError::Limit {
-                    what: "descriptors of one kind in one dispatch".into(),
+                    what: "descriptors of one type in one dispatch".into(),
                     needed: kinds().count() as u64,
                     allowed: u64::from(DESCRIPTORS),
                 })?;
@@ -81,7 +82,7 @@ impl DescriptorSets {
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pools[current]).set_layouts(&layouts);
         // SAFETY: pool and layout are alive, and there is room for one set more.
         let sets = unsafe { self.context.device.allocate_descriptor_sets(&allocate) };
-        let set = sets.context(|| "take a descriptor set".into())?[0];
+        let set = sets.context(|| "allocate a descriptor set".into())?[0];
         (self.current, self.left) = (current, left);
         Ok(set)
     }
@@ -112,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pool_is_left_when_its_sets_or_one_kind_of_descriptor_run_out() {
+    fn a_pool_is_full_when_its_sets_or_the_descriptors_of_one_type_run_out() {
         let images = |count| std::iter::repeat_n(Kind::Storage, count);
         let mut left = FULL;
         for _ in 0..SETS {
@@ -121,7 +122,7 @@ mod tests {
         assert!(left.after(images(0)).is_none(), "{} sets are left", left.sets);
         assert!(FULL.after(images(DESCRIPTORS as usize)).is_some());
         assert!(FULL.after(images(DESCRIPTORS as usize + 1)).is_none());
-        let behind = FULL.after(images(200)).expect("room");
-        assert!(behind.after(images(57)).is_none() && behind.after(images(56)).is_some());
+        let rest = FULL.after(images(200)).expect("room");
+        assert!(rest.after(images(57)).is_none() && rest.after(images(56)).is_some());
     }
 }

@@ -6,9 +6,10 @@ use std::borrow::Cow;
 use std::ffi::CStr;
 
 /// The device that a user asks for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum DeviceChoice {
     /// The best device that lacks no required feature.
+    #[default]
     Best,
     /// By its number in `echolume devices`.
     Number(usize),

@@ -1,25 +1,25 @@
 //! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
-//! - [`context`] owns instance, device, queues and allocator; [`device_selection`] picks the device; [`faults`] injects faults.
-//! - [`resources`] are images and buffers, [`slots`] those of a scene, [`formats`] what the device can do with them.
-//! - [`pipelines`] compiles shaders, [`async_compiler`] does so on its own thread, [`shader_reload`] takes them from a folder that is watched.
-//! - [`recorder`] records one command buffer with the barriers of [`barrier_recorder`] and the time stamps of [`timing`];
-//!   [`timeline`] says when a submission is done.
-//! - [`renderer`] runs the four stages, [`pass_runner`] a single pass for tests and benchmarks.
-//! - [`window`] presents pictures.
+//! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
+//! - `resources` are images and buffers, `slots` those of a scene, `formats` what the device can do with them.
+//! - `pipelines` compiles shaders, `async_compiler` does so on its own thread, `shader_reload` takes them from a folder that is watched.
+//! - `recorder` records one command buffer with the barriers of `barrier_recorder` and the time stamps of `timing`;
+//!   `timeline` says when a submission is done.
+//! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
+//! - `window` presents pictures.
 
-pub mod async_compiler;
-pub mod barrier_recorder;
+mod async_compiler;
+mod barrier_recorder;
 pub mod context;
 mod descriptor_sets;
-pub mod device_selection;
-pub mod error;
+pub(crate) mod device_selection;
+pub(crate) mod error;
 pub mod faults;
-pub mod formats;
+pub(crate) mod formats;
 pub mod pass_runner;
-pub mod pipelines;
+mod pipelines;
 mod recorder;
-pub mod renderer;
+mod renderer;
 pub mod resources;
 pub mod shader_reload;
 mod slots;
@@ -32,4 +32,5 @@ pub use context::{Context, ContextOptions};
 pub use device_selection::{Candidate, DeviceChoice};
 pub use error::GpuError;
 pub use formats::TexelAccess;
+pub use pipelines::Shaders;
 pub use renderer::{Renderer, RendererOptions};

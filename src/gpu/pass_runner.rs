@@ -1,4 +1,4 @@
-//! One pass alone on inputs of the caller's: what the tests hold against its reference, and what benches time.
+//! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
 use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
@@ -16,7 +16,7 @@ use crate::plan::Plan;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// Runs passes one at a time.
+/// Runs single passes on inputs of the caller.
 pub struct PassRunner {
     context: Arc<Context>,
     pipelines: Pipelines,
@@ -24,11 +24,16 @@ pub struct PassRunner {
 }
 
 impl PassRunner {
+    /// # Errors
+    /// A device that fails.
     pub fn new(context: &Arc<Context>) -> Result<PassRunner, GpuError> {
         PassRunner::with_texel_access(context, TexelAccess::for_device(&context.candidate))
     }
 
-    /// With texels read in a way that may not be the device's fastest.
+    /// As [`PassRunner::new`], with texels read in the given way.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn with_texel_access(context: &Arc<Context>, texel_access: TexelAccess) -> Result<PassRunner, GpuError> {
         Ok(PassRunner {
             context: context.clone(),
@@ -37,13 +42,16 @@ impl PassRunner {
         })
     }
 
-    /// Bits of the weights that the device's own filter has, as it says.
+    /// Number of fractional bits of the weights in the device's texture filter.
     pub fn filter_bits(&self) -> u32 {
         self.context.limits.sub_texel_precision_bits
     }
 
-    /// Dispatches `pass` once. `inputs` are named as in the shader; what the scene makes itself need not be there. Outputs hold
-    /// `poison` before, so that what the pass leaves out can be told.
+    /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes
+    /// may be missing. Every texel of the outputs holds `poison` before, which shows the texels that the pass does not write.
+    ///
+    /// # Errors
+    /// A slot that the device cannot hold, a shader that does not compile, a device that fails.
     pub fn run(
         &mut self,
         scene: &Scene,
@@ -117,9 +125,9 @@ impl PassRunner {
     }
 }
 
-/// One pass of a scene, with slots and pipelines of its own, to be run and timed as often as wanted.
+/// Times a single pass of a scene, with its own slots and pipelines.
 pub struct PassTimer {
-    // Dropped in this barriers, after `drop` has waited for the device.
+    // Fields are dropped in this order, after `drop` has waited for the device.
     recorder: Recorder,
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
@@ -133,12 +141,12 @@ pub struct PassTimer {
 }
 
 impl PassTimer {
-    /// `contents` is what images hold before the first run; those left out hold zeros. What the scene makes itself is there in
-    /// any case. A pass of frames works on layer 0 and the middle slice, one of volumes on all slices. Runs once, because
-    /// drivers compile then.
+    /// `contents` is what images hold before the first run. Slots that the scene computes are filled; all others hold zeros. A pass
+    /// over frames works on layer 0 and the middle slice, a pass over volumes on all slices. Runs the pass once, because drivers
+    /// compile at the first run.
     ///
     /// # Errors
-    /// What the device cannot hold or compile, named.
+    /// A slot that the device cannot hold, a shader that does not compile; the error names it.
     pub fn new(
         context: &Arc<Context>,
         scene: &Scene,
@@ -148,7 +156,10 @@ impl PassTimer {
         PassTimer::with_texel_access(context, scene, pass, contents, TexelAccess::for_device(&context.candidate))
     }
 
-    /// The same with texels read in a way that may not be the device's fastest.
+    /// As [`PassTimer::new`], with texels read in the given way.
+    ///
+    /// # Errors
+    /// As for [`PassTimer::new`].
     pub fn with_texel_access(
         context: &Arc<Context>,
         scene: &Scene,
@@ -163,12 +174,12 @@ impl PassTimer {
         } else {
             DispatchArgs { slice: 0, slices: scene.slices(), ..first }
         };
-        let turns: Vec<DispatchArgs> =
+        let iterations: Vec<DispatchArgs> =
             (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
         let mut plan = Plan { steps: Vec::new(), slots: Vec::new() };
         let pipelines = Pipelines::new(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
-        for args in turns {
+        for args in iterations {
             let binds = [(pass.reads)(scene, &args), (pass.writes)(scene, &args)].concat();
             plan.slots.extend(binds.iter().map(|b| b.slot));
             dispatches.push((args, pipelines.get(pass, scene, &args)?));
@@ -204,7 +215,7 @@ impl PassTimer {
                 _ => continue,
             };
             let Some(image) = self.slots.image(slot, copy) else { continue };
-            // As large as the image, whatever was given.
+            // The staging buffer has the size of the image, whatever was given.
             let mut staging = Buffer::new(&self.context, "contents", slot.bytes(&self.scene), Purpose::Staging)?;
             let length = bytes.len().min(staging.bytes().len());
             staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
@@ -219,13 +230,16 @@ impl PassTimer {
         done
     }
 
-    /// Runs every iteration of the pass once, in one submission, and waits: the device's time for them all, ns; none where it
-    /// has no time stamps. A pass that repeats works on what it left there the last time.
+    /// Runs all iterations of the pass in one submission, and waits. Returns the device's time for all of them, ns; `None` if the device
+    /// has no time stamps. A repeated pass works on its last results.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn run(&mut self) -> Result<Option<f64>, GpuError> {
         self.recorder.begin(&mut self.barriers, &self.timelines)?;
         for (args, pipeline) in &self.dispatches {
-            let work = Dispatch { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
-            self.recorder.dispatch(&mut self.barriers, &work)?;
+            let dispatch = Dispatch { slots: &self.slots, pipeline, scene: &self.scene, pass: self.pass, args };
+            self.recorder.dispatch(&mut self.barriers, &dispatch)?;
         }
         self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let mut timings = Timings::new(&self.context, false);
@@ -233,7 +247,10 @@ impl PassTimer {
         Ok(timings.take_times().iter().find(|t| t.name == self.pass.name).map(|t| t.total))
     }
 
-    /// What an image holds now; none for a slot that the pass does not touch, or that is a table.
+    /// The current content of an image slot; `None` for a slot that the pass does not use, or a lookup table in a buffer.
+    ///
+    /// # Errors
+    /// A device that fails.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
@@ -253,8 +270,11 @@ impl Drop for PassTimer {
     }
 }
 
-/// Times of `count` runs of one pass in a row, ns, each of all its iterations, over slots that hold zeros; empty where the
-/// device has no time stamps. A run before them, which compiles, is left out.
+/// Times of `count` consecutive runs of a pass, ns, each with all its iterations, on slots that hold zeros. Empty if the device has
+/// no time stamps. A first run, in which drivers compile, is not counted.
+///
+/// # Errors
+/// As for [`PassTimer::new`].
 pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, count: u32) -> Result<Vec<f64>, GpuError> {
     let mut timed = PassTimer::new(context, scene, pass, &[])?;
     let mut times = Vec::new();
@@ -264,7 +284,7 @@ pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, cou
     Ok(times)
 }
 
-/// The bytes that a slot read by a pass holds: the caller's, or the scene's own.
+/// The content of an input slot: the caller's, or what the scene computes.
 fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
     let format = bind.slot.format(scene);
     if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {

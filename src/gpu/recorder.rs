@@ -1,4 +1,4 @@
-//! One command buffer: operations with the barriers they need, labels, time stamps, and their parameters.
+//! Records one command buffer: dispatches and copies with the barriers that they need, labels, time stamps, and parameters.
 
 use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
@@ -20,11 +20,12 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// Room for the parameters of one command buffer.
+/// Size of the uniform buffer for the parameters of one command buffer, bytes.
 const PARAMS_BYTES: u64 = 64 << 10;
+/// Capacity for time stamps.
 const STAMPS: u32 = 128;
 
-/// One dispatch: a pass, and what it runs on.
+/// A dispatch of a pass, and everything it runs on.
 #[derive(Clone, Copy)]
 pub struct Dispatch<'a> {
     pub slots: &'a Slots,
@@ -34,7 +35,7 @@ pub struct Dispatch<'a> {
     pub args: &'a DispatchArgs,
 }
 
-/// Parts of a slot: layers of an array, slices of a 3D image; of one of the images that take turns.
+/// Parts of a slot's image: layers of an array or slices of a 3D image. `copy` is the number of the volume image.
 #[derive(Clone, Debug)]
 pub struct SlotParts {
     pub slot: Slot,
@@ -42,26 +43,27 @@ pub struct SlotParts {
     pub parts: Range<u32>,
 }
 
+/// A command buffer that is recorded and submitted again and again.
 pub struct Recorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     params: Buffer,
     params_used: u64,
-    /// Where descriptors are not pushed.
+    /// For a device without push descriptors.
     sets: DescriptorSets,
     pub stamps: Option<Stamps>,
-    /// Value of the timeline at which the last submission is done.
+    /// The value of the timeline at which the last submission is done.
     done_at: u64,
-    /// The submission whose times were added last.
+    /// The last submission whose times were added.
     collected_to: u64,
     label: &'static str,
-    /// The queue that it is submitted to.
+    /// The number of its queue.
     queue: usize,
 }
 
 impl Recorder {
-    /// With `statistics` the invocations of every dispatch are counted, where the device can.
+    /// With `statistics`, the invocations of every dispatch are counted, if the device can.
     pub fn new(
         context: &Arc<Context>,
         queue: usize,
@@ -95,7 +97,7 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Waits until the last submission is done, then starts anew.
+    /// Waits until the last submission is done, then begins a new recording.
     pub fn begin(&mut self, barriers: &mut BarrierRecorder, timelines: &Timelines) -> Result<(), GpuError> {
         barriers.begin(self.queue);
         self.wait(timelines)?;
@@ -117,13 +119,13 @@ impl Recorder {
         Ok(())
     }
 
-    /// llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp when it next flushes, once anything was ever drawn on a window:
-    /// without a flush behind each one the dispatch after it would seem to take no time. A barrier is one.
+    /// Flushes after a time stamp. Once anything was drawn on a window, llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp only
+    /// at its next flush, so that the following dispatch would seem to take no time. A barrier is a flush.
     fn flush_timestamps(&self) {
         if self.context.presentation.is_none() || !self.context.candidate.is_software() {
             return;
         }
-        // Of no memory: what the derivation leaves out is still seen to be missing.
+        // It covers no memory, so that validation still notices a barrier that is missing.
         flush(&self.context.device, self.commands, vk::AccessFlags2::NONE);
     }
 
@@ -146,11 +148,12 @@ impl Recorder {
         timelines.of(self.queue).wait(self.done_at)
     }
 
-    /// Whether the last submission is done.
+    /// True if the last submission is done.
     pub fn is_done(&self, timelines: &Timelines) -> Result<bool, GpuError> {
         timelines.of(self.queue).is_done(self.done_at)
     }
 
+    /// Submits the recording, after waits for other queues.
     pub fn submit(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
         // SAFETY: the command buffer is being recorded.
         unsafe { self.context.device.end_command_buffer(self.commands) }
@@ -183,25 +186,28 @@ impl Recorder {
         Ok(())
     }
 
-    /// One dispatch of a pass.
-    pub fn dispatch(&mut self, barriers: &mut BarrierRecorder, work: &Dispatch) -> Result<(), GpuError> {
-        let Dispatch { pipeline, scene, pass, args, .. } = *work;
+    /// Records a dispatch, with the barrier that it needs.
+    ///
+    /// # Errors
+    /// More parameters than one command buffer can hold.
+    pub fn dispatch(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch) -> Result<(), GpuError> {
+        let Dispatch { pipeline, scene, pass, args, .. } = *dispatch;
         self.barrier(barriers, &barriers::accesses(scene, pass, args));
         let Some(args) = &self.context.faults.args(pass, scene, args) else { return Ok(()) };
-        let work = &Dispatch { args, ..*work };
+        let dispatch = &Dispatch { args, ..*dispatch };
         self.context.begin_label(self.commands, pass.name);
         let block = interface_check::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, args));
         let offset = self.place_params(&block)?;
-        self.bind(work, offset, block.len() as u64)?;
+        self.bind(dispatch, offset, block.len() as u64)?;
         let extent = self.context.faults.invocations(pass, scene, args);
         let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
         let (device, commands) = (&self.context.device, self.commands);
-        // Before any query begins: lavapipe looks at the pipeline then.
+        // Before any query begins, because lavapipe reads the pipeline then.
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
-        let dispatch = || {
+        let repeat = || {
             for n in 0..self.context.faults.times(pass.name) {
-                // One that is slow is so one after the other, also where there is room for several at once.
+                // Repetitions of a slowed pass must not overlap.
                 if n > 0 {
                     flush(device, commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
                 }
@@ -210,8 +216,8 @@ impl Recorder {
             }
         };
         match &mut self.stamps {
-            Some(stamps) => stamps.dispatch(commands, pass.name, dispatch),
-            None => dispatch(),
+            Some(stamps) => stamps.dispatch(commands, pass.name, repeat),
+            None => repeat(),
         }
         self.flush_timestamps();
         self.context.counts.dispatches.fetch_add(1, Ordering::Relaxed);
@@ -222,6 +228,7 @@ impl Recorder {
         Ok(())
     }
 
+    /// Copies parameters into the uniform buffer; returns their byte offset.
     fn place_params(&mut self, block: &[u8]) -> Result<u64, GpuError> {
         let alignment = self.context.limits.min_uniform_buffer_offset_alignment.max(16);
         let offset = self.params_used.next_multiple_of(alignment);
@@ -238,6 +245,7 @@ impl Recorder {
         Ok(offset)
     }
 
+    /// Writes a time stamp; the work since the last one is called `name`.
     pub fn stamp(&mut self, name: &'static str) {
         if let Some(stamps) = &mut self.stamps {
             stamps.end_of(self.commands, name);
@@ -250,7 +258,7 @@ impl Recorder {
     }
 }
 
-/// Everything before it is done, and what was written is there for `memory` behind it.
+/// Records a barrier: everything before it is done, and its writes are visible to `memory` accesses after it.
 fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFlags2) {
     let barrier = [vk::MemoryBarrier2::default()
         .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
@@ -262,7 +270,7 @@ fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFl
     unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
 }
 
-/// Where a binding's entry is while a dispatch is bound.
+/// The index of a binding's descriptor in the list of its kind.
 enum DescriptorInfo {
     Image(usize),
     Buffer(usize),
@@ -270,13 +278,14 @@ enum DescriptorInfo {
 }
 
 impl Recorder {
-    fn bind(&mut self, work: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
-        let Dispatch { slots, pipeline, scene, pass, args } = *work;
+    /// Binds the slots by the names that the shader gives them, and the parameters.
+    fn bind(&mut self, dispatch: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
+        let Dispatch { slots, pipeline, scene, pass, args } = *dispatch;
         let binds = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
         let mut images = Vec::with_capacity(binds.len());
         let mut buffers = Vec::with_capacity(binds.len());
         let mut texels = Vec::with_capacity(binds.len());
-        // Which of the three lists a binding's entry went to, and where.
+        // For each binding, the index of its descriptor.
         let mut places = Vec::with_capacity(binds.len());
         for binding in &pipeline.module.bindings {
             let bound = binds.iter().find(|b| b.name == binding.name);
@@ -313,11 +322,11 @@ impl Recorder {
                         image_layout: vk::ImageLayout::GENERAL,
                     }]);
                 }
-                // The contract of pass and shader was checked when the pipeline was made.
+                // Cannot happen: the interface of pass and shader was checked when the pipeline was made.
                 (_, None) => {}
             }
         }
-        // Pushed descriptors go to no set.
+        // Push descriptors need no set.
         let set = match self.context.push_descriptor {
             Some(_) => vk::DescriptorSet::null(),
             None => self.sets.take(pipeline)?,
@@ -354,14 +363,15 @@ impl Recorder {
 }
 
 impl Recorder {
-    /// New images from UNDEFINED to GENERAL, and all their bits to zero: pixels outside the sector are never written again.
+    /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
+    /// sector.
     pub fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &Slots, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
         let transitions: Vec<_> = images
             .iter()
             .map(|(image, ..)| {
-                // The memory may have been another image's a moment ago.
+                // The memory may have belonged to another image before.
                 vk::ImageMemoryBarrier2::default()
                     .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
                     .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
@@ -396,7 +406,7 @@ impl Recorder {
         }
     }
 
-    /// Bytes of a staging buffer into parts of an image: layers of an array, slices of a 3D image.
+    /// Copies a staging buffer into layers or slices of an image.
     pub fn copy_in(&mut self, barriers: &mut BarrierRecorder, from: &Buffer, image: &Image, to: SlotParts) {
         let parts = to.parts.clone();
         self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
@@ -412,7 +422,7 @@ impl Recorder {
         }
     }
 
-    /// A whole image into the readback buffer, made visible to the host.
+    /// Copies a complete image into the readback buffer and makes it visible to the host.
     pub fn copy_out(&mut self, barriers: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
         let parts = image.shape.parts();
         let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
@@ -433,6 +443,7 @@ impl Recorder {
     }
 }
 
+/// The copy region of `parts` layers or slices, from `part` on.
 fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
     let is_volume = image.extent.depth > 1 || matches!(image.shape, Shape::Three(_));
     let (layer, layers, z, depth) = if is_volume { (0, 1, part, parts) } else { (part, parts, 0, 1) };

@@ -47,7 +47,7 @@ impl Cine {
     }
 
     /// True if the volumes have so many frames.
-    pub fn is_of(&self, slices: usize) -> bool {
+    pub(crate) fn is_of(&self, slices: usize) -> bool {
         self.slices == slices
     }
 
@@ -67,7 +67,7 @@ impl Cine {
     }
 
     /// Removes the volume that is being filled: its remaining frames will not come.
-    pub fn discard_partial(&mut self) {
+    pub(crate) fn discard_partial(&mut self) {
         (self.filling, self.partial) = (None, None);
     }
 

@@ -152,7 +152,7 @@ impl Feed {
     }
 
     /// True if a complete volume has arrived after this one and the source cannot wait: then this one need not be drawn.
-    pub fn is_behind(&self, volume: u32) -> bool {
+    pub(crate) fn is_behind(&self, volume: u32) -> bool {
         !self.can_wait && self.shared.lock().newest.is_some_and(|newest| newest > volume.saturating_add(1))
     }
 

@@ -68,7 +68,7 @@ impl Phase {
     }
 
     /// One of the queued events was taken; `is_empty`: there was none left.
-    pub fn drained(&mut self, is_empty: bool) {
+    pub(crate) fn drained(&mut self, is_empty: bool) {
         if let Phase::Draining { events, replay } = self {
             *events = if is_empty { 0 } else { events.saturating_sub(1) };
             if *events == 0 {
@@ -78,7 +78,7 @@ impl Phase {
     }
 
     /// Starts a replay. It takes the place of one that has not finished.
-    pub fn start_replay(&mut self, new: Replay) {
+    pub(crate) fn start_replay(&mut self, new: Replay) {
         match self {
             Phase::Idle | Phase::Replaying(_) => *self = Phase::Replaying(new),
             Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => *replay = Some(new),
@@ -86,7 +86,7 @@ impl Phase {
     }
 
     /// Ends a replay, finished or not.
-    pub fn take_replay(&mut self) -> Option<Replay> {
+    pub(crate) fn take_replay(&mut self) -> Option<Replay> {
         match self {
             Phase::Idle => None,
             Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => replay.take(),
@@ -105,7 +105,7 @@ impl Phase {
         }
     }
 
-    pub fn replay_mut(&mut self) -> Option<&mut Replay> {
+    pub(crate) fn replay_mut(&mut self) -> Option<&mut Replay> {
         match self {
             Phase::Idle => None,
             Phase::Drawing { replay, .. } | Phase::Draining { replay, .. } => replay.as_mut(),
@@ -141,7 +141,7 @@ impl<T> Pending<T> {
         matches!(self, Pending::None)
     }
 
-    pub fn is_ready(&self) -> bool {
+    pub(crate) fn is_ready(&self) -> bool {
         matches!(self, Pending::Ready(_))
     }
 }
@@ -166,7 +166,7 @@ impl Display {
     }
 
     /// The last picture no longer shows what it should.
-    pub fn invalidate(&mut self) {
+    pub(crate) fn invalidate(&mut self) {
         if let Display::Current(volume) = *self {
             *self = Display::Stale(volume);
         }

@@ -133,7 +133,7 @@ impl Session {
     }
 
     /// A frame of `volume` is in volume image `image`.
-    pub fn frame_arrived(&mut self, image: u32, volume: u32, at: Instant) {
+    pub(crate) fn frame_arrived(&mut self, image: u32, volume: u32, at: Instant) {
         let (previous, arrived) = &mut self.arrived[image as usize];
         // Arrivals of a volume that was never shown are discarded. A rolling volume takes the frames of all.
         if *previous != volume && !self.pool.is_rolling() {
@@ -211,17 +211,17 @@ impl Session {
     }
 
     /// The volume on display, or the next one to be.
-    pub fn current_volume(&self) -> Option<u32> {
+    pub(crate) fn current_volume(&self) -> Option<u32> {
         self.pool.waiting().or(self.display.volume()).or(self.to_restore)
     }
 
     /// The volume that is being sent again, if any.
-    pub fn replayed_volume(&self) -> Option<u32> {
+    pub(crate) fn replayed_volume(&self) -> Option<u32> {
         self.phase.replay().map(|replay| replay.volume.volume)
     }
 
     /// True if a step has work to do without any event of the source. A replay is not counted.
-    pub fn is_busy(&self) -> bool {
+    pub(crate) fn is_busy(&self) -> bool {
         matches!(self.phase, Phase::Drawing { .. } | Phase::Draining { .. })
             || self.pending.is_ready()
             || self.refused.is_some()
@@ -265,7 +265,7 @@ impl Session {
     }
 
     /// Starts to send a volume again, instead of one that is being sent. Without a free volume image nothing happens.
-    pub fn start_replay(&mut self, volume: CineVolume) {
+    pub(crate) fn start_replay(&mut self, volume: CineVolume) {
         let image = match self.phase.replay() {
             Some(replay) => Some(replay.image),
             None => self.pool.spare(),
@@ -276,7 +276,7 @@ impl Session {
     }
 
     /// Shows a volume again that changed settings or another device discarded, if the cine loop has it; otherwise the newest of the loop.
-    pub fn restore(&mut self, volume: u32, cine: &Cine) {
+    pub(crate) fn restore(&mut self, volume: u32, cine: &Cine) {
         let volumes = cine.volumes();
         if let Some(volume) = volumes.iter().find(|kept| kept.volume == volume).or(volumes.back()) {
             self.start_replay(volume.clone());
@@ -284,7 +284,7 @@ impl Session {
     }
 
     /// Sends the next frames of the replay.
-    pub fn continue_replay(&mut self) -> Result<(), GpuError> {
+    pub(crate) fn continue_replay(&mut self) -> Result<(), GpuError> {
         let Some(replay) = self.phase.replay_mut() else { return Ok(()) };
         let (frames, image) = (&replay.volume.frames, replay.image);
         for frame in frames.iter().skip(replay.sent).take(REPLAY_FRAMES) {

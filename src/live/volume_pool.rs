@@ -81,14 +81,14 @@ impl VolumePool {
     }
 
     /// The contents of all images are discarded.
-    pub fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.end();
         self.counts.dropped += u64::from(self.is_waiting() && !self.is_replay);
         (self.ready, self.shown, self.replay) = (None, None, None);
     }
 
     /// True if a complete volume waits to be shown; never for a rolling one.
-    pub fn is_waiting(&self) -> bool {
+    pub(crate) fn is_waiting(&self) -> bool {
         self.update == Update::Whole && self.ready.is_some()
     }
 
@@ -98,11 +98,11 @@ impl VolumePool {
     }
 
     /// True if there is anything new to show.
-    pub fn has_new(&self) -> bool {
+    pub(crate) fn has_new(&self) -> bool {
         self.ready.is_some()
     }
 
-    pub fn is_rolling(&self) -> bool {
+    pub(crate) fn is_rolling(&self) -> bool {
         self.update == Update::Rolling
     }
 
@@ -112,13 +112,13 @@ impl VolumePool {
     }
 
     /// Continues the counts of the pool of another geometry or device. Its volumes that were not shown are dropped.
-    pub fn continue_from(&mut self, mut previous: VolumePool) {
+    pub(crate) fn continue_from(&mut self, mut previous: VolumePool) {
         previous.forget();
         (self.counts, self.over) = (previous.counts, previous.over);
     }
 
     /// Another source begins, which may number its volumes from 0 again.
-    pub fn restart_numbering(&mut self) {
+    pub(crate) fn restart_numbering(&mut self) {
         self.end();
         self.over = None;
     }

@@ -1,4 +1,4 @@
-//! A rendered 2D result, and its way to and from a file.
+//! Pictures in memory and their files: rendered pictures (RGBA), and grey pictures for the 2D filters.
 
 pub mod regions;
 
@@ -12,10 +12,10 @@ use image::{ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Longest file of a picture that is read, bytes: what its pixels may take, too.
+/// Maximum size of a picture file, bytes; also the maximum memory for its pixels.
 const MAX_BYTES: u64 = 512 << 20;
 
-/// 8-bit red, green, blue, alpha; rows from the top.
+/// A picture of 8-bit red, green, blue, alpha; rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     pub width: u32,
@@ -24,10 +24,10 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The picture as a PNG, opaque; grey where it is.
+    /// Encodes an opaque PNG; with one channel if all pixels are grey.
     ///
     /// # Errors
-    /// One line: it has no pixels, or not as many as its size says.
+    /// One line: there are no pixels, or their number does not match the size.
     pub fn png(&self) -> Result<Vec<u8>, String> {
         let pixels = self.width as usize * self.height as usize;
         if pixels == 0 || self.rgba.len() != 4 * pixels {
@@ -44,7 +44,7 @@ impl Picture {
         Ok(bytes)
     }
 
-    /// Writes a PNG beside the target first and renames it: a full disk leaves the old picture as it was.
+    /// Writes a PNG. It is written to a temporary file and renamed, so that a full disk leaves the old picture intact.
     ///
     /// # Errors
     /// One line naming the file and the fault.
@@ -59,7 +59,7 @@ impl Picture {
     /// One line naming the file and the fault. Files and pixels of more than 512 MiB are refused, whatever the file claims.
     pub fn load(file: &Path) -> Result<Picture, String> {
         let bytes = files::read(file, MAX_BYTES, "picture").map_err(|e| format!("{}: {e}", file.display()))?;
-        // With the limits of the library.
+        // The library limits memory.
         let image = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png).decode();
         let image = image.map_err(|e| format!("{}: cannot be read: {}", file.display(), printable(&e.to_string())))?;
         let rgba = image.to_rgba8();
@@ -67,30 +67,30 @@ impl Picture {
     }
 }
 
-/// A picture of one channel; rows from the top.
+/// A picture of one channel of 8 or 16 bits; rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grey {
     pub width: u32,
     pub height: u32,
-    /// Values run to 65535, not to 255.
+    /// True for values to 65535, false for values to 255.
     pub sixteen: bool,
     pub values: Vec<u16>,
-    /// Brightness of a picture that had colours.
+    /// True if the values are the brightness of a colour picture.
     pub from_colour: bool,
 }
 
 impl Grey {
     /// Reads PNG, JPEG, PNM or BMP of 8 or 16 bits. Colour becomes brightness by the weights of Rec. 709 on the stored
-    /// (gamma-coded) values, so that grey stored as colour keeps its values; transparency is left out.
+    /// (gamma-coded) values, so that grey stored as colour keeps its values; transparency is ignored.
     ///
     /// # Errors
     /// One line naming the file and the fault. Files and pixels of more than 512 MiB are refused, whatever the file claims.
     pub fn load(file: &Path) -> Result<Grey, String> {
-        // The library's messages may have several lines, and what the file says in them.
+        // Messages of the library may have several lines and contain text of the file.
         let fault =
             |e: &dyn std::fmt::Display| format!("{}: cannot be read: {}", file.display(), printable(&e.to_string()));
         let bytes = files::read(file, MAX_BYTES, "picture").map_err(|e| format!("{}: {e}", file.display()))?;
-        // What it holds decides, not what it is called.
+        // The contents decide, not the file name.
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| fault(&e))?;
         if !reader.format().is_some_and(|f| f.reading_enabled()) {
             return Err(fault(&"is no picture of a known format; PNG, JPEG, PNM and BMP are read"));
@@ -116,23 +116,23 @@ impl Grey {
         Ok(Grey { width, height, sixteen, values, from_colour: colour.has_color() })
     }
 
-    /// Value that is white.
+    /// The value of white.
     pub fn white(&self) -> f64 {
         if self.sixteen { 65535.0 } else { 255.0 }
     }
 
-    /// The values in 0..1.
+    /// The values scaled to 0..1.
     pub fn shares(&self) -> Vec<f64> {
         self.values.iter().map(|v| f64::from(*v) / self.white()).collect()
     }
 
-    /// The same picture with other values in 0..1, each rounded to the nearest that it can hold.
+    /// The same picture with other values in 0..1, each rounded to the nearest stored value.
     pub fn with(&self, shares: &[f64]) -> Grey {
         let values = shares.iter().map(|v| (v.clamp(0.0, 1.0) * self.white()).round() as u16).collect();
         Grey { values, ..*self }
     }
 
-    /// The samples as a frame stores them: little-endian.
+    /// The samples as stored in a frame, little-endian.
     pub fn bytes(&self) -> Vec<u8> {
         match self.sixteen {
             true => self.values.iter().flat_map(|v| v.to_le_bytes()).collect(),
@@ -140,14 +140,14 @@ impl Grey {
         }
     }
 
-    /// Writes a grey PNG of 8 or 16 bits, in the place of an old file only when it is whole.
+    /// Writes a grey PNG of 8 or 16 bits. It replaces an old file only when complete.
     ///
     /// # Errors
     /// One line naming the file and the fault.
     pub fn save(&self, file: &Path) -> Result<(), String> {
         let mut png = Vec::new();
         let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive);
-        // The encoder takes 16 bits in the machine's own order.
+        // The encoder takes 16 bits in native byte order.
         let (texels, colour) = match self.sixteen {
             true => (self.values.iter().flat_map(|v| v.to_ne_bytes()).collect(), ExtendedColorType::L16),
             false => (self.bytes(), ExtendedColorType::L8),

@@ -1,5 +1,5 @@
-//! How much a filter smooths and what contrast it leaves: signal-to-noise and contrast-to-noise ratios of rectangles of a
-//! picture (thesis 5.6).
+//! Signal-to-noise and contrast-to-noise ratios of rectangles of a picture, to measure how a filter smooths and preserves contrast
+//! (thesis 5.6).
 
 use std::fmt::Write as _;
 use std::str::FromStr;
@@ -28,7 +28,7 @@ impl FromStr for Region {
     }
 }
 
-/// Mean and standard deviation (of all pixels, not of a sample of them), 0..1.
+/// Mean and population standard deviation of the pixels, 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
     pub mean: f64,
@@ -36,8 +36,10 @@ pub struct Level {
 }
 
 impl Region {
+    /// Checks that the region is within a picture of `size` pixels.
+    ///
     /// # Errors
-    /// The region leaves a picture of that size.
+    /// It is not.
     pub fn check(&self, size: [u32; 2]) -> Result<(), String> {
         let [right, lower] = [0, 1].map(|i| u64::from(self.at[i]) + u64::from(self.size[i]));
         match right <= u64::from(size[0]) && lower <= u64::from(size[1]) {
@@ -46,7 +48,7 @@ impl Region {
         }
     }
 
-    /// Of a picture `width` pixels wide that holds the region.
+    /// Mean and deviation of the region in a picture `width` pixels wide, which must contain it.
     pub fn level(&self, values: &[f64], width: u32) -> Level {
         let row = |y: u32| {
             let from = (self.at[1] + y) as usize * width as usize + self.at[0] as usize;
@@ -61,19 +63,19 @@ impl Region {
 }
 
 impl Level {
-    /// Signal-to-noise ratio: mean over standard deviation; none without noise.
+    /// Signal-to-noise ratio: mean over standard deviation; None without noise.
     pub fn snr(&self) -> Option<f64> {
         (self.deviation > 0.0).then(|| self.mean / self.deviation)
     }
 
-    /// Contrast-to-noise ratio against another region: |m1 - m2| / sqrt(s1^2 + s2^2); none without noise.
+    /// Contrast-to-noise ratio against another region: |m1 - m2| / sqrt(s1^2 + s2^2); None without noise.
     pub fn cnr(&self, other: &Level) -> Option<f64> {
         let noise = self.deviation.hypot(other.deviation);
         (noise > 0.0).then(|| (self.mean - other.mean).abs() / noise)
     }
 }
 
-/// Levels and ratios of the regions before and after a filter.
+/// A table of the levels and ratios of a region and its background before and after a filter.
 pub fn table(before: &[f64], after: &[f64], width: u32, region: &Region, background: Option<&Region>) -> String {
     let mut text = format!("{:<22} {:>8} {:>8} {:>8} {:>8}\n", "", "mean", "sd", "SNR", "CNR");
     let ratio = |r: Option<f64>| r.map_or("no noise".into(), |r| format!("{r:.3}"));
@@ -99,7 +101,7 @@ mod tests {
 
     #[test]
     fn ratios_follow_their_formulas() {
-        // A checkerboard of 0.2 and 0.6 beside a plane of 0.9.
+        // A checkerboard of 0.2 and 0.6 next to a plane of 0.9.
         let values: Vec<f64> = (0..8 * 4).map(|i| if i % 8 >= 4 { 0.9 } else { [0.2, 0.6][(i + i / 8) % 2] }).collect();
         let (board, plane): (Region, Region) = ("0,0,4,4".parse().unwrap(), "4, 1,4,3".parse().unwrap());
         let (a, b) = (board.level(&values, 8), plane.level(&values, 8));

@@ -2,13 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Strictly increasing positions: angles in rad or places in mm, one an index.
+/// Strictly increasing positions along an axis, one for each index: angles in rad or lengths in mm.
 ///
-/// An even axis has the closed inverse `(v - first) / pitch`; a table is inverted by bracketing and interpolating,
-/// which is what uneven Kretz tables need.
+/// The inverse of a uniform axis is `(v - first) / pitch`. A table, as Kretz files have it, is inverted by bracketing and linear
+/// interpolation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Axis {
+    /// Uniformly spaced: `first + pitch * index`.
     Even { first: f64, pitch: f64, count: usize },
+    /// Any spacing.
     Table(Vec<f64>),
 }
 
@@ -19,7 +21,7 @@ impl Axis {
         Axis::Even { first, pitch, count }
     }
 
-    /// A table, or the even axis it is to within 1e-9 of its span: readers hand over tables that are even in all but name.
+    /// A table, or the uniform axis that it equals to within 1e-9 of its span: many files store uniform positions as tables.
     pub fn from_table(table: Vec<f64>) -> Axis {
         let count = table.len();
         if count < 2 {
@@ -32,6 +34,7 @@ impl Axis {
         if even { Axis::Even { first, pitch, count } } else { Axis::Table(table) }
     }
 
+    /// Number of positions.
     pub fn len(&self) -> usize {
         match self {
             Axis::Even { count, .. } => *count,
@@ -43,10 +46,12 @@ impl Axis {
         self.len() == 0
     }
 
+    /// First position; 0 of an empty table.
     pub fn first(&self) -> f64 {
         self.at(0.0)
     }
 
+    /// Last position.
     pub fn last(&self) -> f64 {
         self.at(self.len().saturating_sub(1) as f64)
     }
@@ -60,7 +65,7 @@ impl Axis {
         }
     }
 
-    /// Position at a fractional index; continued in a straight line beyond both ends.
+    /// Position at a fractional index. Beyond both ends it is extrapolated linearly.
     pub fn at(&self, index: f64) -> f64 {
         match self {
             Axis::Even { first, pitch, .. } => first + pitch * index,
@@ -84,7 +89,7 @@ impl Axis {
         }
     }
 
-    /// Finite and strictly increasing.
+    /// True if the positions are finite and strictly increasing, and there is at least one.
     pub fn is_valid(&self) -> bool {
         match self {
             Axis::Even { first, pitch, count } => {
@@ -126,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn centred_positions_lie_alike_to_both_sides() {
+    fn centred_positions_are_symmetric() {
         let positions = |axis: &Axis| (0..axis.len()).map(|i| axis.at(i as f64)).collect::<Vec<_>>();
         assert_eq!(positions(&Axis::centred(0.5, 4)), [-0.75, -0.25, 0.25, 0.75]);
         assert_eq!(positions(&Axis::centred(3.0, 3)), [-3.0, 0.0, 3.0]);
@@ -134,20 +139,20 @@ mod tests {
         assert!(Axis::centred(3.0, 0).is_empty() && !Axis::centred(3.0, 1).is_empty());
     }
 
-    /// A table from -5 to 15 is even where each entry is to 2e-8.
+    /// A table from -5 to 15 counts as uniform if each entry is, to 2e-8.
     #[test]
     fn a_table_is_even_to_a_thousand_millionth_of_its_span() {
-        let bent = |by: f64| Axis::from_table(vec![-5.0, 5.0 + by, 15.0]);
-        assert_eq!(bent(1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
-        assert_eq!(bent(-1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
-        assert!(matches!(bent(2.5e-8), Axis::Table(_)) && matches!(bent(-2.5e-8), Axis::Table(_)));
+        let shifted = |by: f64| Axis::from_table(vec![-5.0, 5.0 + by, 15.0]);
+        assert_eq!(shifted(1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
+        assert_eq!(shifted(-1.5e-8), Axis::Even { first: -5.0, pitch: 10.0, count: 3 });
+        assert!(matches!(shifted(2.5e-8), Axis::Table(_)) && matches!(shifted(-2.5e-8), Axis::Table(_)));
         assert_eq!(Axis::from_table(vec![3.0, 7.0]), Axis::Even { first: 3.0, pitch: 4.0, count: 2 });
         assert_eq!(Axis::from_table(vec![7.0]), Axis::Even { first: 7.0, pitch: 1.0, count: 1 });
         assert_eq!(Axis::from_table(Vec::new()).len(), 0);
     }
 
     #[test]
-    fn the_pitch_of_a_table_is_the_mean_and_that_of_one_position_none() {
+    fn the_pitch_of_a_table_is_the_mean_and_of_one_position_zero() {
         let table = Axis::Table(vec![-2.0, 0.5, 4.0]);
         assert_eq!((table.len(), table.first(), table.last(), table.pitch()), (3, -2.0, 4.0, 3.0));
         let even = Axis::Even { first: -2.0, pitch: 0.5, count: 2 };
@@ -158,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_go_on_in_a_straight_line_beyond_both_ends() {
+    fn tables_are_extrapolated_linearly() {
         let table = Axis::Table(vec![-1.0, 1.0, 2.0, 6.0]);
         for (index, position) in
             [(0.0, -1.0), (0.5, 0.0), (1.0, 1.0), (1.5, 1.5), (2.25, 3.0), (-1.0, -3.0), (4.0, 10.0)]

@@ -1,21 +1,22 @@
-//! The probe file: a TOML that says where the scan lines and frames of a recording lie. Lengths in mm, angles in degrees.
+//! The probe file: a TOML file with the positions of the scan lines and frames of a recording. Lengths in mm, angles in degrees.
 //!
-//! The numbers of samples, lines and frames are not in it: they come from the recording.
+//! The numbers of samples, lines and frames are not in it. They come from the recording.
 
-use super::geometry::GeometryError;
+use super::axis::Axis;
+use super::geometry::{Advance, Array, GeometryError, Motion, Probe};
 use super::motor::MotorTable;
-use super::{Advance, Array, Axis, Motion, Probe, Volumes};
+use super::volumes::Volumes;
 use crate::files::{self, InputError};
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Longest probe file, in bytes.
+/// Largest probe file, bytes.
 const MAX_BYTES: u64 = 1 << 20;
-/// Thickness of the slab that a lone frame is drawn as, mm.
+/// Thickness of the slab that a single frame is drawn as, mm.
 pub(crate) const SLAB: f64 = 1.0;
 
-/// A probe file as written. `tests/data/*/probe.toml` are commented examples.
+/// A probe file that was read. `tests/data/*/probe.toml` are commented examples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeFile {
     path: PathBuf,
@@ -23,7 +24,11 @@ pub struct ProbeFile {
 }
 
 impl ProbeFile {
-    /// Reads and checks all that can be checked without the recording.
+    /// Reads a probe file and checks everything that can be checked without the recording.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is larger than 1 MiB or is not TOML, unknown keys, and numbers out of their range: one line that
+    /// names the file and the field.
     pub fn read(path: &Path) -> Result<ProbeFile, InputError> {
         let text = files::read_text(path, MAX_BYTES, "probe file").map_err(|e| InputError::new(path, "file", e))?;
         ProbeFile::parse(path, &text)
@@ -38,10 +43,10 @@ impl ProbeFile {
         ProbeFile { path: path.into(), tables }.checked()
     }
 
-    /// The same tables as JSON objects, from within what `path` names.
+    /// As [`ProbeFile::read`], from the tables as JSON objects. `path` names their origin in messages.
     ///
     /// # Errors
-    /// As of [`ProbeFile::read`].
+    /// As [`ProbeFile::read`].
     pub fn from_json(path: &Path, tables: serde_json::Value) -> Result<ProbeFile, InputError> {
         let tables = serde_json::from_value(tables).map_err(|e| InputError::new(path, "probe", e.to_string()))?;
         ProbeFile { path: path.into(), tables }.checked()
@@ -52,8 +57,8 @@ impl ProbeFile {
         Ok(self)
     }
 
-    /// The probe file beside a recording: `<stem>.probe.toml`, which is for this recording alone, or else `probe.toml`,
-    /// which is for all in its folder.
+    /// The probe file in the folder of a recording: `<stem>.probe.toml`, which is for this recording alone, otherwise `probe.toml`,
+    /// which is for all recordings of the folder.
     pub fn find_for(recording: &Path) -> Option<PathBuf> {
         let own = recording.file_stem().map(|stem| {
             let mut name = stem.to_os_string();
@@ -63,23 +68,24 @@ impl ProbeFile {
         own.into_iter().chain([recording.with_file_name("probe.toml")]).find(|p| p.is_file())
     }
 
+    /// The file that was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Sample values that are to be shown as 0 and 1, in the recording's own units.
+    /// Sample values that are shown as 0 and 1, in the unit of the recording; None if the file has none.
     pub fn range(&self) -> Option<[f64; 2]> {
         self.tables.samples.range
     }
 
-    /// What the frames of a fan lie over, from the first to the last, degrees.
+    /// Angle from the first to the last frame of a fan, degrees.
     pub fn fan_angle(&self) -> Option<f64> {
         let motion = &self.tables.motion;
         let table = motion.frame_angles_deg.as_ref().and_then(|table| Some(table.last()? - table.first()?));
         motion.fan_angle_deg.or(table)
     }
 
-    /// How the motor is driven, where the file says so.
+    /// The `[motor]` table, if the file has one.
     pub fn motor(&self) -> Option<&MotorTable> {
         self.tables.motor.as_ref()
     }
@@ -92,7 +98,7 @@ impl ProbeFile {
         let (lines, motion) = (&self.tables.lines, &self.tables.motion);
         let curved = self.tables.array.kind == ArrayKind::Curved;
         let (fan, translated) = (motion.kind == MotionKind::Fan, motion.kind == MotionKind::Translated);
-        // Field, its value, may it be zero, does it belong to this kind of probe.
+        // Field, its value, may it be zero, does it apply to this kind of probe.
         let numbers = [
             ("array.radius_mm", self.tables.array.radius_mm, true, curved),
             ("lines.sector_angle_deg", lines.sector_angle_deg, false, curved),
@@ -107,10 +113,10 @@ impl ProbeFile {
             ("motion.speed_ratio", Some(motion.speed_ratio), true, true),
             ("sound.speed_m_per_s", Some(self.tables.sound.speed_m_per_s), false, true),
         ];
-        for (field, value, zero, belongs) in numbers {
+        for (field, value, zero, applies) in numbers {
             let Some(value) = value else { continue };
-            if !belongs {
-                return self.fault(field, "does not belong to this kind of array or motion");
+            if !applies {
+                return self.fault(field, "does not apply to this kind of array or motion");
             }
             if !value.is_finite() || value < 0.0 || (value == 0.0 && !zero) {
                 let least = if zero { "of at least 0" } else { "above 0" };
@@ -123,9 +129,9 @@ impl ProbeFile {
             ("motion.frame_angles_deg", &motion.frame_angles_deg, fan),
             ("motion.frame_positions_mm", &motion.frame_positions_mm, translated),
         ];
-        for (field, table, belongs) in tables {
-            if table.is_some() && !belongs {
-                return self.fault(field, "does not belong to this kind of array or motion");
+        for (field, table, applies) in tables {
+            if table.is_some() && !applies {
+                return self.fault(field, "does not apply to this kind of array or motion");
             }
         }
         if motion.speed_ratio > 1.0 {
@@ -145,8 +151,11 @@ impl ProbeFile {
         }
     }
 
-    /// The probe, swept forwards without [`Advance`], and the volumes of a recording of so many samples a line, lines a
-    /// frame, and frames. See [`Volumes::advance`] for what the motion adds to each volume.
+    /// The probe, without [`Advance`], and the volumes of a recording with so many samples a line, lines a frame, and frames.
+    /// [`Volumes::advance`] gives the advance of each volume.
+    ///
+    /// # Errors
+    /// Tables of another length, fewer frames than one volume, and numbers that make no valid [`Probe`].
     pub fn geometry(&self, samples: usize, lines: usize, frames: usize) -> Result<(Probe, Volumes), InputError> {
         let volumes = self.volumes(frames)?;
         let (motion, slices) = self.motion(volumes.frames)?;
@@ -225,7 +234,7 @@ impl ProbeFile {
                 (Motion::Fan { wobble_radius }, slices)
             }
         };
-        // One frame has no sweep to lie in: it is drawn as a slab.
+        // A single frame is no sweep: it is drawn as a slab.
         if frames == 1 { Ok((slab, Axis::centred(1.0, 1))) } else { Ok((kind, slices)) }
     }
 
@@ -273,11 +282,12 @@ pub(crate) fn geometry_error(file: &Path, error: &GeometryError) -> InputError {
     InputError::new(file, error.field, &error.fault)
 }
 
-/// `count` positions over `span`, first to last, centred on zero. One position lies in the middle.
+/// `count` positions over `span`, from first to last, centred on zero. A single position is at zero.
 fn spread(span: f64, count: usize) -> Axis {
     if count < 2 { Axis::centred(1.0, 1) } else { Axis::centred(span / (count - 1) as f64, count) }
 }
 
+/// The tables of a probe file, one struct each. Unknown keys are errors, so that a misspelt key is not silently ignored.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Tables {
@@ -382,15 +392,16 @@ struct SamplesTable {
     range: Option<[f64; 2]>,
 }
 
-/// What is apart by no more, in rad or mm, is the same place: a file says angles in degrees.
-const SAME: f64 = 1e-9;
+/// Positions that differ by no more, in rad or mm, are equal: converting angles to degrees and back rounds.
+const POSITION_TOLERANCE: f64 = 1e-9;
 
 impl ProbeFile {
-    /// The text that [`ProbeFile::read`] and [`ProbeFile::geometry`] make this probe and these volumes of again. `range`: the values that are
-    /// shown as 0 and 1. The probe is that of the first volume.
+    /// The text of a probe file that [`ProbeFile::read`] and [`ProbeFile::geometry`] turn into this probe and these volumes again.
+    /// `probe`: of the first volume. `range`: the values that are shown as 0 and 1.
     ///
     /// # Errors
-    /// A probe that no file can say: an advance that is not the motor's at an even speed, tables longer than a file may be; in words.
+    /// In words, a probe that no file can describe: an advance that is not that of a motor at constant speed, or tables that are longer
+    /// than a file may be.
     pub fn to_toml(probe: &Probe, volumes: &Volumes, range: [f64; 2]) -> Result<String, String> {
         let gap = probe.slices.at(1.0) - probe.slices.at(0.0);
         let advance = probe.slice_position(probe.lines.len() as f64, 0.0) - probe.slice_position(0.0, 0.0);
@@ -398,11 +409,11 @@ impl ProbeFile {
         let text = written(probe, &Volumes { speed_ratio, ..volumes.clone() }, range);
         let read = ProbeFile::parse(Path::new("probe.toml"), &text)
             .and_then(|file| file.geometry(probe.samples, probe.lines.len(), volumes.frames * volumes.count));
-        let (read, there) = read.map_err(|e| format!("{}: {}", e.field(), e.fault()))?;
-        let read = Probe { advance: there.advance(0, &read.slices), ..read };
+        let (read, read_volumes) = read.map_err(|e| format!("{}: {}", e.field(), e.fault()))?;
+        let read = Probe { advance: read_volumes.advance(0, &read.slices), ..read };
         match is_same(probe, &read) && text.len() as u64 <= MAX_BYTES {
             true => Ok(text),
-            false => Err("cannot be said by a probe file".into()),
+            false => Err("cannot be described by a probe file".into()),
         }
     }
 }
@@ -448,9 +459,9 @@ fn angles(even: &str, table: &str, positions: &Axis) -> String {
     axis((even, span), table, positions, 180.0 / std::f64::consts::PI)
 }
 
-/// One number for positions that are even and centred, otherwise all of them.
+/// One number for positions that are uniform and centred, otherwise all of them.
 fn axis((even, number): (&str, f64), table: &str, positions: &Axis, scale: f64) -> String {
-    let is_centred = (positions.first() + positions.last()).abs() <= SAME;
+    let is_centred = (positions.first() + positions.last()).abs() <= POSITION_TOLERANCE;
     match positions {
         Axis::Even { .. } if is_centred => format!("{even} = {number:?}"),
         _ => {
@@ -462,10 +473,10 @@ fn axis((even, number): (&str, f64), table: &str, positions: &Axis, scale: f64) 
 }
 
 fn is_same(a: &Probe, b: &Probe) -> bool {
-    let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(1.0);
+    let equal = |a: f64, b: f64| (a - b).abs() <= POSITION_TOLERANCE * a.abs().max(1.0);
     let kinds = match (a.motion, b.motion) {
-        (Motion::Fan { wobble_radius: a }, Motion::Fan { wobble_radius: b }) => near(a, b),
-        (Motion::Still { thickness: a }, Motion::Still { thickness: b }) => near(a, b),
+        (Motion::Fan { wobble_radius: a }, Motion::Fan { wobble_radius: b }) => equal(a, b),
+        (Motion::Still { thickness: a }, Motion::Still { thickness: b }) => equal(a, b),
         (a, b) => a == b,
     };
     let sizes = |p: &Probe| [p.samples, p.lines.len(), p.slices.len()];
@@ -474,11 +485,11 @@ fn is_same(a: &Probe, b: &Probe) -> bool {
     kinds
         && std::mem::discriminant(&a.array) == std::mem::discriminant(&b.array)
         && sizes(a) == sizes(b)
-        && numbers(a).into_iter().zip(numbers(b)).all(|(a, b)| near(a, b))
-        && (0..a.lines.len()).map(|k| k as f64).all(|k| near(a.lines.at(k), b.lines.at(k)))
+        && numbers(a).into_iter().zip(numbers(b)).all(|(a, b)| equal(a, b))
+        && (0..a.lines.len()).map(|k| k as f64).all(|k| equal(a.lines.at(k), b.lines.at(k)))
         && (0..a.slices.len())
             .map(|k| k as f64)
-            .all(|k| [0.0, last].into_iter().all(|line| near(a.slice_position(line, k), b.slice_position(line, k))))
+            .all(|k| [0.0, last].into_iter().all(|line| equal(a.slice_position(line, k), b.slice_position(line, k))))
 }
 
 #[cfg(test)]
@@ -563,16 +574,16 @@ mod writing_tests {
     }
 
     #[test]
-    fn no_probe_is_written_that_is_read_as_another() {
+    fn a_written_probe_is_read_as_the_same() {
         let uneven = Axis::Table(vec![-0.1, -0.05, 0.01, 0.05, 0.06, 0.09, 0.2]);
-        let aside = Axis::Even { first: 0.01, pitch: 0.02, count: 40 };
+        let off_centre = Axis::Even { first: 0.01, pitch: 0.02, count: 40 };
         let volumes = Volumes { both_ways: true, ..Volumes::forward(7, 2) };
         let moving = Volumes { speed_ratio: 0.3, first_backward: true, ..volumes.clone() };
         let linear =
             Probe { array: Array::Linear, lines: Axis::centred(0.3, 40), motion: Motion::Translated, ..probe() };
         for (probe, volumes) in [
             (probe(), volumes.clone()),
-            (Probe { lines: aside, ..probe() }, volumes.clone()),
+            (Probe { lines: off_centre, ..probe() }, volumes.clone()),
             (Probe { slices: uneven.clone(), advance: moving.advance(0, &uneven), ..probe() }, moving),
             (linear.clone(), volumes.clone()),
             (
@@ -591,12 +602,15 @@ mod writing_tests {
         ] {
             let text = ProbeFile::to_toml(&probe, &volumes, [3.0, 250.0]).unwrap();
             let file = ProbeFile::parse(Path::new("probe.toml"), &text).unwrap();
-            let (read, there) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
-            assert!(is_same(&Probe { advance: there.advance(0, &read.slices), ..read }, &probe), "{text}");
-            assert_eq!((there.both_ways, there.first_backward), (volumes.both_ways, volumes.first_backward));
+            let (read, read_volumes) = file.geometry(100, 40, volumes.frames * volumes.count).unwrap();
+            assert!(is_same(&Probe { advance: read_volumes.advance(0, &read.slices), ..read }, &probe), "{text}");
+            assert_eq!(
+                (read_volumes.both_ways, read_volumes.first_backward),
+                (volumes.both_ways, volumes.first_backward)
+            );
             assert_eq!(file.range(), Some([3.0, 250.0]));
         }
-        let astray = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
-        assert!(ProbeFile::to_toml(&astray, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
+        let irregular = Probe { advance: Advance::Each(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..probe() };
+        assert!(ProbeFile::to_toml(&irregular, &Volumes::forward(7, 1), [0.0, 1.0]).is_err());
     }
 }

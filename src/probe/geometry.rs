@@ -1,63 +1,65 @@
-//! The maps between (sample, line, slice) indices and places in space, in f64: the definition every pass is held to.
+//! The maps between (sample, line, slice) indices and points in space, in f64. They define the geometry that every pass is tested against.
 //!
-//! Space is (X lateral, Y depth, Z elevation) in mm with the origin at the in-plane apex of the array (at the face of a
-//! linear array) and Y pointing away from the probe. Equations: in-plane map and sweep map of the thesis, 4.4.2.
+//! Space is (X lateral, Y depth, Z elevation) in mm. The origin is the in-plane apex of a curved array, or the face of a linear one; Y
+//! points away from the probe. Equations: in-plane map and sweep map of the thesis, 4.4.2.
 
 use super::axis::Axis;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// How the transducer elements lie.
+/// Shape of the transducer array.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Array {
-    /// Elements on an arc of `radius` mm (Ra, apex to face); 0 is a phased array. Lines are angles in rad.
+    /// Elements on an arc of `radius` mm (Ra, from the apex to the face); 0 is a phased array. Scan lines are angles in rad.
     Curved { radius: f64 },
-    /// Elements on a straight line. Lines are lateral places in mm.
+    /// Elements on a straight line. Scan lines are lateral positions in mm.
     Linear,
 }
 
-/// How the frames of a sweep lie to one another.
+/// How the array moves from frame to frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Motion {
-    /// The array turns about an axis `wobble_radius` mm (Rw) behind the face. Slices are angles in rad.
+    /// The array rotates about an axis `wobble_radius` mm (Rw) behind the face. Slices are angles in rad.
     Fan { wobble_radius: f64 },
-    /// The array is moved sideways. Slices are elevations in mm.
+    /// The array is moved in elevation. Slices are positions in mm.
     Translated,
-    /// One frame: a slab of `thickness` mm.
+    /// A single frame, drawn as a slab of `thickness` mm.
     Still { thickness: f64 },
 }
 
-/// How far the motor travels while a frame is acquired line by line, in units of the slice axis, signed.
+/// Distance that the motor travels while a frame is acquired line by line: signed, in the unit of the slice axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Advance {
+    /// The motor stops for each frame.
     None,
-    /// The same for every slice: one direction, even pitch.
+    /// The same for every slice: one direction, uniform pitch.
     Same(f64),
-    /// One entry a slice: mixed directions, or an uneven sweep.
+    /// One entry for each slice: mixed directions, or a non-uniform sweep.
     Each(Vec<f64>),
 }
 
-/// Everything that places a sample in space.
+/// A swept probe: everything that determines the position of a sample in space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     pub array: Array,
-    /// One position a scan line: rad or mm.
+    /// Position of each scan line: rad (curved array) or mm (linear array).
     pub lines: Axis,
-    /// Distance from the face to the first sample (d0), mm.
+    /// Distance from the array's face to the first sample (d0), mm.
     pub start_depth: f64,
     /// Distance between samples (dr), mm.
     pub sample_pitch: f64,
+    /// Samples a line, at least 2.
     pub samples: usize,
     pub motion: Motion,
-    /// Position of each slice when its line 0 was taken, in geometric order: rad or mm.
+    /// Position of each slice when its line 0 was acquired, in geometric order: rad or mm, see [`Motion`].
     pub slices: Axis,
     pub advance: Advance,
-    /// m/s.
+    /// Speed of sound, m/s.
     pub sound_speed: f64,
 }
 
-/// Fractional indices into a sweep.
+/// Fractional indices of a sample in a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indices {
     pub sample: f64,
@@ -65,6 +67,7 @@ pub struct Indices {
     pub slice: f64,
 }
 
+/// A number of a geometry that is out of its range: which one, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("probe geometry: {field}: {fault}")]
 pub struct GeometryError {
@@ -76,21 +79,23 @@ fn fault<T>(field: &'static str, fault: impl Into<String>) -> Result<T, Geometry
     Err(GeometryError { field, fault: fault.into() })
 }
 
-/// A number without its three hundred digits.
+/// A number as text, with an exponent if it is very large or small.
 fn short(value: f64) -> String {
     if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
 }
 
 impl Probe {
-    /// Range of the first sample: from the apex of a curved array, from the face of a linear one. mm.
+    /// Range of the first sample, mm: from the apex of a curved array, from the face of a linear one.
     pub fn first_range(&self) -> f64 {
         self.start_depth + self.array_radius()
     }
 
+    /// Range of the last sample, mm.
     pub fn last_range(&self) -> f64 {
         self.first_range() + self.sample_pitch * (self.samples - 1) as f64
     }
 
+    /// Radius of the array (Ra), mm; 0 for a linear one.
     pub fn array_radius(&self) -> f64 {
         match self.array {
             Array::Curved { radius } => radius,
@@ -98,7 +103,7 @@ impl Probe {
         }
     }
 
-    /// Y of the wobble axis: Ra - Rw. 0 without a fan.
+    /// Y of the wobble axis, mm: Ra - Rw. 0 unless the motion is a fan.
     pub fn axis_depth(&self) -> f64 {
         match self.motion {
             Motion::Fan { wobble_radius } => self.array_radius() - wobble_radius,
@@ -106,7 +111,7 @@ impl Probe {
         }
     }
 
-    /// In-plane place (x, y) of a fractional (sample, line).
+    /// In-plane map: point (x, y) of a fractional (sample, line), mm.
     pub fn plane_point(&self, sample: f64, line: f64) -> (f64, f64) {
         let range = self.first_range() + sample * self.sample_pitch;
         let at = self.lines.at(line);
@@ -116,22 +121,22 @@ impl Probe {
         }
     }
 
-    /// Fractional (sample, line) of an in-plane place: the inverse of [`Probe::plane_point`].
+    /// Fractional (sample, line) of an in-plane point: the inverse of [`Probe::plane_point`].
     pub fn plane_indices(&self, x: f64, y: f64) -> (f64, f64) {
         let (range, at) = match self.array {
-            // atan2(0, 0) is 0 here; on some GPUs it is not, so shaders test the range first.
+            // atan2(0, 0) is 0 here. On some GPUs it is not, so the shaders test the range first.
             Array::Curved { .. } => (x.hypot(y), x.atan2(y)),
             Array::Linear => (y, x),
         };
         ((range - self.first_range()) / self.sample_pitch, self.lines.index_of(at))
     }
 
-    /// Position of a slice when the given line was taken: rad or mm.
+    /// Position of a slice when the given line was acquired: rad or mm.
     pub fn slice_position(&self, line: f64, slice: f64) -> f64 {
         self.slices.at(slice) + self.advance_at(slice) * line / self.lines.len() as f64
     }
 
-    /// The motor's way while the frame at a fractional slice is acquired.
+    /// Distance that the motor travels while the frame at a fractional slice is acquired.
     pub(super) fn advance_at(&self, slice: f64) -> f64 {
         match &self.advance {
             Advance::None => 0.0,
@@ -144,14 +149,14 @@ impl Probe {
         }
     }
 
-    /// Place of fractional indices in space: the in-plane map, then the sweep map.
+    /// Point in space of fractional indices, mm: the in-plane map followed by the sweep map.
     pub fn to_space(&self, at: Indices) -> DVec3 {
         let (x, y) = self.plane_point(at.sample, at.line);
         let position = self.slice_position(at.line, at.slice);
         self.sweep_map(x, y, position)
     }
 
-    /// The sweep map of an in-plane place at a slice position.
+    /// Sweep map: point in space of an in-plane point (x, y) at a slice position, mm.
     pub fn sweep_map(&self, x: f64, y: f64, position: f64) -> DVec3 {
         match self.motion {
             Motion::Fan { .. } => {
@@ -163,7 +168,7 @@ impl Probe {
         }
     }
 
-    /// In-plane place (x, y) and slice position of a place in space: the inverse of [`Probe::sweep_map`].
+    /// In-plane point (x, y) and slice position of a point in space: the inverse of [`Probe::sweep_map`].
     pub fn inverse_sweep_map(&self, place: DVec3) -> (f64, f64, f64) {
         match self.motion {
             Motion::Fan { .. } => {
@@ -175,14 +180,14 @@ impl Probe {
         }
     }
 
-    /// Fractional indices of a place in space. Exact, not iterated: the line does not depend on the slice.
+    /// Fractional indices of a point in space. Closed form: the line does not depend on the slice.
     pub fn to_indices(&self, place: DVec3) -> Indices {
         let (x, y, position) = self.inverse_sweep_map(place);
         let (sample, line) = self.plane_indices(x, y);
         Indices { sample, line, slice: self.slice_index(position, line) }
     }
 
-    /// Fractional slice index of a slice position, seen at a line.
+    /// Fractional slice index of a slice position, for samples of the given line.
     pub fn slice_index(&self, position: f64, line: f64) -> f64 {
         let share = line / self.lines.len() as f64;
         match &self.advance {
@@ -200,7 +205,7 @@ impl Probe {
         }
     }
 
-    /// Corners of the smallest in-plane rectangle (x, y) that holds every sample.
+    /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample, mm.
     pub fn plane_bounds(&self) -> ([f64; 2], [f64; 2]) {
         let (r0, r1) = (self.first_range(), self.last_range());
         let (first, last) = (self.lines.first(), self.lines.last());
@@ -216,7 +221,7 @@ impl Probe {
         }
     }
 
-    /// Lowest and highest slice position of any line, swept either way: what is looked at does not jump to and fro with the motor.
+    /// Lowest and highest slice position of any line. The same for both directions, so that the bounds do not alternate with the motor.
     pub fn slice_bounds(&self) -> (f64, f64) {
         let last = (self.slices.len() - 1) as f64;
         let share = 1.0 - 1.0 / self.lines.len() as f64;
@@ -224,7 +229,7 @@ impl Probe {
         (self.slices.at(0.0) - low, self.slices.at(last) + high)
     }
 
-    /// Corners of a box in space that holds the insonified region.
+    /// Corners (low, high) of a box in space that contains the insonified region, mm.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.plane_bounds();
         let (first, last) = self.slice_bounds();
@@ -246,15 +251,18 @@ impl Probe {
         }
     }
 
-    /// The time in s that sound needs for one volume: a line takes 2 d / c (thesis 4.3). No renderer is faster than this.
+    /// Time that sound needs for one volume, s: 2 d / c for each line (thesis 4.3). No system can acquire faster.
     pub fn acquisition_time(&self) -> f64 {
         let depth = (self.start_depth + self.sample_pitch * (self.samples - 1) as f64) * 1e-3;
         (self.slices.len() * self.lines.len()) as f64 * 2.0 * depth / self.sound_speed
     }
 
-    /// Refuses what no map can place.
+    /// Checks every number of the geometry.
+    ///
+    /// # Errors
+    /// The first number that is out of its range, or numbers that the maps cannot invert.
     pub fn check(&self) -> Result<(), GeometryError> {
-        // What lies beyond is no probe, and would be infinite in f32.
+        // Larger values belong to no real probe, and their squares would be infinite in f32.
         let positive = |field, value: f64| match (1e-6..=1e6).contains(&value) {
             true => Ok(()),
             false => fault(field, format!("is {}, must lie in 1e-6..=1e6", short(value))),
@@ -282,7 +290,7 @@ impl Probe {
             return fault("frames", "positions must be finite and rise from slice to slice");
         }
         if self.slices.len() < 2 && !matches!(self.motion, Motion::Still { .. }) {
-            return fault("frames", "a sweep has at least 2 frames a volume; a single one is a still probe's");
+            return fault("frames", "a sweep has at least 2 frames a volume; a single frame needs motion 'still'");
         }
         if let Array::Curved { .. } = self.array {
             let widest = self.lines.first().abs().max(self.lines.last().abs());
@@ -296,7 +304,7 @@ impl Probe {
             Advance::Each(t) if t.len() == self.slices.len() && t.iter().all(|a| a.is_finite()) => {}
             _ => return fault("motion", "one finite advance a slice is needed"),
         }
-        // A forward slice beside a backward one: past half a pitch of travel their last lines would cross.
+        // A forward slice next to a backward one: beyond half a pitch of travel their last lines would cross.
         let last_line = (self.lines.len() - 1) as f64;
         let at = |k: usize| self.slice_position(last_line, k as f64);
         if (1..self.slices.len()).any(|k| at(k) <= at(k - 1)) {
@@ -322,8 +330,8 @@ impl Probe {
                     return fault(
                         "wobble radius",
                         format!(
-                            "the sector reaches up to y = {nearest:.2} mm but the wobble axis lies at {:.2} mm: \
-                             all of the sector must lie beyond the axis",
+                            "the sector reaches up to y = {nearest:.2} mm but the wobble axis is at {:.2} mm: \
+                             all of the sector must be beyond the axis",
                             self.axis_depth()
                         ),
                     );

@@ -1,24 +1,27 @@
-//! Frames that are pictures already, and the choice between those and the polar frames of a sweep.
+//! The geometry of a volume: polar frames of a swept probe, or slices of a Cartesian grid.
 
 use super::geometry::{Advance, GeometryError, Probe};
 use serde::{Deserialize, Serialize};
 
-/// No place or spacing is further than this, mm: f32 on the GPU keeps squares of it finite.
-const FAR: f64 = 1e6;
+/// Largest coordinate and spacing, mm. Its square is finite in f32, which the GPU computes in.
+const MAX_LENGTH: f64 = 1e6;
 
-/// Voxels on a straight lattice, as in a volume that was scan-converted by others.
+/// Voxels on an axis-aligned Cartesian grid, as in a volume that was scan-converted elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Voxels along x (fastest), y, and z (one a frame).
+    /// Number of voxels along x (fastest), y, and z (one a frame).
     pub size: [usize; 3],
     /// Distance between voxels, mm.
     pub spacing: [f64; 3],
-    /// Place of the centre of voxel (0, 0, 0), mm.
+    /// Position of the centre of voxel (0, 0, 0), mm.
     pub origin: [f64; 3],
 }
 
 impl Grid {
-    /// Refuses a lattice without voxels, or one whose voxels have no finite place.
+    /// Checks every number of the grid.
+    ///
+    /// # Errors
+    /// A size of 0, a spacing outside 1e-6..=1e6 mm, an origin beyond 1e6 mm.
     pub fn check(&self) -> Result<(), GeometryError> {
         let fault = |field, fault: String| Err(GeometryError { field, fault });
         for axis in 0..3 {
@@ -26,10 +29,10 @@ impl Grid {
             if size == 0 {
                 return fault("size", "is 0, must be at least 1 voxel".into());
             }
-            if !(1.0 / FAR..=FAR).contains(&spacing) {
+            if !(1.0 / MAX_LENGTH..=MAX_LENGTH).contains(&spacing) {
                 return fault("spacing", format!("is {spacing:e} mm, must lie in 1e-6 .. 1e6"));
             }
-            if !(-FAR..=FAR).contains(&origin) {
+            if !(-MAX_LENGTH..=MAX_LENGTH).contains(&origin) {
                 return fault("origin", format!("is {origin:e} mm, must lie within 1e6 of 0"));
             }
         }
@@ -37,17 +40,17 @@ impl Grid {
     }
 }
 
-/// Where the samples of a volume lie.
+/// The positions of the samples of a volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Geometry {
     /// Polar frames of a probe.
     Sweep(Probe),
-    /// Pictures on a lattice.
+    /// Slices of a Cartesian grid.
     Cartesian(Grid),
 }
 
 impl Geometry {
-    /// Samples and lines of a polar frame; width and height of a picture. The first runs fastest.
+    /// Samples and scan lines of a polar frame; width and height of a Cartesian slice. The first index is the fastest.
     pub fn frame_size(&self) -> [usize; 2] {
         match self {
             Geometry::Sweep(probe) => [probe.samples, probe.lines.len()],
@@ -55,7 +58,7 @@ impl Geometry {
         }
     }
 
-    /// Frames a volume.
+    /// Number of frames of a volume.
     pub fn slices(&self) -> usize {
         match self {
             Geometry::Sweep(probe) => probe.slices.len(),
@@ -65,34 +68,34 @@ impl Geometry {
 }
 
 impl Geometry {
-    /// Whether the two differ at most in the motor's way during a frame.
-    pub fn equals_except_advance(&self, other: &Geometry) -> bool {
+    /// True if the two differ at most in the motor's travel during a frame, which moves only the later lines of each slice.
+    pub(crate) fn equals_except_advance(&self, other: &Geometry) -> bool {
         match (self, other) {
             (Geometry::Sweep(a), Geometry::Sweep(b)) => {
-                let lies = |p: &Probe| (p.array, p.start_depth, p.sample_pitch, p.samples, p.motion, p.sound_speed);
-                lies(a) == lies(b) && a.lines == b.lines && a.slices == b.slices
+                let fields = |p: &Probe| (p.array, p.start_depth, p.sample_pitch, p.samples, p.motion, p.sound_speed);
+                fields(a) == fields(b) && a.lines == b.lines && a.slices == b.slices
             }
             _ => self == other,
         }
     }
 
-    /// Whether the two differ at most in the direction of the motor's way during each frame.
-    pub fn equals_except_direction(&self, other: &Geometry) -> bool {
-        let ways = |geometry: &Geometry| match geometry {
+    /// True if the two differ at most in the direction of the motor's travel during each frame.
+    pub(crate) fn equals_except_direction(&self, other: &Geometry) -> bool {
+        let travels = |geometry: &Geometry| match geometry {
             Geometry::Sweep(p) => (0..p.slices.len()).map(|k| p.advance_at(k as f64).abs()).collect(),
             Geometry::Cartesian(_) => Vec::new(),
         };
-        self == other || (self.equals_except_advance(other) && ways(self) == ways(other))
+        self == other || (self.equals_except_advance(other) && travels(self) == travels(other))
     }
 
-    /// Slices of two directions side by side: each lies as in `backward` where that is marked, else as in `self`. None where the last
-    /// lines of neighbours would cross, and of geometries that differ in more than the motor's way.
-    pub fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
+    /// A volume with slices of both directions: a slice is as in `backward` if it is marked, else as in `self`. None if the last lines
+    /// of neighbouring slices would cross, or if the two geometries differ in more than the motor's travel.
+    pub(crate) fn with_mixed_directions(&self, backward: &Geometry, marked: &[bool]) -> Option<Geometry> {
         let (Geometry::Sweep(forward), Geometry::Sweep(back)) = (self, backward) else { return None };
-        let way = |k: usize| {
+        let travel = |k: usize| {
             if marked.get(k) == Some(&true) { back.advance_at(k as f64) } else { forward.advance_at(k as f64) }
         };
-        let each = (0..forward.slices.len()).map(way).collect();
+        let each = (0..forward.slices.len()).map(travel).collect();
         let probe = Probe { advance: Advance::Each(each), ..forward.clone() };
         (self.equals_except_advance(backward) && probe.check().is_ok()).then_some(Geometry::Sweep(probe))
     }
@@ -103,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lattice_without_extent_is_refused() {
+    fn a_grid_without_extent_is_refused() {
         let good = Grid { size: [2, 3, 1], spacing: [0.5; 3], origin: [0.0; 3] };
         assert!(good.check().is_ok());
         assert!(Grid { size: [2, 0, 1], ..good }.check().is_err());
@@ -113,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_is_taken_up_to_its_limits() {
+    fn a_grid_is_accepted_up_to_its_limits() {
         let good = Grid { size: [2, 3, 1], spacing: [1e-6, 1e6, 1.0], origin: [-1e6, 1e6, 0.0] };
         assert_eq!(good.check(), Ok(()));
         let fault = |grid: Grid| grid.check().map_err(|e| e.field);
@@ -164,7 +167,7 @@ mod direction_tests {
     }
 
     #[test]
-    fn slices_of_two_ways_lie_side_by_side_each_as_it_was_swept() {
+    fn slices_of_both_directions_keep_their_own_advance() {
         let (forth, back) = (probe(Advance::Same(0.02)), probe(Advance::Same(-0.02)));
         assert!(forth.equals_except_direction(&back) && forth != back);
         let mixed = forth.with_mixed_directions(&back, &[false, true, true, false]).expect("no lines cross");

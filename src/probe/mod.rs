@@ -1,4 +1,4 @@
-//! The probe: where its scan lines and frames lie ([`geometry`]), how a TOML file says so ([`mod@file`]), and the motor
+//! The probe: the positions of its scan lines and frames ([`geometry`]), the TOML file that describes them ([`mod@file`]), and the motor
 //! that sweeps it ([`motor`]).
 
 pub mod axis;

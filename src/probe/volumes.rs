@@ -1,21 +1,22 @@
-//! How the frames of a recording make up volumes, and which way each was swept.
+//! How the frames of a recording make up volumes, and in which direction each was swept.
 
-use super::{Advance, Axis};
+use super::axis::Axis;
+use super::geometry::Advance;
 
 /// How the frames of a recording make up volumes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volumes {
     /// Frames a volume (K).
     pub frames: usize,
-    /// Whole volumes in the recording.
+    /// Complete volumes in the recording.
     pub count: usize,
-    /// Frames after the last whole volume.
+    /// Frames after the last complete volume.
     pub left_over: usize,
-    /// Every second volume was swept the other way.
+    /// Every second volume was swept in the other direction.
     pub both_ways: bool,
     /// The first volume was swept backwards.
     pub first_backward: bool,
-    /// Share of the way to the next frame that the motor travels while one frame is acquired (s), 0..1.
+    /// Fraction of the distance to the next frame that the motor travels while one frame is acquired (s), 0..=1.
     pub speed_ratio: f64,
 }
 
@@ -25,12 +26,13 @@ impl Volumes {
         Volumes { frames, count, left_over: 0, both_ways: false, first_backward: false, speed_ratio: 0.0 }
     }
 
+    /// True if this volume was swept backwards.
     pub fn backward(&self, volume: usize) -> bool {
         self.first_backward ^ (self.both_ways && volume % 2 == 1)
     }
 
-    /// Way of the motor while each frame of this volume was acquired: towards the frame that followed it in time, so
-    /// negative on the way back: f = f_first + dir df (k + s j / L) for line j of frame k (thesis 4.4.2.2, Fig. 40).
+    /// Travel of the motor while each frame of this volume was acquired: towards the frame that followed in time, so negative for a
+    /// backward sweep: f = f_first + dir df (k + s j / L) for line j of frame k (thesis 4.4.2.2, Fig. 40).
     pub fn advance(&self, volume: usize, slices: &Axis) -> Advance {
         if self.speed_ratio == 0.0 || slices.len() < 2 {
             return Advance::None;
@@ -42,7 +44,7 @@ impl Volumes {
             Axis::Table(table) => {
                 let gap = |k: usize| table[k + 1] - table[k];
                 let last = table.len() - 2;
-                // The last frame in time has no follower: the motor is taken to go on as it went.
+                // The last frame in time has no successor: the motor is assumed to continue at the same speed.
                 let gap_after = |k: usize| if backward { gap(k.max(1) - 1) } else { gap(k.min(last)) };
                 Advance::Each((0..table.len()).map(|k| sign * gap_after(k)).collect())
             }
@@ -54,7 +56,7 @@ impl Volumes {
 mod tests {
     use super::*;
 
-    /// Line 0 of the frame that follows in time lies where the motor is when all lines of this one are done.
+    /// Line 0 of the next frame in time is where the motor is when the last line of this one is done.
     #[test]
     fn the_motor_moves_towards_the_next_frame_in_time_both_ways() {
         let slices = Axis::Table(vec![0.0, 1.0, 3.0, 6.0]);
@@ -70,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_direction_and_the_alternation_are_not_mixed_up() {
+    fn the_first_direction_and_the_alternation_are_independent() {
         let volumes = Volumes { first_backward: true, ..Volumes::forward(4, 3) };
         assert_eq!([0, 1, 2].map(|v| volumes.backward(v)), [true; 3]);
         let volumes = Volumes { both_ways: true, ..volumes };

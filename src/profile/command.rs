@@ -10,7 +10,7 @@ use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
 /// Longest profile that is read, bytes.
-const LONGEST: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(after_help = "A repeat is a whole volume: every frame through stage 1, then the picture.\n\nExamples:\n  \
@@ -90,7 +90,7 @@ impl Profile {
             frames.push(frame);
             Ok(())
         })?;
-        let asked = measure::ProfileOptions {
+        let options = measure::ProfileOptions {
             repeats: self.repeat as usize,
             warm_up: self.warm_up as usize,
             still: self.still,
@@ -102,7 +102,7 @@ impl Profile {
             Some(choice) => Some(open_device(Some(choice.clone()), false)?),
             None => None,
         };
-        let run = |context| measure::ProfileRun::new(context, &scene, &asked).map_err(failed);
+        let run = |context| measure::ProfileRun::new(context, &scene, &options).map_err(failed);
         let (mut first, mut second) = (run(&context)?, against.as_ref().map(run).transpose()?);
         while first.needs_more() {
             first.repeat(&frames).map_err(failed)?;
@@ -156,6 +156,6 @@ impl Profile {
 
 fn read(file: &Path) -> Result<model::Profile, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("{}: {e}", file.display()));
-    let text = read_text(file, LONGEST, "profile").map_err(|e| fault(&e))?;
+    let text = read_text(file, MAX_BYTES, "profile").map_err(|e| fault(&e))?;
     model::Profile::from_json(&text).map_err(|e| fault(&e))
 }

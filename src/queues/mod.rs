@@ -1,36 +1,36 @@
-//! Which queue does what, and what a submission waits for of other queues. Within a queue barriers order operations
-//! ([`crate::barriers`]); between queues only semaphores do, and a submission waits for as much as it conflicts with and no more.
-//! Pure: the same for one, two and three queues, and tested without a GPU.
+//! Assigns work to queues and derives the semaphore waits between them. Within a queue, barriers order operations
+//! ([`crate::barriers`]). Between queues only semaphores do; a submission waits for the submissions that it conflicts with and no
+//! others. The logic is the same for one, two and three queues, and is tested without a GPU.
 
 pub mod oracle;
 
 use crate::barriers::{Access, Barrier, BarrierTracker};
 
-/// Most queues that are of use: copies, stage 1, and everything after it.
+/// The maximum number of queues: copies, stage 1, and all later stages.
 pub const MAX_QUEUES: usize = 3;
 
-/// What is to be done.
+/// A kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QueueRole {
-    /// What follows from volumes and pictures.
+    /// All passes over volumes and pictures.
     Render,
-    /// Stage 1 of a frame.
+    /// Stage 1: converting a frame.
     Ingest,
-    /// Samples on their way in.
+    /// Uploads of samples.
     Copy,
 }
 
 impl QueueRole {
-    /// The queue that does it where there are so many: number 0 renders, 1 takes frames in, 2 copies them.
+    /// Its queue, given the number of queues: queue 0 renders, 1 ingests frames, 2 copies them.
     pub fn queue(self, queues: usize) -> usize {
         (self as usize).min(queues.clamp(1, MAX_QUEUES) - 1)
     }
 }
 
-/// By queue, the last submission that is known to be done: the values of their timelines.
+/// A vector clock: by queue, the timeline value of the last submission that is known to be complete.
 type Clock = [u64; MAX_QUEUES];
 
-/// Everything that queues do to the same slots.
+/// Tracks the accesses of all queues to the same slots.
 #[derive(Clone, Debug)]
 pub struct QueueTracker {
     each: Vec<Queue>,
@@ -41,11 +41,11 @@ struct Queue {
     tracker: BarrierTracker,
     /// A submission is being recorded.
     recording: bool,
-    /// What the submission that is being recorded touches.
+    /// The accesses of the submission that is being recorded.
     open: Vec<Access>,
-    /// What its submissions touched last, with the value at which it is done, and what that submission had waited for.
+    /// The last submitted accesses, with the timeline value at which they are complete, and what that submission had waited for.
     done: Vec<(Access, u64, Clock)>,
-    /// What its next submission comes after in any case.
+    /// What its next submission is ordered after anyway.
     after: Clock,
 }
 
@@ -57,14 +57,14 @@ pub struct Wait {
 }
 
 impl Default for QueueTracker {
-    /// One for everything.
+    /// A single queue.
     fn default() -> QueueTracker {
         QueueTracker::new(1)
     }
 }
 
 impl QueueTracker {
-    /// `count`: 1..=3.
+    /// `count`: number of queues, clamped to 1..=3.
     pub fn new(count: usize) -> QueueTracker {
         QueueTracker { each: vec![Queue::default(); count.clamp(1, MAX_QUEUES)] }
     }
@@ -73,7 +73,7 @@ impl QueueTracker {
         self.each.len()
     }
 
-    /// The barrier that an operation of this queue needs in front of it, if any; the operation is then taken as recorded.
+    /// Records an operation on this queue. Returns the barrier that it needs before it, if any.
     pub fn record(&mut self, queue: usize, accesses: &[Access]) -> Option<Barrier> {
         let alone = self.count() == 1;
         let me = &mut self.each[queue];
@@ -85,8 +85,8 @@ impl QueueTracker {
         me.tracker.record(accesses)
     }
 
-    /// A submission of this queue is recorded from here on. If the one before was not submitted, the next operation waits for everything
-    /// before it.
+    /// Begins the recording of a submission to this queue. If the last recording was not submitted, the next operation waits for
+    /// everything before it.
     pub fn begin(&mut self, queue: usize) {
         let me = &mut self.each[queue];
         if std::mem::replace(&mut me.recording, true) {
@@ -95,7 +95,7 @@ impl QueueTracker {
         }
     }
 
-    /// What the submission that is being recorded on this queue has to wait for, and nothing that another of these waits implies.
+    /// The waits that the submission recorded on this queue needs, without those that another of them implies.
     pub fn waits(&self, queue: usize) -> Vec<Wait> {
         let me = &self.each[queue];
         let mut needed = Vec::new();
@@ -112,7 +112,7 @@ impl QueueTracker {
         needed.iter().map(|(wait, _)| *wait).filter(|wait| !implied(wait)).collect()
     }
 
-    /// The submission that was recorded on this queue is on its way, behind these waits, and done at this value of its timeline.
+    /// The recording of this queue was submitted with these waits; it is complete at this value of the queue's timeline.
     pub fn submitted(&mut self, queue: usize, waits: &[Wait], value: u64) {
         self.each[queue].recording = false;
         if self.count() == 1 {
@@ -128,14 +128,14 @@ impl QueueTracker {
         let me = &mut self.each[queue];
         me.after = after;
         for access in std::mem::take(&mut me.open) {
-            me.done.retain(|(known, ..)| *known != access);
+            me.done.retain(|(earlier, ..)| *earlier != access);
             me.done.push((access, value, after));
         }
-        // What all others come after in any case needs no remembering.
+        // Accesses that all other queues are ordered after anyway can be forgotten.
         for q in 0..self.count() {
             let others = self.each.iter().enumerate().filter(|(other, _)| *other != q);
-            let seen = others.map(|(_, other)| other.after[q]).min().unwrap_or(0);
-            self.each[q].done.retain(|(_, value, _)| *value > seen);
+            let reached = others.map(|(_, other)| other.after[q]).min().unwrap_or(0);
+            self.each[q].done.retain(|(_, value, _)| *value > reached);
         }
     }
 }
@@ -148,7 +148,7 @@ mod tests {
     use crate::scene::Scene;
     use proptest::prelude::*;
 
-    /// What was submitted: by which queue, at which value of its timeline, what it touches, and what it waited for.
+    /// A submission: its queue, its timeline value, its accesses, and its waits.
     type Submission = (usize, u64, Vec<Access>, Vec<Wait>);
 
     fn submit(
@@ -164,8 +164,8 @@ mod tests {
         (queue, values[queue], accesses, waits)
     }
 
-    /// A second opinion, with nothing in common with the clocks: what comes after what, by reaching it from wait to wait and along
-    /// each queue; then every pair of different queues that conflicts must be reached.
+    /// An independent check without clocks: follows waits and queue order transitively. Every pair of conflicting submissions on
+    /// different queues must be ordered.
     fn unordered(submissions: &[Submission]) -> Option<(usize, usize)> {
         let n = submissions.len();
         let mut after = vec![vec![false; n]; n];
@@ -189,8 +189,8 @@ mod tests {
         (0..n).flat_map(|j| (0..j).map(move |i| (i, j))).find(|(i, j)| conflicts(*i, *j) && !after[*j][*i])
     }
 
-    /// Every conflict is ordered; and without any one of the waits one is not.
-    fn hold(submissions: &[Submission]) -> Result<(), String> {
+    /// Checks that every conflict is ordered, and that every wait is needed.
+    fn check(submissions: &[Submission]) -> Result<(), String> {
         if let Some((i, j)) = unordered(submissions) {
             return Err(format!("submission {j} does not wait for {i}"));
         }
@@ -198,7 +198,7 @@ mod tests {
             let mut without = submissions.to_vec();
             without[j].3.remove(n);
             if unordered(&without).is_none() {
-                return Err(format!("submission {j} waits for {:?} and need not", submissions[j].3[n]));
+                return Err(format!("submission {j} waits for {:?} without need", submissions[j].3[n]));
             }
         }
         Ok(())
@@ -220,12 +220,12 @@ mod tests {
             let (mut queues, mut values) = (QueueTracker::new(count), [0; MAX_QUEUES]);
             let work = work.into_iter();
             let all: Vec<_> = work.map(|(q, a)| submit(&mut queues, &mut values, q % count, a)).collect();
-            prop_assert_eq!(hold(&all), Ok(()));
+            prop_assert_eq!(check(&all), Ok(()));
         }
     }
 
-    /// Volumes that are filled while those before them are drawn, as the renderer submits them: `whole` with turns, and `rolling`
-    /// into the one that is shown.
+    /// Volumes that are filled while earlier ones are drawn, as the renderer submits them: `whole` with several volume images, and
+    /// `rolling` into the one that is shown.
     #[test]
     fn a_live_stream_is_ordered_on_one_two_and_three_queues() {
         use crate::probe::{Geometry, Grid};
@@ -239,9 +239,8 @@ mod tests {
         };
         for (count, images) in (1..=3).flat_map(|count| [(count, 1), (count, 2), (count, 3)]) {
             let (mut queues, mut values, mut all) = (QueueTracker::new(count), [0; MAX_QUEUES], Vec::new());
-            let mut do_it = |work: QueueRole, accesses| {
+            let mut run = |work: QueueRole, accesses| {
                 let submission = submit(&mut queues, &mut values, work.queue(count), accesses);
-                // More than one queue's work is never waited for but for a reason.
                 all.push(submission);
             };
             for (n, image) in (0..6u32).map(|n| (n, n % images)) {
@@ -250,30 +249,30 @@ mod tests {
                         DispatchArgs { layer: (n * 6 + slice) % 4, slice, image, slices: 1, ..DispatchArgs::default() };
                     let layer = args.layer..args.layer + 1;
                     let copied = Access::of_slot(Slot::Frames, 0, layer, true, PipelineStage::Copy);
-                    // Without a queue of its own the copy goes with the frame.
+                    // Without a queue for copies, the copy is part of the frame's submission.
                     match count {
                         3 => {
-                            do_it(QueueRole::Copy, vec![copied]);
-                            do_it(QueueRole::Ingest, of(Frequency::Frame, args));
+                            run(QueueRole::Copy, vec![copied]);
+                            run(QueueRole::Ingest, of(Frequency::Frame, args));
                         }
-                        _ => do_it(QueueRole::Ingest, [vec![copied], of(Frequency::Frame, args)].concat()),
+                        _ => run(QueueRole::Ingest, [vec![copied], of(Frequency::Frame, args)].concat()),
                     }
                     let rolls = images == 1 && slice % 2 == 1;
                     if rolls || slice == 5 {
                         let args = DispatchArgs { image, slices: scene.slices(), ..DispatchArgs::default() };
-                        do_it(QueueRole::Render, [of(Frequency::Volume, args), of(Frequency::Picture, args)].concat());
+                        run(QueueRole::Render, [of(Frequency::Volume, args), of(Frequency::Picture, args)].concat());
                     }
                 }
             }
-            assert_eq!(hold(&all), Ok(()), "{count} queues, {images} images");
+            assert_eq!(check(&all), Ok(()), "{count} queues, {images} images");
             let waits: usize = all.iter().map(|s| s.3.len()).sum();
             assert_eq!(waits == 0, count == 1, "{count} queues, {images} images: {waits} waits");
-            // The ledger forgets what everyone has waited for.
+            // Accesses that every queue has waited for are forgotten.
             assert!(queues.each.iter().all(|q| q.done.len() < 100), "{count} queues");
         }
     }
 
-    /// Prevents that a volume that is filled waits for the picture of another.
+    /// Filling one volume image must not wait for a picture of the other.
     #[test]
     fn frames_of_one_volume_image_do_not_wait_for_a_picture_of_the_other() {
         let (mut queues, mut values) = (QueueTracker::new(2), [0; MAX_QUEUES]);
@@ -281,7 +280,7 @@ mod tests {
         submit(&mut queues, &mut values, 1, on(0, true));
         let picture = submit(&mut queues, &mut values, 0, on(0, false));
         assert_eq!(picture.3, [Wait { queue: 1, value: 1 }]);
-        assert!(queues.each[1].done.is_empty(), "what all others have waited for is forgotten");
+        assert!(queues.each[1].done.is_empty(), "accesses that all others have waited for are forgotten");
         assert_eq!(submit(&mut queues, &mut values, 1, on(1, true)).3, []);
         assert_eq!(submit(&mut queues, &mut values, 1, on(0, true)).3, [Wait { queue: 0, value: 1 }]);
     }
@@ -293,7 +292,7 @@ mod tests {
         queues.begin(1);
         assert_eq!(queues.record(1, &access(Slot::Volume)), None);
         queues.begin(1);
-        assert!(queues.record(1, &access(Slot::SharpVolume)).is_some(), "what was given up may have run in part");
+        assert!(queues.record(1, &access(Slot::SharpVolume)).is_some(), "a dropped recording may have run in part");
         submit(&mut queues, &mut values, 1, access(Slot::SharpVolume));
         assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::Volume)).3, []);
         assert_eq!(submit(&mut queues, &mut values, 0, access(Slot::SharpVolume)).3, [Wait { queue: 1, value: 1 }]);

@@ -1,6 +1,6 @@
-//! A second opinion on the order of what was recorded, with nothing in common with the derivation: every pair of accesses is looked
-//! at, and whether the later one comes after the earlier one follows from the barriers and semaphores that lie between, by brute
-//! force. It notices a barrier that was left out, which no picture need show.
+//! An independent check of the order of recorded work (a test oracle). It shares no code with the derivation of barriers and waits:
+//! for every pair of conflicting accesses it decides by brute force whether the barriers and semaphores between them order them. It
+//! finds a missing barrier even if no picture shows it.
 
 use super::{MAX_QUEUES, Wait};
 use crate::barriers::{Access, Barrier, PipelineStage, PipelineStages, Resource};
@@ -8,12 +8,11 @@ use crate::passes::Slot;
 use crate::passes::slots::Shape;
 use crate::scene::Scene;
 
-/// What was recorded on a queue, in recording order.
+/// An entry of a queue's recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A barrier, then.
     Barrier(Barrier),
-    /// An operation, by what it touches.
+    /// An operation, by its memory accesses.
     Operation(Vec<Access>),
 }
 
@@ -21,20 +20,20 @@ pub enum Event {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Submission {
     pub queue: usize,
-    /// Of its queue's timeline, when it is done.
+    /// The value of its queue's timeline at which it is complete.
     pub value: u64,
     pub waits: Vec<Wait>,
     pub events: Vec<Event>,
 }
 
-/// Everything that was submitted, in the order of submission, and what is recorded but not submitted yet.
+/// Everything that was submitted, in order, and what is recorded but not submitted yet.
 #[derive(Clone, Debug, Default)]
 pub struct SubmissionLog {
     pub submissions: Vec<Submission>,
     open: Vec<(usize, Vec<Event>)>,
 }
 
-/// Two accesses of one resource that nothing orders, by submission and event in it.
+/// Two conflicting accesses of a resource that nothing orders, by submission and event.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hazard {
     pub earlier: (usize, usize),
@@ -43,26 +42,27 @@ pub struct Hazard {
 }
 
 impl SubmissionLog {
-    /// A submission of a queue is recorded from here on: what was recorded and not submitted never runs.
+    /// Begins the recording of a submission. A recording of the same queue that was not submitted never runs.
     pub fn begin(&mut self, queue: usize) {
         self.open.retain(|(of, _)| *of != queue);
         self.open.push((queue, Vec::new()));
     }
 
-    /// What was recorded on a queue.
+    /// Records an operation on a queue, after a barrier.
     pub fn record(&mut self, queue: usize, barrier: Option<Barrier>, accesses: &[Access]) {
         let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) else { return };
         events.extend(barrier.map(Event::Barrier));
         events.push(Event::Operation(accesses.to_vec()));
     }
 
+    /// Submits the recording of a queue.
     pub fn submit(&mut self, queue: usize, waits: &[Wait], value: u64) {
         let Some(at) = self.open.iter().position(|(of, _)| *of == queue) else { return };
         let (_, events) = self.open.swap_remove(at);
         self.submissions.push(Submission { queue, value, waits: waits.to_vec(), events });
     }
 
-    /// Where barriers are: submission and event.
+    /// The positions of all barriers: submission and event.
     pub fn barriers(&self) -> Vec<(usize, usize)> {
         let of = |(n, submission): (usize, &Submission)| {
             let events = submission.events.iter().enumerate();
@@ -72,27 +72,27 @@ impl SubmissionLog {
         self.submissions.iter().enumerate().flat_map(of).collect()
     }
 
-    /// Semaphores that are waited for: submission and wait.
+    /// The positions of all semaphore waits: submission and wait.
     pub fn waits(&self) -> Vec<(usize, usize)> {
         let of = |(n, submission): (usize, &Submission)| (0..submission.waits.len()).map(move |w| (n, w));
         self.submissions.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The same without one barrier.
+    /// A copy of the log without one barrier.
     pub fn without_barrier(&self, (submission, event): (usize, usize)) -> SubmissionLog {
         let mut log = self.clone();
         log.submissions[submission].events.remove(event);
         log
     }
 
-    /// The same without one wait.
+    /// A copy of the log without one wait.
     pub fn without_wait(&self, (submission, wait): (usize, usize)) -> SubmissionLog {
         let mut log = self.clone();
         log.submissions[submission].waits.remove(wait);
         log
     }
 
-    /// The first two accesses that conflict and that nothing orders. The scene says which slots are 3D images.
+    /// The first two conflicting accesses that nothing orders. The scene says which slots are 3D images.
     pub fn find_hazard(&self, scene: &Scene) -> Option<Hazard> {
         let is_volume = |slot: Slot| matches!(slot.shape(scene), Shape::Three(_));
         (0..self.submissions.len()).find_map(|s| {
@@ -108,7 +108,7 @@ impl SubmissionLog {
         })
     }
 
-    /// Walks over all that comes later than one access, and keeps for every queue which workers are ordered behind it there.
+    /// Walks over everything that was submitted after one access, and tracks by queue which stages are ordered after it.
     fn first_conflict_after(
         &self,
         (first, event): (usize, usize),
@@ -116,18 +116,18 @@ impl SubmissionLog {
         is_volume: &impl Fn(Slot) -> bool,
     ) -> Option<((usize, usize), Resource)> {
         let queue = self.submissions[first].queue;
-        let mut behind = [PipelineStages::default(); MAX_QUEUES];
-        // By submission: whether its end comes after the access.
+        let mut ordered = [PipelineStages::default(); MAX_QUEUES];
+        // By submission: its end is ordered after the access.
         let mut reached = vec![false; self.submissions.len()];
         for (s, submission) in self.submissions.iter().enumerate().skip(first) {
             let here = submission.queue;
             for wait in &submission.waits {
-                // The semaphore's value stands for everything on its queue up to there.
+                // The value of a semaphore covers everything on its queue up to there.
                 let signalled = |(n, of): (usize, &Submission)| {
                     of.queue == wait.queue && of.value <= wait.value && n >= first && reached[n]
                 };
                 if self.submissions[..s].iter().enumerate().any(signalled) {
-                    behind[here] = behind[here].with(PipelineStages::DEVICE);
+                    ordered[here] = ordered[here].with(PipelineStages::DEVICE);
                 }
             }
             let from = if s == first { event + 1 } else { 0 };
@@ -137,29 +137,29 @@ impl SubmissionLog {
                         let held = here == queue && from.has(access.stage);
                         let chained = [PipelineStage::Compute, PipelineStage::Copy, PipelineStage::Host]
                             .iter()
-                            .any(|w| from.has(*w) && behind[here].has(*w));
+                            .any(|w| from.has(*w) && ordered[here].has(*w));
                         if held || chained {
-                            behind[here] = behind[here].with(*to);
+                            ordered[here] = ordered[here].with(*to);
                         }
                     }
                     Event::Operation(later) => {
                         let conflict =
-                            later.iter().find(|l| !behind[here].has(l.stage) && must_order(access, l, is_volume));
+                            later.iter().find(|l| !ordered[here].has(l.stage) && must_order(access, l, is_volume));
                         if let Some(conflict) = conflict {
                             return Some(((s, e), conflict.resource));
                         }
                     }
                 }
             }
-            // A submission's signal comes after everything on its queue.
-            reached[s] = here == queue || behind[here] != PipelineStages::default();
+            // The signal of a submission is ordered after everything on its queue.
+            reached[s] = here == queue || ordered[here] != PipelineStages::default();
         }
         None
     }
 }
 
-/// Whether the order of two accesses matters. Parts of an array are ranges of their own; slices of a 3D image are not, but writers
-/// of different ones never meet.
+/// True if the order of two accesses matters. Layers of an array are separate; slices of a 3D image are not, except that writers of
+/// different slices never conflict.
 fn must_order(a: &Access, b: &Access, is_volume: &impl Fn(Slot) -> bool) -> bool {
     if a.resource != b.resource || !(a.write || b.write) {
         return false;
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_write_and_a_read_need_a_barrier_of_their_workers_between_them() {
+    fn a_write_and_a_read_need_a_barrier_between_their_stages() {
         let [write, read] = [touch(Slot::Picture, 0, true), touch(Slot::Picture, 0, false)];
         let one = |events: Vec<Event>| finds(vec![submitted(0, 1, &[], events)]);
         let found = one(vec![write.clone(), read.clone()]).expect("unordered");
@@ -211,7 +211,7 @@ mod tests {
         assert!(
             one(vec![barrier(PipelineStage::Compute, PipelineStage::Compute), write.clone(), read.clone()]).is_some()
         );
-        // Two barriers are a chain where the second begins with what the first ends with.
+        // Two barriers form a chain if the second begins with the stage that the first ends with.
         let [there, back] = [
             barrier(PipelineStage::Compute, PipelineStage::Copy),
             barrier(PipelineStage::Copy, PipelineStage::Compute),
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_an_array_are_apart_and_slices_of_a_volume_are_not() {
+    fn layers_of_an_array_are_independent_and_slices_of_a_volume_are_not() {
         let one = |a: Event, b: Event| finds(vec![submitted(0, 1, &[], vec![a, b])]).is_some();
         assert!(!one(touch(Slot::Frames, 0, true), touch(Slot::Frames, 1, false)));
         assert!(one(touch(Slot::Frames, 1, true), touch(Slot::Frames, 1, false)));
@@ -231,13 +231,13 @@ mod tests {
     }
 
     #[test]
-    fn between_queues_only_a_wait_orders_and_what_it_waits_for_carries_on() {
+    fn between_queues_only_waits_order_and_they_are_transitive() {
         let write = || vec![touch(Slot::Volume, 0, true)];
         let read = || vec![touch(Slot::Volume, 0, false)];
         let wait = |queue, value| Wait { queue, value };
         assert!(finds(vec![submitted(1, 1, &[], write()), submitted(0, 1, &[], read())]).is_some());
         assert_eq!(finds(vec![submitted(1, 1, &[], write()), submitted(0, 1, &[wait(1, 1)], read())]), None);
-        // A wait for what came before it is none.
+        // A wait for an earlier submission does not help.
         let late =
             vec![submitted(1, 1, &[], vec![]), submitted(1, 2, &[], write()), submitted(0, 1, &[wait(1, 1)], read())];
         assert!(finds(late).is_some());
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_submitted_counts_for_nothing() {
+    fn recordings_that_were_not_submitted_are_ignored() {
         let mut log = SubmissionLog::default();
         let access = [Access::of_slot(Slot::Picture, 0, 0..1, true, PipelineStage::Compute)];
         log.begin(0);

@@ -1,5 +1,5 @@
-//! A sweep as a Cartesian volume file: each voxel takes what lies around its place in the polar frames, trilinear in sample, line and
-//! slice. In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
+//! Conversion of a sweep to a Cartesian volume file: each voxel is interpolated in the polar frames, trilinearly in sample, line and slice.
+//! In f64 on the CPU, one slice of the result at a time, so that only the sweep itself has to fit into memory.
 
 use super::frame::Frame;
 use super::samples::{SampleType, StoredType};
@@ -10,24 +10,24 @@ use rayon::prelude::*;
 use std::io::Write;
 use std::path::Path;
 
-/// Most voxels along an edge, and in all: 32 GiB of floats.
+/// Most voxels along an edge, and in total: 32 GiB of floats.
 const MAX_EDGE: f64 = 16384.0;
 const MAX_VOXELS: f64 = 8_589_934_592.0;
 
-/// Volume files that are written.
+/// Formats of volume files that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VolumeFile {
-    /// MetaImage with its samples behind its header (.mha).
+    /// MetaImage with header and samples in one file (.mha).
     MetaImage,
-    /// NRRD 4 with raw samples behind its header (.nrrd).
+    /// NRRD 4 with header and raw samples in one file (.nrrd).
     Nrrd,
 }
 
 impl VolumeFile {
-    /// By the name's ending.
+    /// The format for the extension of a file name.
     ///
     /// # Errors
-    /// Another ending.
+    /// Another extension.
     pub fn of(path: &Path) -> Result<VolumeFile, InputError> {
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         match &*ending {
@@ -68,10 +68,10 @@ impl VolumeFile {
     }
 }
 
-/// The lattice of even spacing, mm, over all that a geometry insonifies: lateral, depth (Y of the probe), elevation.
+/// The grid of uniform spacing, mm, over the insonified region of a geometry: lateral, depth (Y of the probe), elevation.
 ///
 /// # Errors
-/// A spacing that is no length, or makes more voxels than a file may hold; in words without the file's name.
+/// In words, without the file's name: a spacing that is not a length, or that makes too many voxels.
 pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(format!("{spacing} mm: must be a finite length above 0"));
@@ -84,7 +84,7 @@ pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
             (origin, origin + last * pitch)
         }
     };
-    // The outermost voxels lie within a spacing of the bounds; one that is off by rounding is not another.
+    // The outermost voxels are within one spacing of the bounds. Tolerates rounding.
     let count = (((high - low) / spacing + 1e-9).floor() + 1.0).to_array();
     if count.iter().any(|n| n.is_nan() || *n > MAX_EDGE) || count.iter().product::<f64>() > MAX_VOXELS {
         let [x, y, z] = count;
@@ -95,24 +95,25 @@ pub fn lattice(geometry: &Geometry, spacing: f64) -> Result<Grid, String> {
     Ok(Grid { size: count.map(|n| n as usize), spacing: [spacing; 3], origin: low.to_array() })
 }
 
-/// The samples of one volume in memory, and where they lie.
+/// The samples of one volume in memory, with their geometry.
 pub struct Volume {
     geometry: Geometry,
     stored: StoredType,
-    /// Samples and lines of a frame, and frames.
+    /// Samples of a line, lines of a frame, frames.
     size: [usize; 3],
-    /// By slice in geometric order; a frame that is missing is zero.
+    /// By slice in geometric order; a missing frame is zero.
     frames: Vec<Vec<u8>>,
 }
 
 impl Volume {
+    /// A volume without frames.
     pub fn new(geometry: Geometry, stored: StoredType) -> Volume {
         let [samples, lines] = geometry.frame_size();
         let size = [samples, lines, geometry.slices()];
         Volume { geometry, stored, size, frames: vec![Vec::new(); size[2]] }
     }
 
-    /// A frame in its place. One whose place or size is not this volume's is left out.
+    /// Adds a frame. One with a wrong slice or size is ignored.
     pub fn take(&mut self, frame: Frame) {
         let bytes = self.size[0] * self.size[1] * self.stored.bytes();
         if let Some(place) = self.frames.get_mut(frame.slice).filter(|_| frame.bytes.len() == bytes) {
@@ -131,7 +132,7 @@ impl Volume {
         }
     }
 
-    /// The stored value at a place in space, mm; none outside of what is insonified.
+    /// The stored value at a point in space, mm; None outside the insonified region.
     pub fn at(&self, place: DVec3) -> Option<f64> {
         let index = match &self.geometry {
             Geometry::Sweep(probe) => self.indices(probe, place),
@@ -141,7 +142,7 @@ impl Volume {
         let mut share = [0.0; 3];
         for axis in 0..3 {
             let last = (self.size[axis] - 1) as f64;
-            // What is off by rounding at the border is still inside.
+            // Tolerates rounding at the border.
             if !(index[axis] >= -1e-6 && index[axis] <= last + 1e-6) {
                 return None;
             }
@@ -164,11 +165,11 @@ impl Volume {
         [at.sample, at.line, at.slice]
     }
 
-    /// Writes it on a lattice. `sample` is the type of the file that it came from, whose values are written; nothing is where the
-    /// sector is not: zero. `each` hears of every slice that is done.
+    /// Writes the volume on a grid. `sample`: the type of the original file, which is used for the values. Voxels outside the sector are
+    /// zero. `each` is called after every slice.
     ///
     /// # Errors
-    /// An ending that is no format, a disk that is full; then no file is left.
+    /// An extension that is not a format, a full disk. No file is left then.
     pub fn write(&self, grid: &Grid, sample: SampleType, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         let format = VolumeFile::of(path)?;
         let written = |e| InputError::unwritable(path, &e);
@@ -190,7 +191,7 @@ impl Volume {
     }
 }
 
-/// A stored value as the file's type has it, rounded to nearest.
+/// Writes a stored value in the type of the file, rounded to nearest.
 fn store(sample: SampleType, value: Option<f64>, voxel: &mut [u8]) {
     let whole = value.unwrap_or(0.0).round();
     match sample {

@@ -1,11 +1,11 @@
-//! Geometry, volumes and times in words: mm, degrees and seconds, for `info` and messages.
+//! Descriptions of geometry, volumes and times for users, in mm, degrees and seconds.
 
 use crate::files::escaped;
 use crate::probe::{Array, Axis, Grid, Motion, Probe, Volumes};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Longest path, in characters.
+/// Longest path, characters.
 const MAX_PATH_CHARACTERS: usize = 300;
 
 /// At most four decimals, without trailing zeros; large and tiny numbers with an exponent.

@@ -1,4 +1,4 @@
-//! Frames, what the frames of a source have in common, and the trait of every source that can be read at will.
+//! Frames, the header of a sequence of frames, and the trait of sources that are read on demand.
 
 use super::samples::{SampleType, StoredType};
 use crate::files::InputError;
@@ -6,54 +6,56 @@ use crate::probe::{Advance, Geometry};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Most frames a volume: as many as any reader takes.
+/// Most frames a volume, for every reader.
 const MAX_SLICES: usize = 1 << 16;
 /// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
 
-/// One polar acquisition, or one slice of a Cartesian volume.
+/// One polar 2D acquisition, or one slice of a Cartesian volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Number of the volume that the frame belongs to, from 0.
     pub volume: u32,
-    /// Place in its volume in the order of acquisition, from 0.
+    /// Index in its volume in order of acquisition, from 0.
     pub number: u32,
-    /// Place in its volume in geometric order: K - 1 - `number` when swept backwards.
+    /// Index in its volume in geometric order, from 0: K - 1 - `number` if it was swept backwards (K frames a volume).
     pub slice: usize,
-    /// The motor was on its way back.
+    /// The volume was swept backwards.
     pub backward: bool,
-    /// Time stamp, s, on the recorder's clock.
+    /// Time stamp, s, on the clock of the device that acquired it.
     pub time: Option<f64>,
-    /// Samples of the stored type, little-endian, line by line (samples fastest).
+    /// Samples of the stored type ([`Header::stored`]), little-endian, line by line (samples fastest).
     pub bytes: Vec<u8>,
 }
 
-/// What every frame of a file has in common.
+/// What all frames of a file or of a live source have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// Where samples lie in a volume that is swept forwards.
+    /// Geometry of a volume that is swept forwards.
     pub forward: Geometry,
-    /// The same backwards; the same where the motor has no part in it.
+    /// Geometry of a volume that is swept backwards; equal to `forward` if the motor stops for each frame.
     pub backward: Geometry,
     pub stored: StoredType,
-    /// Stored values that become 0 and 1.
+    /// Stored values that are shown as 0 and 1; finite, the second above the first.
     pub range: [f64; 2],
 }
 
 impl Header {
-    /// Bytes of a frame.
+    /// Size of a frame, bytes. None if it is 0 or above 1 GiB.
     pub fn frame_bytes(&self) -> Option<u64> {
         let [width, height] = self.forward.frame_size();
         let samples = (width as u64).checked_mul(height as u64)?;
         samples.checked_mul(self.stored.bytes() as u64).filter(|n| *n > 0 && *n <= MAX_FRAME_BYTES)
     }
 
+    /// Checks that frames with this header are possible.
+    ///
     /// # Errors
-    /// The field and what is wrong with it.
+    /// The field, and what is wrong with it.
     pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
         for geometry in [&self.forward, &self.backward] {
-            // First, since the rest looks at each.
+            // Checked first: the other checks visit each slice.
             if geometry.slices() > MAX_SLICES {
                 return Err(("slices", format!("are {}, at most {MAX_SLICES} a volume", geometry.slices())));
             }
@@ -68,7 +70,7 @@ impl Header {
             return Err(("backward", "has frames of another size or number than forward".into()));
         }
         if !self.forward.equals_except_advance(&self.backward) {
-            return Err(("backward", "differs from forward in more than the motor's way during a frame".into()));
+            return Err(("backward", "differs from forward in more than the motor's travel during a frame".into()));
         }
         if self.frame_bytes().is_none() {
             return Err(("forward", format!("makes frames of more than {MAX_FRAME_BYTES} bytes")));
@@ -81,38 +83,46 @@ impl Header {
     }
 }
 
-/// Where frames come from, in order of acquisition.
+/// A source of frames that is read on demand, in order of acquisition. For sources with their own clock see [`Live`](super::live::Live).
 pub trait Source: Send {
-    /// Where the samples of a volume lie; the direction of its sweep decides about the motor's advance.
+    /// Geometry of a volume. The direction of its sweep determines the motor's advance.
     fn geometry(&self, volume: usize) -> Geometry;
+    /// Type of the samples in [`Frame::bytes`].
     fn stored_type(&self) -> StoredType;
-    /// What a sample is in the file that it comes from.
+    /// Type of the samples in the file.
     fn sample_type(&self) -> SampleType {
         self.stored_type().into()
     }
-    /// Stored values that become 0 and 1.
+    /// Stored values that are shown as 0 and 1.
     fn range(&self) -> [f64; 2];
+    /// Number of complete volumes.
     fn volumes(&self) -> usize;
     fn frames_per_volume(&self) -> usize;
-    /// The next frame is the first of that volume.
+    /// Moves forwards or back to the first frame of a volume.
+    ///
+    /// # Errors
+    /// A volume that does not exist, or data that cannot be read.
     fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError>;
-    /// None after the last.
+    /// The next frame; None after the last.
+    ///
+    /// # Errors
+    /// Data that cannot be read.
     fn next_frame(&mut self) -> Result<Option<Frame>, InputError>;
-    /// What all frames have in common, either way.
+    /// What all frames have in common.
     fn header(&self) -> Header {
         header_of(self)
     }
-    /// Every file that it is read from.
+    /// Every file that is read; none for a source that is computed.
     fn files(&self) -> Vec<PathBuf> {
         Vec::new()
     }
-    /// When the frame that was given last arrived, s on the recorder's clock, where that was recorded.
+    /// When the last frame that was returned had arrived, s on the recorder's clock; None if that was not recorded.
     fn arrival(&self) -> Option<f64> {
         None
     }
 }
 
-/// What the frames of a source have in common. A source that is swept one way only says the same for both.
+/// The header of the frames of a source. If all volumes are swept in one direction, both geometries are the same.
 pub(super) fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
@@ -120,7 +130,7 @@ pub(super) fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     Header { forward, backward, stored: source.stored_type(), range: source.range() }
 }
 
-/// Whether the motor is on its way back in this geometry.
+/// True if this geometry is of a backward sweep.
 fn goes_back(geometry: &Geometry) -> bool {
     let Geometry::Sweep(probe) = geometry else { return false };
     match &probe.advance {

@@ -2,65 +2,66 @@
 //!
 //! Two steps, as in the pixel-based methods of Rohling, Gee and Berman, *A comparison of freehand three-dimensional ultrasound
 //! reconstruction techniques*, Med. Image Anal. 3 (1999), and Solberg et al., *Freehand 3D ultrasound reconstruction algorithms: a
-//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is given to the voxels around its place as it arrives ([`Splat`], [`Overlap`]),
-//! and voxels that no pixel reached are filled from those around them. The second step bridges gaps along straight lines that end in
+//! review*, Ultrasound Med. Biol. 33 (2007): every pixel is added to the voxels around its position as it arrives ([`Splat`], [`Overlap`]),
+//! and voxels without a pixel are filled from those around them. The second step bridges gaps along straight lines that end in
 //! reached voxels on both sides (Vaughan et al., *Hole filling with oriented sticks in ultrasound volume reconstruction*, J. Med. Imaging
-//! 2 (2015)): so holes up to a width are closed, wider ones stay 0 all over, and nothing grows beyond the border of what was swept.
+//! 2 (2015)): holes up to a width are closed, wider ones stay 0, and nothing is added beyond the border of the swept region.
 
 use super::samples::StoredType;
 use crate::probe::Grid;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Voxels of a volume unless asked otherwise: 2^25, about 320 along each edge.
+/// Default limit of the voxels of a volume: 2^25, about 320 along each edge.
 pub const DEFAULT_MAX_VOXELS: usize = 1 << 25;
-/// Most of these that can be asked for.
+/// Largest possible limit.
 const MAX_VOXELS: usize = 1 << 31;
-/// Weight that a voxel remembers, in pixels that hit it squarely. Beyond, it forgets half: to larger sums f32 adds one more pixel with a
-/// rounding that shows in their mean, and after 2^24 it adds none.
+/// Largest weight of a voxel, in pixels at its centre. Above it, sum and weight are halved: with larger sums, rounding in f32 would
+/// affect the mean, and after 2^24 further pixels would have no effect.
 const MAX_WEIGHT: f32 = 4096.0;
-/// What is larger cannot be added up in f32; as a sample it is no echo.
+/// Larger samples are left out: they cannot be added up in f32, and are no echoes.
 const MAX_SAMPLE: f32 = 1e30;
-/// Weights below are rounding: a pixel on a voxel's middle is not given to its neighbours.
+/// Smaller weights are rounding errors: a pixel at the centre of a voxel is not added to its neighbours.
 const MIN_WEIGHT: f64 = 1e-6;
-/// What a pixel must weigh in a voxel to be its maximum. One of the eight around it always weighs so much.
+/// Least weight of a pixel that counts for the maximum of a voxel. One of the eight voxels around a pixel always has it.
 const MIN_MAXIMUM_WEIGHT: f32 = 0.125;
 
-/// Which voxels a pixel is given to.
+/// The voxels that a pixel is added to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Splat {
-    /// The one whose middle is nearest.
+    /// The nearest one.
     Nearest,
-    /// The eight around it, each with the weight that trilinear interpolation has for it.
+    /// The eight around it, with the weights of trilinear interpolation.
     #[default]
     Trilinear,
 }
 
-/// What a voxel is that several pixels were given to.
+/// The value of a voxel with several pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overlap {
-    /// Their weighted mean, whatever their order up to rounding.
+    /// Their weighted mean, independent of their order up to rounding.
     #[default]
     Mean,
-    /// The weighted mean of those of the frame that came last.
+    /// The weighted mean of those of the last frame.
     Latest,
-    /// The largest of those that weigh at least an eighth.
+    /// The largest of those with a weight of at least an eighth.
     Maximum,
 }
 
-/// How frames are compounded.
+/// Options of a [`Compounder`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompoundingOptions {
     pub splat: Splat,
     pub overlap: Overlap,
-    /// Widest gap that is bridged, mm; at most 64 voxels. 0: none.
+    /// Widest hole that is filled, mm; at most 64 voxels. 0: none.
     pub max_hole: f64,
-    /// The part of each frame that is ultrasound: column and row of its first pixel, columns, rows. `None`: all of it.
+    /// The ultrasound region of each frame: first column, first row, columns, rows. `None`: all of it.
     pub clip: Option<[usize; 4]>,
-    /// Distance between voxels along each axis, mm. `None`: between the frames' pixels.
+    /// Distance between voxels along each axis, mm. `None`: that of the frames' pixels.
     pub spacing: Option<f64>,
-    /// What the volume has around the frames that it was laid around, mm.
+    /// Margin of the volume around the frames that it is placed around, mm.
     pub margin: f64,
+    /// Most voxels of the volume.
     pub max_voxels: usize,
 }
 
@@ -78,41 +79,41 @@ impl Default for CompoundingOptions {
     }
 }
 
-/// What became of the frames.
+/// Counts of frames and pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompoundingCounts {
-    /// Compounded.
+    /// Compounded frames.
     pub frames: u64,
-    /// Of the compounded: those of which no pixel lies in the volume.
+    /// Compounded frames without a pixel in the volume.
     pub outside: u64,
-    /// Without a usable pose, or with samples that do not fit their size.
+    /// Frames without a valid pose, or with the wrong number of samples.
     pub refused: u64,
     /// Pixels left out because they were not finite, or beyond 1e30.
     pub pixels: u64,
 }
 
-/// A volume that grows frame by frame.
+/// Compounds tracked frames into a volume.
 ///
-/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and those of the stored type for each slice that a frame has come near.
+/// Memory: 8 bytes a voxel, 4 more with [`Overlap::Latest`], and those of the stored type for each slice near a frame.
 pub struct Compounder {
     lattice: Lattice,
     stored: StoredType,
     options: CompoundingOptions,
     voxels: Voxels,
     sticks: Sticks,
-    /// Hit since they were last given out.
+    /// Slices with new pixels since the last [`Compounder::changed_slices`].
     touched: Vec<bool>,
-    /// As they were last given out; empty: zero all over.
+    /// Filled slices; an empty one is all zero.
     slices: Vec<Vec<u8>>,
     zero: Vec<u8>,
     counts: CompoundingCounts,
 }
 
 impl Compounder {
-    /// An empty volume whose voxels are `stored`; frames may be of any type, and are given without scaling.
+    /// An empty volume with voxels of type `stored`. Frames may have any type; their values are not scaled.
     ///
     /// # Errors
-    /// A lattice or options that cannot be, or more voxels than the options allow; in words, before anything is allocated.
+    /// In words: a lattice or options that are not valid, or more voxels than the options allow. Nothing is allocated then.
     pub fn new(lattice: Lattice, stored: StoredType, options: CompoundingOptions) -> Result<Compounder, String> {
         let grid = &lattice.grid;
         grid.check().map_err(|e| format!("{} {}", e.field, e.fault))?;
@@ -154,10 +155,10 @@ impl Compounder {
         self.counts
     }
 
-    /// Compounds a frame: how many of its pixels lie in the volume.
+    /// Compounds a frame. Returns the number of its pixels in the volume.
     ///
     /// # Errors
-    /// What is wrong with a frame that is refused; it is counted, and the volume stays as it is.
+    /// In words, why the frame is refused. It is counted, and the volume is not changed.
     pub fn push(&mut self, frame: &TrackedFrame) -> Result<u64, String> {
         let checked = frame.check().and_then(|()| frame.pose.clipped(self.options.clip));
         let [columns, rows] = match checked {
@@ -194,7 +195,7 @@ impl Compounder {
         Ok(inside)
     }
 
-    /// Fills the slices anew that frames have come near since the last time, and names them, lowest first.
+    /// Fills the slices near new pixels again, and returns their indices in rising order.
     pub fn changed_slices(&mut self) -> Vec<usize> {
         let (reach, last) = (self.sticks.reach(), self.touched.len());
         let near = |k: usize| self.touched[k.saturating_sub(reach)..(k + reach + 1).min(last)].contains(&true);
@@ -208,27 +209,27 @@ impl Compounder {
         changed
     }
 
-    /// A slice as it was when [`Compounder::changed_slices`] last named it: rows of depth, lateral fastest, little-endian. Zero where nothing
-    /// is; `None` beyond the last.
+    /// A slice as of the last [`Compounder::changed_slices`]: rows of depth, lateral fastest, little-endian. Zero where there are no pixels;
+    /// `None` beyond the last slice.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.slices.get(k).map(|slice| if slice.is_empty() { &self.zero[..] } else { &slice[..] })
     }
 }
 
-/// No pixel lies further off, mm.
+/// Largest coordinate of a pixel, mm.
 const MAX_DISTANCE: f64 = 1e6;
-/// Least sine of the angle between rows and columns: below, the frame is a line.
+/// Least sine of the angle between rows and columns. Below it, the frame is a line.
 const MIN_SINE: f64 = 1e-3;
 /// Most columns and rows.
 const MAX_PIXELS: usize = 1 << 16;
 
-/// First column and the one behind the last, and rows likewise.
+/// Ranges of columns and rows: first, and one past the last.
 type PixelRange = [(usize, usize); 2];
 
-/// Where the pixels of a frame lie.
+/// Position and orientation of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// From (column, row, 0), of pixels' middles and from 0, to a place in the tracker's space, mm. Its third axis is not used.
+    /// From (column, row, 0) of a pixel's centre, from 0, to the space of the tracker, mm. The third axis is not used.
     pub to_space: DAffine3,
     /// Columns and rows.
     pub size: [usize; 2],
@@ -244,13 +245,15 @@ pub struct TrackedFrame<'a> {
 }
 
 impl Pose {
-    /// The place of a pixel, mm.
+    /// The position of a pixel, mm.
     pub fn place(&self, column: f64, row: f64) -> DVec3 {
         self.to_space.transform_point3(DVec3::new(column, row, 0.0))
     }
 
+    /// Checks the pose.
+    ///
     /// # Errors
-    /// A frame without pixels, or whose pose is not finite, is flat, or lies beyond 1e6 mm; in words.
+    /// In words: no pixels, or a pose that is not finite, is degenerate, or is beyond 1e6 mm.
     pub fn check(&self) -> Result<(), String> {
         let [columns, rows] = self.size;
         if !(1..=MAX_PIXELS).contains(&columns) || !(1..=MAX_PIXELS).contains(&rows) {
@@ -275,10 +278,10 @@ impl Pose {
         }
     }
 
-    /// What a clip rectangle leaves.
+    /// The pixels in a clip rectangle.
     ///
     /// # Errors
-    /// Nothing is left.
+    /// There are none.
     fn clipped(&self, clip: Option<[usize; 4]>) -> Result<PixelRange, String> {
         let [columns, rows] = self.size;
         let [x, y, width, height] = clip.unwrap_or([0, 0, columns, rows]);
@@ -294,8 +297,10 @@ impl Pose {
 }
 
 impl TrackedFrame<'_> {
+    /// Checks pose and samples.
+    ///
     /// # Errors
-    /// As of [`Pose::check`], and samples that are more or fewer than its pixels.
+    /// As [`Pose::check`], and a number of samples that is not that of the pixels.
     pub fn check(&self) -> Result<(), String> {
         self.pose.check()?;
         let [columns, rows] = self.pose.size;
@@ -306,7 +311,7 @@ impl TrackedFrame<'_> {
         }
     }
 
-    /// None beyond the last.
+    /// A sample; None beyond the last.
     fn sample(&self, column: usize, row: usize) -> Option<f32> {
         let n = row * self.pose.size[0] + column;
         let of = |bytes: usize| self.bytes.get(n * bytes..);
@@ -318,35 +323,35 @@ impl TrackedFrame<'_> {
     }
 }
 
-/// Most voxels along an edge: what 3D textures have on most devices.
+/// Most voxels along an edge: the limit of 3D textures on most devices.
 const MAX_EDGE: f64 = 2048.0;
-/// Steps in which the spacing is made coarser; each takes most of what is too much.
+/// Most steps of making the spacing coarser. Each step removes most of the excess.
 const COARSENING_STEPS: usize = 64;
 
-/// Where the voxels of a volume lie in the tracker's space.
+/// The grid of a volume, and its position in the space of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     pub grid: Grid,
-    /// From the tracker's space to the volume's, mm: a turn and a shift.
+    /// From the space of the tracker to that of the volume, mm: a rotation and a translation.
     pub to_volume: DAffine3,
 }
 
 impl Lattice {
-    /// A lattice in the tracker's own axes.
+    /// A lattice along the axes of the tracker.
     pub fn straight(grid: Grid) -> Lattice {
         Lattice { grid, to_volume: DAffine3::IDENTITY }
     }
 
-    /// The lattice that holds some frames, `options.margin` around them.
+    /// The lattice that contains the frames, with a margin of `options.margin`.
     ///
-    /// Its axes are the mean of theirs: lateral along the rows, depth down the columns and at a right angle to it, elevation along the
-    /// normal (lateral x depth). The origin is the mean of the middles of their first rows, as if the probe's face were there. What the clip
-    /// leaves out does not count. The distance of voxels is what was asked for, otherwise that of pixels along rows and columns and the
-    /// larger of both along the normal; all three are made coarser until there are no more than `options.max_voxels`, and 2048 along
-    /// an edge. Poses that place no frame are left out.
+    /// Its axes are the mean of theirs: lateral along the rows, depth along the columns and perpendicular to lateral, elevation along the
+    /// normal (lateral x depth). The origin is the mean of the centres of their first rows, as if that were the face of the probe. Only the
+    /// clipped part of the frames is used. The spacing is that of the options, otherwise that of the pixels along rows and columns, and the
+    /// larger of both along the normal. It is made coarser until there are at most `options.max_voxels`, and at most 2048 along an edge.
+    /// Poses that are not valid are left out.
     ///
     /// # Errors
-    /// No pose is left, or no length, or nothing coarse enough; in words.
+    /// In words: no valid pose, an option out of its range, or no spacing that is coarse enough.
     pub fn around(poses: &[Pose], options: &CompoundingOptions) -> Result<Lattice, String> {
         let length = |what, mm: f64, least: f64| match (least..=1e6).contains(&mm) {
             true => Ok(()),
@@ -366,11 +371,11 @@ impl Lattice {
             placed.iter().map(|(pose, clip)| of(pose, *clip)).sum::<DVec3>() / placed.len() as f64
         };
         let [right, down] = [|pose: &Pose| pose.to_space.matrix3.x_axis, |pose: &Pose| pose.to_space.matrix3.y_axis];
-        let turned = axes(mean(&|p, _| right(p).normalize()), mean(&|p, _| down(p).normalize()))
+        let rotation = axes(mean(&|p, _| right(p).normalize()), mean(&|p, _| down(p).normalize()))
             .or_else(|| axes(right(first).normalize(), down(first).normalize()))
             .unwrap_or(DMat3::IDENTITY);
         let origin = mean(&|pose, [columns, rows]| pose.place((columns.0 + columns.1 - 1) as f64 / 2.0, rows.0 as f64));
-        let to_volume = DAffine3::from_mat3(turned.transpose()) * DAffine3::from_translation(-origin);
+        let to_volume = DAffine3::from_mat3(rotation.transpose()) * DAffine3::from_translation(-origin);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for (pose, [columns, rows]) in &placed {
             for (column, row) in
@@ -391,8 +396,8 @@ impl Lattice {
     }
 }
 
-/// Axes at right angles, as columns: the first kept, the second as near to what is given as that allows. None where there is hardly a
-/// direction: frames that point every way have no mean.
+/// Orthogonal axes, as columns: the first one is kept, the second is as near to `down` as possible. None if a vector is almost zero, as the
+/// mean of frames that point in all directions.
 fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
     const LEAST: f64 = 5e-4;
     let x = right.try_normalize().filter(|_| right.length() > LEAST)?;
@@ -401,11 +406,11 @@ fn axes(right: DVec3, down: DVec3) -> Option<DMat3> {
     Some(DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// The lattice from `low` to `high`, its spacing as little coarser as `most` voxels allow.
+/// The grid from `low` to `high`, with the finest spacing of at most `most` voxels.
 fn grid(low: DVec3, high: DVec3, mut spacing: DVec3, most: usize) -> Result<Grid, String> {
     let most = most.max(1) as f64;
     for _ in 0..COARSENING_STEPS {
-        // Of the outermost voxels, each end is within a quarter of the spacing.
+        // The outermost voxels are within a quarter of the spacing of the ends.
         let count = ((high - low) / spacing).round() + 1.0;
         let (all, along) = (count.element_product(), count.max_element());
         if all <= most && along <= MAX_EDGE {
@@ -418,16 +423,16 @@ fn grid(low: DVec3, high: DVec3, mut spacing: DVec3, most: usize) -> Result<Grid
     Err(format!("no spacing makes {most} voxels or fewer of {:.1} mm", high - low))
 }
 
-/// Weighted sums, lateral fastest, then depth, then elevation.
+/// Weighted sums of the pixels of each voxel: lateral fastest, then depth, then elevation.
 struct Voxels {
     size: [usize; 3],
     overlap: Overlap,
-    /// Sum of weighted values, and of weights; the second is 0 where nothing came.
+    /// Sum of weighted values, and of weights; the latter is 0 for a voxel without pixels.
     sums: Vec<[f32; 2]>,
-    /// The frame that a voxel's sums are of; only with [`Overlap::Latest`].
+    /// The frame of each voxel's sums; only for [`Overlap::Latest`].
     frames: Vec<u32>,
     frame: u32,
-    /// By row: lowest and highest lateral index that anything came to; reversed where nothing did.
+    /// By row: lowest and highest lateral index with pixels; reversed if there are none.
     rows: Vec<[u32; 2]>,
 }
 
@@ -438,16 +443,16 @@ impl Voxels {
         Voxels { size, overlap, sums: vec![[0.0; 2]; x * y * z], frames, frame: 0, rows: vec![[u32::MAX, 0]; y * z] }
     }
 
-    /// What follows is of another frame.
+    /// Begins another frame.
     fn begin(&mut self) {
-        // 0 is of none.
+        // 0 means no frame.
         self.frame = self.frame.wrapping_add(1).max(1);
     }
 
-    /// Gives a pixel's value to the voxels around a place, in indices. `touched`: slices that something came to. False: no voxel is there.
+    /// Adds a pixel at a position in voxel indices. Sets `touched` for its slices. False if no voxel is there.
     fn splat(&mut self, at: DVec3, value: f32, splat: Splat, touched: &mut [bool]) -> bool {
         let size = DVec3::from_array(self.size.map(|n| n as f64));
-        // No voxel is within reach. NaN is in no range.
+        // No voxel is within reach, or NaN.
         if !(at.cmpgt(DVec3::NEG_ONE).all() && at.cmplt(size).all()) {
             return false;
         }
@@ -498,12 +503,12 @@ impl Voxels {
         touched[z] = true;
     }
 
-    /// The value of voxel `n` of all, if anything came to it.
+    /// The value of voxel `n`, if it has pixels.
     fn value(&self, n: usize) -> Option<f32> {
         self.sums.get(n).filter(|[_, weight]| *weight > 0.0).map(|[sum, weight]| sum / weight)
     }
 
-    /// Lowest and highest lateral and depth index, ends included, that anything came to in some slices.
+    /// Lowest and highest lateral and depth index with pixels in some slices, inclusive.
     fn bounds(&self, slices: std::ops::Range<usize>) -> Option<[[usize; 2]; 2]> {
         let depth = self.size[1];
         let rows = self.rows.get(slices.start * depth..slices.end * depth)?;
@@ -518,10 +523,10 @@ impl Voxels {
     }
 }
 
-/// Widest hole, in voxels.
+/// Widest hole, voxels.
 const MAX_HOLE_VOXELS: f64 = 64.0;
 
-/// Straight lines through a voxel along which a hole may be bridged.
+/// Straight lines through a voxel along which a hole may be filled.
 struct Sticks {
     sticks: Vec<Stick>,
 }
@@ -529,32 +534,32 @@ struct Sticks {
 struct Stick {
     /// Voxels along each axis, -1, 0 or 1.
     step: [isize; 3],
-    /// Of a step, mm.
+    /// Length of a step, mm.
     length: f64,
-    /// Empty voxels between both ends.
+    /// Most empty voxels between both ends.
     most: usize,
 }
 
 impl Sticks {
     /// # Errors
-    /// A width that is no length, or of more voxels than are looked through.
+    /// A width that is not a length, or more than 64 voxels.
     fn new(grid: &Grid, widest: f64) -> Result<Sticks, String> {
         let finest = grid.spacing.into_iter().fold(f64::INFINITY, f64::min);
         if !(widest >= 0.0 && widest / finest <= MAX_HOLE_VOXELS) {
             return Err(format!("widest hole {widest} mm: must be 0 to {MAX_HOLE_VOXELS} voxels of {finest} mm"));
         }
         let steps = (0..27isize).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]);
-        // Each line once, in the direction whose last step that is not 0 is 1.
+        // Each line once: in the direction whose last non-zero step is 1.
         let once = steps.filter(|s| s.iter().rev().find(|v| **v != 0) == Some(&1));
         let stick = |step: [isize; 3]| {
             let length = (0..3).map(|a| (step[a] as f64 * grid.spacing[a]).powi(2)).sum::<f64>().sqrt();
-            // A width of whole voxels is not one less by rounding.
+            // Tolerates rounding of a width that is a multiple of the spacing.
             Stick { step, length, most: (widest / length + 1e-9) as usize }
         };
         Ok(Sticks { sticks: once.map(stick).filter(|s| s.most > 0).collect() })
     }
 
-    /// How many slices off a voxel may be that fills another.
+    /// Largest distance, in slices, between a voxel and one that it is filled from.
     fn reach(&self) -> usize {
         self.sticks.iter().filter(|s| s.step[2] != 0).map(|s| s.most).max().unwrap_or(0)
     }
@@ -564,7 +569,7 @@ impl Sticks {
         let [width, height, depth] = voxels.size;
         let mut bytes = vec![0; width * height * stored.bytes()];
         let slices = z.saturating_sub(self.reach())..(z + self.reach() + 1).min(depth);
-        // What lies between two voxels lies within the bounds of all.
+        // A voxel between two others is within the bounds of all.
         let Some([[left, right], [top, bottom]]) = voxels.bounds(slices) else { return bytes };
         for y in top..=bottom {
             for x in left..=right {
@@ -578,21 +583,21 @@ impl Sticks {
         bytes
     }
 
-    /// The mean of the ends of all sticks that are whole, weighted by one over their distance: along a single stick the straight line
-    /// between its ends.
+    /// The mean of the ends of all sticks that have both, weighted by the inverse of their distance. For a single stick that is the linear
+    /// interpolation between its ends.
     fn bridged(&self, voxels: &Voxels, cell: [usize; 3], n: usize) -> Option<f32> {
         let [width, height, _] = voxels.size;
         let (mut sum, mut weights) = (0.0, 0.0);
         for Stick { step, length, most } in &self.sticks {
             let stride = step[0] + width as isize * (step[1] + height as isize * step[2]);
-            // The first voxel with a value, at most `steps` off, and how far.
+            // The first voxel with a value within `steps` steps, and its distance.
             let end = |sign: isize, steps: usize| {
-                let room = |a: usize| match step[a] * sign {
+                let available = |a: usize| match step[a] * sign {
                     0 => usize::MAX,
                     1 => voxels.size[a] - 1 - cell[a],
                     _ => cell[a],
                 };
-                let steps = steps.min(room(0)).min(room(1)).min(room(2));
+                let steps = steps.min(available(0)).min(available(1)).min(available(2));
                 let at = |s: usize| n.wrapping_add_signed(sign * stride * s as isize);
                 (1..=steps).find_map(|s| voxels.value(at(s)).map(|value| (s, f64::from(value))))
             };
@@ -606,14 +611,14 @@ impl Sticks {
     }
 }
 
-/// Stores a value, rounded to nearest where the type is whole.
+/// Stores a value, rounded to nearest for an integer type.
 fn put(bytes: &mut [u8], stored: StoredType, n: usize, value: f32) {
     let at = n * stored.bytes();
     let Some(place) = bytes.get_mut(at..at + stored.bytes()) else { return };
     match stored {
         StoredType::U8 => place.copy_from_slice(&[value.round() as u8]),
         StoredType::U16 => place.copy_from_slice(&(value.round() as u16).to_le_bytes()),
-        // As no reader lets a denormal through, neither does a mean.
+        // Denormals are flushed, as in every reader.
         StoredType::F32 if value.is_subnormal() => {}
         StoredType::F32 => place.copy_from_slice(&value.to_le_bytes()),
     }

@@ -13,11 +13,11 @@ use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 const MAGIC: &[u8; 16] = b"KRETZFILE 1.0   ";
-/// The format does not say; m/s.
+/// Speed of sound, which the format omits, m/s.
 const SOUND_SPEED: f64 = 1540.0;
-/// An angle table of 65536 entries is the longest item that is read whole.
+/// Longest item that is read completely: an angle table of 65536 entries.
 const MAX_TABLE_BYTES: u64 = 65_536 * 8;
-/// Files have some hundred items; zeros without end are items as well.
+/// Most items. Real files have some hundred; a file of zeros has any number.
 const MAX_ITEMS: usize = 100_000;
 
 type Tag = (u16, u16);
@@ -33,17 +33,17 @@ const VOXELS: Tag = (0xd000, 1);
 const END: Tag = (0xffff, 0xffff);
 const READ_WHOLE: [Tag; 8] =
     [SAMPLES, LINES, FRAMES, RADIAL_STEP, ARRAY_RADIUS, MINUS_AXIS_DEPTH, SWEEP_ANGLES, LINE_ANGLES];
-/// Elements of group 0002 that are there when the voxels are wavelet-compressed.
+/// Elements of group 0002 that exist if the voxels are wavelet-compressed.
 const WAVELET: [Tag; 3] = [(2, 0x1000), (2, 0x1100), (2, 0x1200)];
 
-/// The items of a file that matter here. Where an item comes twice the first counts.
+/// The items of a file that are used. Of repeated items the first one counts.
 struct Items<'a> {
     path: &'a Path,
     small: HashMap<Tag, Vec<u8>>,
     /// Offset and length.
     voxels: Option<(u64, u64)>,
     wavelet: bool,
-    /// There are items of further volumes in time.
+    /// There are items of further volumes in time (4D).
     four_d: bool,
 }
 

@@ -9,17 +9,17 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Most samples, lines or frames along one dimension.
+/// Most samples, lines or frames.
 const MAX_EXTENT: u64 = 65_536;
-/// Most bytes of one frame.
+/// Largest frame, bytes.
 const MAX_FRAME_BYTES: u64 = 1 << 30;
 
-/// A file's layout, and what it says of its own geometry.
+/// The layout of a recorded file, and the geometry that is stored in it.
 pub(super) struct Layout {
     pub format: &'static str,
     pub sample: SampleType,
     pub big_endian: bool,
-    /// Samples and lines, or width and height: the first runs fastest.
+    /// Samples and lines, or width and height; the first index is the fastest.
     pub frame_size: [usize; 2],
     pub frames: usize,
     pub pixels: Pixels,
@@ -27,26 +27,26 @@ pub(super) struct Layout {
     pub geometry: StoredGeometry,
     /// Time stamps by frame, s.
     pub times: BTreeMap<usize, f64>,
-    /// For people to read. Never a patient field.
+    /// Remarks for users: title and text. Never a patient field.
     pub remarks: Vec<(String, String)>,
 }
 
-/// How a frame's rows would be scan lines.
+/// How the rows of a frame relate to scan lines.
 pub(super) enum LineOrder {
     InOrder,
     /// The last line comes first.
     Reversed,
-    /// They are not: the frames are pictures. Says by which word.
+    /// They are not scan lines: the frames are pictures. Holds the value in the file that says so.
     Pictures(String),
 }
 
-/// The geometry that stands in the file.
+/// The geometry that is stored in a file.
 pub(super) enum StoredGeometry {
     /// One polar volume.
     Sweep(Box<Probe>),
-    /// So many Cartesian volumes, one after the other.
+    /// Cartesian volumes, and how many there are.
     Pictures(Grid, usize),
-    /// None, and it cannot do without.
+    /// None, although the file needs one.
     Missing(InputError),
 }
 
@@ -55,13 +55,13 @@ impl Layout {
         self.frame_size[0] as u64 * self.frame_size[1] as u64 * self.sample.bytes() as u64
     }
 
-    /// Refuses sizes that cannot be true of a file of this length, so that no claim of a header is ever allocated.
+    /// Refuses sizes that are impossible for a file of this length, so that a false header never causes a large allocation.
     pub fn check(&self, file: &Path, size_field: &str) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(file, field, fault));
         if self.frame_bytes() > MAX_FRAME_BYTES {
             return fault(size_field, format!("one frame has {} bytes, at most 1 GiB is read", self.frame_bytes()));
         }
-        // Cannot overflow: a frame has at most 2^30 bytes and there are at most 2^16 frames.
+        // Cannot overflow: at most 2^16 frames of at most 2^30 bytes.
         let claimed = self.frame_bytes() * self.frames as u64;
         let there = self.pixels.length;
         if !self.pixels.compressed && claimed > there {
@@ -74,7 +74,7 @@ impl Layout {
     }
 }
 
-/// A number of samples, lines or frames as a file states it.
+/// Checks a number of samples, lines or frames.
 pub(super) fn extent(file: &Path, field: &str, which: &str, value: u64) -> Result<usize, InputError> {
     match value {
         0 => Err(InputError::new(file, field, format!("{which}is 0, must be at least 1"))),
@@ -83,28 +83,28 @@ pub(super) fn extent(file: &Path, field: &str, which: &str, value: u64) -> Resul
     }
 }
 
-/// Deflate cannot make more than this many bytes of one: 258 from each two bits, so 1032 (zlib, "technical details").
+/// Largest ratio that deflate can reach: 258 bytes from two bits, so 1032 (zlib, "technical details").
 pub(super) const MAX_INFLATED: u64 = 1032;
 
-/// Where in which file the samples lie.
+/// The location of the samples: file and range of bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Pixels {
     pub path: PathBuf,
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u64,
-    /// Bytes in the file, compressed or not.
+    /// Length in the file, bytes, compressed or not.
     pub length: u64,
     pub compressed: bool,
 }
 
-/// The samples from some place on.
+/// The samples as a stream.
 pub(super) enum PixelStream {
     Raw(BufReader<File>),
     Zlib(Box<Inflate>),
 }
 
 impl Pixels {
-    /// The stream from `skip` bytes on. A compressed stream is inflated up to there.
+    /// Opens the stream `skip` bytes after its beginning. A compressed stream is inflated up to there.
     pub fn open(&self, skip: u64) -> io::Result<PixelStream> {
         let mut file = File::open(&self.path)?;
         if !self.compressed {
@@ -130,8 +130,8 @@ impl PixelStream {
         }
     }
 
-    /// Appends `bytes` bytes to `out`, or as many as there are. The buffer grows with what arrives, not with what was
-    /// asked for: the number may be a header's mere claim.
+    /// Appends `bytes` bytes to `out`, or as many as there are. The buffer grows with the data that arrive and not with the requested
+    /// number, which may come from a false header.
     pub fn fill(&mut self, bytes: u64, out: &mut Vec<u8>) -> io::Result<()> {
         match self {
             PixelStream::Raw(file) => file.take(bytes).read_to_end(out)?,
@@ -140,7 +140,7 @@ impl PixelStream {
         Ok(())
     }
 
-    /// Reads on to the end of a compressed stream, where its checksum is compared; bytes that came before the end.
+    /// Reads a compressed stream to its end, where its checksum is verified. Returns the number of bytes that were left.
     pub fn finish(&mut self) -> io::Result<u64> {
         match self {
             PixelStream::Raw(_) => Ok(0),
@@ -149,7 +149,7 @@ impl PixelStream {
     }
 }
 
-/// A zlib stream. Unlike flate2's own reader it tells a stream that was cut off from one that is complete.
+/// A zlib stream. Unlike flate2's own reader it detects a stream that is cut short.
 pub(super) struct Inflate {
     input: BufReader<io::Take<File>>,
     state: Decompress,

@@ -1,71 +1,72 @@
-//! What arrives by itself: the one trait behind every live source, and files played as if they were live.
+//! Live sources: the trait that all of them implement, and recordings that are played back as if they were live.
 
 use super::frame::{Frame, Header, Source};
 use std::time::{Duration, Instant};
 
-/// What a live source says next.
+/// An event of a live source.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// What the frames that follow have in common: before the first, and again whenever it changes. Volumes of before are over.
+    /// The header of the frames that follow: before the first frame, and whenever it changes. All earlier volumes are over.
     Begin(Box<Header>),
-    /// A whole frame.
+    /// A complete frame.
     Frame(Frame),
-    /// Lines of a frame, from line `first` on, in `frame.bytes`; those of a frame follow one another, and the last completes it.
+    /// Scan lines of a frame, from line `first` on, in `frame.bytes`. The lines of a frame arrive in order; the last one completes it.
     Lines { frame: Frame, first: usize },
-    /// Something was left out, and why; the source goes on.
+    /// Something was left out, and why. The source goes on.
     Fault(String),
-    /// Nothing has come.
+    /// Nothing arrived within the given time.
     Idle,
-    /// Nothing will come any more, and why if that was not to be expected.
+    /// The source has ended, with the reason if that was unexpected.
     End(Option<String>),
 }
 
-/// Where frames come from on their own clock. Volumes are numbered upwards; a frame belongs to the volume whose number it has.
+/// A source whose frames arrive on its own clock. Implement it to stream from a device of your own.
 ///
-/// Every source is total: whatever comes in is a frame or a fault, and no more memory is taken than the source states.
+/// Contract: [`Event::Begin`] comes before the first frame. Volume numbers never decrease. After [`Event::End`] the source is
+/// not asked again. Any input gives frames or faults, never a panic, and a source takes no more memory than it documents.
 pub trait Live: Send {
-    /// What comes next, waiting for it at most about so long.
+    /// The next event. Waits for it for about `patience` at most, then returns [`Event::Idle`].
     fn next(&mut self, patience: Duration) -> Event;
 
-    /// Whether it can be kept waiting without losing anything, as a file or a pipe can. What cannot loses whole volumes instead.
+    /// True if the source loses nothing when it is not asked for a while, as a file or a pipe. Otherwise complete volumes are lost
+    /// instead when the caller is slow.
     fn can_wait(&self) -> bool;
 }
 
 /// When the frames of a file arrive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Playback {
-    /// As soon as they are asked for.
+    /// As soon as they are requested.
     Fast,
-    /// So many volumes a second, their frames evenly spread.
+    /// So many volumes a second, with their frames evenly spaced.
     Volumes(f64),
-    /// As they were stamped: by the time of arrival where that was recorded, else by the time of the frame. Those without a stamp
-    /// follow at once.
+    /// By their recorded time of arrival, otherwise by their time stamp. Frames without either follow at once.
     Recorded,
 }
 
-/// A recording or the phantom as a live source. Between two frames it holds none.
+/// A recording or the phantom as a live source. It buffers at most one frame.
 pub struct PlaybackSource {
     source: Box<dyn Source>,
-    pace: Playback,
-    /// Times that the whole is played.
+    playback: Playback,
+    /// How often the source is played.
     rounds: u32,
     round: u32,
-    /// What the numbers of this round's volumes begin with, and the highest that was given.
+    /// Number of the first volume of this round, and the highest number so far.
     base: u32,
     highest: u32,
     begun: Option<(Instant, f64)>,
     header: Option<Header>,
-    /// A frame that is due later.
+    /// A frame that is not due yet, and when it is.
     waiting: Option<(Instant, Frame)>,
     frames: u64,
 }
 
 impl PlaybackSource {
-    /// `rounds`: how often to play it; volumes go on being numbered.
-    pub fn new(source: Box<dyn Source>, pace: Playback, rounds: u32) -> PlaybackSource {
+    /// Plays `source` `rounds` times. The volume numbers go on from round to round.
+    pub fn new(source: Box<dyn Source>, playback: Playback, rounds: u32) -> PlaybackSource {
         PlaybackSource {
             source,
-            pace,
+            playback,
             rounds,
             round: 0,
             base: 0,
@@ -77,7 +78,7 @@ impl PlaybackSource {
         }
     }
 
-    /// The next frame and when it is due, on from the first.
+    /// The next frame, and when it is due.
     fn read(&mut self) -> Result<Option<(Instant, Frame)>, String> {
         let mut frame = match self.source.next_frame().map_err(|e| e.to_string())? {
             Some(frame) => frame,
@@ -86,7 +87,7 @@ impl PlaybackSource {
                 if self.round >= self.rounds || self.frames == 0 {
                     return Ok(None);
                 }
-                // Stamps begin again.
+                // The time stamps begin again.
                 self.begun = None;
                 self.base = self.highest.wrapping_add(1);
                 self.source.skip_to_volume(0).map_err(|e| e.to_string())?;
@@ -98,20 +99,20 @@ impl PlaybackSource {
         };
         frame.volume = frame.volume.wrapping_add(self.base);
         self.highest = frame.volume;
-        let stamp = match self.pace {
+        let stamp = match self.playback {
             Playback::Fast => 0.0,
             Playback::Volumes(rate) => self.frames as f64 / (rate * self.source.frames_per_volume().max(1) as f64),
             Playback::Recorded => self.source.arrival().or(frame.time).unwrap_or(0.0),
         };
         self.frames += 1;
         let (began, first) = *self.begun.get_or_insert_with(|| (Instant::now(), stamp));
-        // A stamp that is no time, or lies before the first, is due at once; so is one that lies in another age.
+        // A stamp that is not finite or before the first is due at once.
         let after = Duration::try_from_secs_f64((stamp - first).clamp(0.0, MAX_SPAN)).unwrap_or_default();
         Ok(Some((began + after, frame)))
     }
 }
 
-/// Between the first and the last frame of a recording, s: ten days.
+/// Longest time from the first to the last frame of a recording, s: ten days.
 const MAX_SPAN: f64 = 864_000.0;
 
 impl Live for PlaybackSource {
@@ -140,6 +141,6 @@ impl Live for PlaybackSource {
     }
 
     fn can_wait(&self) -> bool {
-        self.pace == Playback::Fast
+        self.playback == Playback::Fast
     }
 }

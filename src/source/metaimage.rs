@@ -86,7 +86,7 @@ fn dimensions(path: &Path, header: &Header) -> Result<[usize; 3], InputError> {
     Ok(size)
 }
 
-/// The lattice of the voxels. A rotation in space is not applied: the volume is shown as it lies in the file.
+/// The grid of the voxels. A rotation in space is not applied.
 fn lattice(header: &Header, size: [usize; 3], remarks: &mut Vec<(String, String)>) -> Result<Grid, InputError> {
     let count = if header.get("NDims") == Some("2") { 2 } else { 3 };
     let mut grid = Grid { size, spacing: [1.0; 3], origin: [0.0; 3] };
@@ -111,8 +111,8 @@ fn lattice(header: &Header, size: [usize; 3], remarks: &mut Vec<(String, String)
     Ok(grid)
 }
 
-/// PLUS names the axes of a frame by the way they run on the transducer: the first letter is the fastest. F is far from it,
-/// so FM is scan lines in order, FU scan lines from the last to the first; M and U first are rows of pictures.
+/// PLUS names the axes of a frame by their direction on the transducer, the fastest one first. F is away from it, so FM is scan lines in
+/// order and FU is scan lines from last to first. M or U as the first letter means rows of pictures.
 fn line_order(header: &Header) -> Result<LineOrder, InputError> {
     match header.get("UltrasoundImageOrientation") {
         None | Some("FM" | "FMA") => Ok(LineOrder::InOrder),
@@ -140,13 +140,13 @@ fn own_pictures(path: &Path, header: &Header, mut grid: Grid, lines: &LineOrder)
             return header.fault("UltrasoundImageType", fault);
         }
     }
-    // Frames in time are no neighbours in space: each is a volume of one slice.
+    // Frames in time are not neighbours in space: each is a volume of one slice.
     let in_time = header.sequence || header.get("Kinds").is_some_and(|k| k.split_whitespace().nth(2) == Some("list"));
     let volumes = if in_time { std::mem::replace(&mut grid.size[2], 1) } else { 1 };
     Ok(StoredGeometry::Pictures(grid, volumes))
 }
 
-/// Finds where the samples lie, and how many bytes of them there are.
+/// Finds the location and the length of the samples.
 fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), InputError> {
     let name = header.need("ElementDataFile")?;
     let pixels = &mut layout.pixels;
@@ -176,7 +176,7 @@ fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), 
     match header.integer("HeaderSize")? {
         None | Some(0) => {}
         Some(bytes @ 1..) => pixels.offset = bytes as u64,
-        // MetaIO's way to say that the samples are the last bytes of the file.
+        // In MetaIO this means that the samples are the last bytes of the file.
         Some(-1) if !pixels.compressed => {
             pixels.offset = metadata.len().saturating_sub(claimed).max(pixels.offset);
         }
@@ -202,11 +202,11 @@ fn find_pixels(path: &Path, header: &Header, layout: &mut Layout) -> Result<(), 
     Ok(())
 }
 
-/// Longest header, in bytes and in lines.
+/// Longest header, bytes and lines.
 const MAX_HEADER_BYTES: u64 = 1 << 20;
 const MAX_HEADER_LINES: usize = 100_000;
 
-/// The fields that are read. All others are passed over unseen, so that none can carry a patient's name into a message.
+/// The fields that are read. All others are skipped, so that no patient's name gets into a message.
 const KEYS: &[&str] = &[
     "ObjectType",
     "NDims",
@@ -249,7 +249,7 @@ struct Header<'a> {
     not_ok: usize,
     /// There are `Seq_` fields: frames in time.
     sequence: bool,
-    /// Bytes up to and with the line of `ElementDataFile`.
+    /// Length up to and including the line of `ElementDataFile`, bytes.
     length: u64,
 }
 
@@ -271,7 +271,7 @@ impl<'a> Header<'a> {
             if text.is_empty() {
                 continue;
             }
-            // The text itself is not shown: it may be anything.
+            // The text itself is not quoted: it may contain anything.
             let Some((key, value)) = text.split_once('=') else {
                 return Err(InputError::new(path, format!("line {number}"), "is not 'Key = Value'"));
             };
@@ -284,7 +284,7 @@ impl<'a> Header<'a> {
                 header.sequence = true;
                 header.frame_field(of_frame, value)?;
             }
-            // Data begin behind this line, whatever they look like.
+            // The data begin after this line.
             if key == "ElementDataFile" {
                 return Ok(header);
             }
@@ -292,7 +292,7 @@ impl<'a> Header<'a> {
         header.fault("ElementDataFile", "is missing, or not within the first 1 MiB and 100000 lines")
     }
 
-    /// `0012_Timestamp` and `0012_ImageStatus`; other fields of frames are passed over.
+    /// `0012_Timestamp` and `0012_ImageStatus`; other fields of frames are skipped.
     fn frame_field(&mut self, key: &str, value: &str) -> Result<(), InputError> {
         let Some((number, field)) = key.split_once('_') else { return Ok(()) };
         let Ok(number) = number.parse::<usize>() else { return Ok(()) };
@@ -318,7 +318,7 @@ impl<'a> Header<'a> {
         self.fields.get(field).map(String::as_str)
     }
 
-    /// The first of several spellings that is there, with its value.
+    /// The first existing field of several spellings, with its value.
     fn first_of<'n>(&self, names: &[&'n str]) -> Option<(&'n str, &str)> {
         names.iter().find_map(|name| self.get(name).map(|value| (*name, value)))
     }
@@ -361,7 +361,7 @@ impl<'a> Header<'a> {
         Ok(numbers)
     }
 
-    /// One number above 0, or of at least 0.
+    /// One number above 0, or at least 0.
     fn size(&self, field: &str, may_be_zero: bool) -> Result<f64, InputError> {
         let value = self.numbers(field, 1)?[0];
         match value > 0.0 || (may_be_zero && value == 0.0) {
@@ -372,7 +372,7 @@ impl<'a> Header<'a> {
     }
 }
 
-/// "3rd entry " of a list, nothing for a lone value.
+/// "3rd entry " of a list, empty for a single value.
 fn which(index: usize, count: usize) -> String {
     match (index, count) {
         (_, 1) => String::new(),
@@ -383,7 +383,7 @@ fn which(index: usize, count: usize) -> String {
     }
 }
 
-/// Any of these makes a file a pre-scan sweep; then all must be there.
+/// The keys of a pre-scan sweep, as the UsTK library writes them, in metres and radians. If a file has any of them it must have all.
 const PRESCAN_KEYS: [&str; 7] = [
     "IsTransducerConvex",
     "TransducerRadius",
@@ -393,14 +393,14 @@ const PRESCAN_KEYS: [&str; 7] = [
     "FramePitch",
     "AxialResolution",
 ];
-/// UsTK leaves it out; soft tissue's usual value, m/s.
+/// Speed of sound, which UsTK omits: the usual value for soft tissue, m/s.
 const SOUND_SPEED: f64 = 1540.0;
 const MM: f64 = 1e3;
 
-/// The probe, or `None` for a file that has none of the keys.
+/// The probe of a pre-scan sweep; `None` if the file has none of the keys.
 fn prescan_probe(header: &Header, [samples, lines]: [usize; 2], frames: usize) -> Result<Option<Probe>, InputError> {
     let kind = header.get("UltrasoundImageType").unwrap_or("");
-    // UsTK leaves the keys in the files that it has scan-converted.
+    // UsTK keeps the keys in files that it has scan-converted.
     if kind.starts_with("POSTSCAN") || (!kind.starts_with("PRESCAN") && header.first_of(&PRESCAN_KEYS).is_none()) {
         return Ok(None);
     }

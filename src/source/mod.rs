@@ -1,6 +1,8 @@
-//! Where frames come from: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded; frames without a place
-//! of their own get one from the motor. Every reader is total: any bytes give frames or an [`InputError`], never a panic, and no more
-//! memory is taken than the file's own bytes account for, or a live source says.
+//! Sources of frames: files, the phantom, a pipe, and OpenIGTLink, whose tracked frames are compounded. Frames of a free-running probe are
+//! placed by the motor's position.
+//!
+//! Every reader is total: any bytes give frames or an [`InputError`], never a panic. No reader takes more memory than the bytes of its
+//! file account for, or than a live source documents.
 
 pub mod convert;
 mod describe;
@@ -30,10 +32,10 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
 
-/// A file of frames or any other recording, by its content.
+/// Opens a `.frames` file or any other recording; the content decides which. `probe`: the probe file to use, see [`Recording::open`].
 ///
 /// # Errors
-/// As of [`recorder::Reader::open`] and [`Recording::open`].
+/// As [`recorder::Reader::open`] and [`Recording::open`].
 pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputError> {
     match is_frames(path) {
         true => Ok(Box::new(recorder::Reader::open(path)?)),
@@ -41,10 +43,10 @@ pub fn open(path: &Path, probe: Option<&Path>) -> Result<Box<dyn Source>, InputE
     }
 }
 
-/// What such a file is, for people to read: title and value. Never a patient's name or number.
+/// A description of such a file for users: pairs of title and value. Never a patient's name or number.
 ///
 /// # Errors
-/// As of [`open`], and what cannot be read of a file of frames, all of which is gone through.
+/// As [`open`]; a `.frames` file is read completely, and may fail while that is done.
 pub fn description(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, String)>, InputError> {
     match is_frames(path) {
         true => recorder::Reader::open(path)?.description(),
@@ -54,7 +56,7 @@ pub fn description(path: &Path, probe: Option<&Path>) -> Result<Vec<(String, Str
 
 fn is_frames(path: &Path) -> bool {
     let mut start = Vec::new();
-    // What cannot be read here is named by the reader. Opening a pipe may wait for ever.
+    // A file that cannot be read is reported by the reader. Opening a pipe may block for ever.
     if fs::metadata(path).is_ok_and(|m| m.is_file()) {
         let _ = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
     }

@@ -1,4 +1,4 @@
-//! The phantom as a source: frames in order of acquisition, computed a volume at a time or all at once.
+//! The phantom as a source: frames in order of acquisition, computed one volume at a time or all in advance.
 
 use super::frame::{Frame, Header, Source};
 use super::phantom::Phantom;
@@ -7,9 +7,10 @@ use crate::files::InputError;
 use crate::probe::Geometry;
 use std::collections::VecDeque;
 
+/// A source that computes the phantom one volume at a time.
 pub struct PhantomSource {
     phantom: Phantom,
-    /// The volume that is computed when nothing waits.
+    /// The volume that is computed next.
     next: usize,
     waiting: VecDeque<Frame>,
 }
@@ -20,7 +21,7 @@ impl PhantomSource {
     }
 }
 
-/// Volumes of the phantom that were computed once and are given again and again: a source that is never late.
+/// A source of phantom volumes that are computed once, in advance, so that no frame is ever late.
 pub struct CachedPhantom {
     header: Header,
     /// By volume, in order of acquisition.
@@ -29,7 +30,7 @@ pub struct CachedPhantom {
 }
 
 impl CachedPhantom {
-    /// Computes all volumes of the phantom: as many bytes as they have samples.
+    /// Computes all volumes of the phantom. Takes one byte a sample.
     pub fn new(phantom: Phantom) -> CachedPhantom {
         let volumes = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
         CachedPhantom { header: PhantomSource::new(phantom).header(), volumes, next: (0, 0) }

@@ -2,21 +2,21 @@
 //!
 //! The stream begins with one line of JSON, at most 64 KiB up to its end of line:
 //!
-//! | key | what |
+//! | key | meaning |
 //! |---|---|
 //! | `echolume` | 1, the version of this format |
 //! | `samples`, `lines`, `frames` | samples a line, lines a frame, frames a volume; each 1 to 65536 |
 //! | `type` | `"u8"`, `"u16"` or `"f32"`, little-endian |
 //! | `range` | the two values that are shown as 0 and 1; otherwise `samples.range` of the probe, otherwise all of an integer type. f32 needs one |
-//! | `both_ways` | every second volume comes swept backwards; otherwise as the probe says |
-//! | `speed_ratio` | share of the way to the next frame that the motor travels during one, 0..1; otherwise as the probe says |
-//! | `stamped` | `true`: before each frame its time, an f64 in s. One that is not finite is none |
-//! | `lines_at_once` | a frame is given on whenever so many of its lines have come |
-//! | `probe` | the tables of a probe file as objects: `{"array": {"kind": "curved", ...}, ...}`. A probe file that is given besides goes before it |
+//! | `both_ways` | every second volume is swept backwards; otherwise that of the probe |
+//! | `speed_ratio` | fraction of the distance to the next frame that the motor travels during one, 0..=1; otherwise that of the probe |
+//! | `stamped` | `true`: each frame is preceded by its time stamp, an f64 in s. A value that is not finite means none |
+//! | `lines_at_once` | frames are passed on in parts of so many lines |
+//! | `probe` | the tables of a probe file as objects: `{"array": {"kind": "curved", ...}, ...}`. A probe file given by the user takes precedence |
 //! | `cartesian` | instead of a probe: `{"size": [x, y, z], "spacing": [x, y, z], "origin": [x, y, z]}`, mm; `samples`, `lines` and `frames` may then be left out |
 //!
-//! Behind it come the frames in order of acquisition, line by line (samples fastest), with nothing between them but their times. The
-//! stream may end behind any frame. `tools/pipe_frames.py` writes such a stream.
+//! The frames follow in order of acquisition, line by line (samples fastest), with nothing between them but their time stamps. The
+//! stream may end after any frame. `tools/pipe_frames.py` writes such a stream.
 
 use super::frame::{Frame, Header};
 use super::live::{Event, Live};
@@ -31,26 +31,26 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What the stream is called in messages.
+/// Name of the stream in messages.
 const NAME: &str = "pipe";
-/// Memory of the frames that wait to be taken, bytes, unless a single one is larger.
+/// Most memory of the queued frames, bytes. A single larger one is still queued.
 const MAX_WAITING_BYTES: usize = 256 << 20;
-/// Frames that wait.
+/// Most queued frames.
 const MAX_WAITING_FRAMES: usize = 4;
 
 /// A stream of frames as a live source.
 ///
-/// Memory: four frames that wait, of 256 MiB together at most or else one, and the one that is being read, of at most 1 GiB and no
-/// more than twice what has come of it before the first is whole.
+/// Memory: up to four queued frames of at most 256 MiB in total (or a single one), and the one that is being read, of at most 1 GiB. Before
+/// the first complete frame, no more than twice the bytes that arrived.
 pub struct Piped {
     queue: Arc<Queue>,
 }
 
 impl Piped {
-    /// Begins to read. `probe`: the probe file to go by, before what the stream says of its probe.
+    /// Starts to read. `probe`: the probe file to use, in preference to the probe in the stream.
     ///
     /// # Errors
-    /// A probe file that is none, a thread that cannot be started. What is wrong with the stream comes as [`Event::End`].
+    /// A probe file that is not valid, a thread that cannot be started. Errors of the stream are reported as [`Event::End`].
     pub fn new(reader: impl Read + Send + 'static, probe: Option<&Path>) -> Result<Piped, InputError> {
         let probe = probe.map(ProbeFile::read).transpose()?;
         let queue = Arc::new(Queue::new());
@@ -75,13 +75,13 @@ impl Live for Piped {
 }
 
 impl Drop for Piped {
-    /// Without waiting for the thread, which may be in the middle of reading: it ends with the next byte, or with the stream.
+    /// Does not wait for the thread, which may be blocked in a read: it ends with the next byte, or with the stream.
     fn drop(&mut self) {
         self.queue.close();
     }
 }
 
-/// Most samples, lines and frames each.
+/// Most samples, lines and frames.
 const MAX_EXTENT: usize = 1 << 16;
 const VERSION: u64 = 1;
 
@@ -122,13 +122,13 @@ struct Lattice {
     origin: [f64; 3],
 }
 
-/// What the first line says.
+/// The first line of a stream: the properties of its frames.
 struct StreamHeader {
     header: Header,
     sample: SampleType,
     stamped: bool,
     lines: usize,
-    /// As many as there are, where a frame is given in one piece.
+    /// Equal to `lines` if frames are passed on as a whole.
     lines_at_once: usize,
     volumes: Volumes,
 }
@@ -139,14 +139,14 @@ fn fault<T>(key: &str, fault: impl AsRef<str>) -> Result<T, InputError> {
 
 impl StreamHeader {
     /// # Errors
-    /// A line that is no such header, or whose frames cannot be: too large, without a place, without a range. Nothing is allocated for them.
+    /// A line that is not a header, or frames that are too large, without a geometry, or without a range. Nothing is allocated for them.
     fn parse(line: &[u8], probe: Option<ProbeFile>) -> Result<StreamHeader, InputError> {
         let no_json = |e: serde_json::Error| InputError::new(Path::new(NAME), "header", e.to_string());
         let value: serde_json::Value = serde_json::from_slice(line).map_err(|e| {
             let fault = format!("is no line of JSON ({e}); a stream begins as that of tools/pipe_frames.py");
             InputError::new(Path::new(NAME), "header", fault)
         })?;
-        // Before the keys, which another version may have others of.
+        // Checked before the keys: another version may have other keys.
         match value.get("echolume").map(serde_json::Value::as_u64) {
             Some(Some(VERSION)) => {}
             Some(_) => return fault("echolume", format!("must be {VERSION}, the version that this program reads")),
@@ -199,11 +199,11 @@ impl StreamHeader {
         Ok(StreamHeader { header, sample, stamped: keys.stamped, lines, lines_at_once, volumes })
     }
 
-    /// The frame of a place in the stream, from 0, without samples.
+    /// The frame at an index of the stream, from 0, without samples.
     fn frame(&self, index: u64, time: Option<f64>) -> Frame {
         let each = self.volumes.frames as u64;
         let (volume, number) = (index / each, (index % each) as usize);
-        // The direction only tells even from odd.
+        // The direction depends on the parity only.
         let backward = self.volumes.backward((volume % 2) as usize);
         Frame {
             volume: u32::try_from(volume).unwrap_or(u32::MAX),
@@ -236,7 +236,7 @@ impl Keys {
     }
 }
 
-/// Where the samples lie swept forwards and backwards, and how frames make up volumes.
+/// The geometries of forward and backward sweeps, and how frames make up volumes.
 fn geometries(
     file: &ProbeFile,
     [samples, lines, frames]: [usize; 3],
@@ -252,19 +252,19 @@ fn geometries(
     if !(0.0..=1.0).contains(&volumes.speed_ratio) {
         return fault("speed_ratio", format!("is {}, must be 0 to 1", volumes.speed_ratio));
     }
-    let going = |first_backward| {
+    let swept = |first_backward| {
         let advance = Volumes { first_backward, ..volumes.clone() }.advance(0, &probe.slices);
         Geometry::Sweep(Probe { advance, ..probe.clone() })
     };
-    Ok((going(false), going(true), volumes))
+    Ok((swept(false), swept(true), volumes))
 }
 
 /// Longest first line, bytes.
 const MAX_HEADER_BYTES: u64 = 64 << 10;
-/// Memory follows what came, in steps of so many bytes, until a whole piece of a frame has come once.
+/// Memory grows with the data, in steps of so many bytes, until one complete part of a frame has arrived.
 const STEP: usize = 1 << 20;
 
-/// Says that nothing comes any more, however it came to that.
+/// Reports the end of the stream when the thread ends, also after a panic.
 struct EndOnExit(Arc<Queue>);
 
 impl Drop for EndOnExit {
@@ -277,7 +277,7 @@ struct Reader<'a, R> {
     input: BufReader<R>,
     queue: &'a Queue,
     replaced: Replaced,
-    /// A whole piece has come, so that the next may be allocated at once.
+    /// A complete part has arrived, so that the next one may be allocated at once.
     proven: bool,
 }
 
@@ -290,10 +290,10 @@ impl<'a, R: Read> Reader<'a, R> {
         Reader { input: BufReader::new(input), queue, replaced: Replaced::default(), proven: false }
     }
 
-    /// Until the stream ends, or nobody takes any more.
+    /// Reads until the stream ends or the receiver is dropped.
     ///
     /// # Errors
-    /// A first line that is no header, an end within a frame, what the operating system says.
+    /// A first line that is not a header, an end within a frame, errors of the operating system.
     fn run(&mut self, probe: Option<ProbeFile>) -> Result<(), InputError> {
         let stream = StreamHeader::parse(&self.first_line()?, probe)?;
         let begin = Event::Begin(Box::new(stream.header.clone()));
@@ -328,12 +328,12 @@ impl<'a, R: Read> Reader<'a, R> {
         }
     }
 
-    /// The next frame, in one piece or in several. False: there is none, or nobody takes it.
+    /// Reads the next frame, as a whole or in parts. False: there is none, or the receiver was dropped.
     fn frame(&mut self, stream: &StreamHeader, index: u64) -> Result<bool, InputError> {
         let whole = stream.header.frame_bytes().unwrap_or(0) as usize;
         let (line, stamp) = (whole / stream.lines, if stream.stamped { size_of::<f64>() } else { 0 });
         let mut came = 0;
-        // Nothing at all of a frame is the end of a whole stream.
+        // An end between two frames is the regular end of the stream.
         let cut = |error: io::Error, came: usize| match error.kind() {
             io::ErrorKind::UnexpectedEof if came == 0 => Ok(false),
             io::ErrorKind::UnexpectedEof => {
@@ -377,7 +377,7 @@ impl<'a, R: Read> Reader<'a, R> {
         Ok(true)
     }
 
-    /// Appends so many bytes; `came` counts them also where they are not all there.
+    /// Appends `count` bytes. `came` counts the bytes that arrived, also if some are missing.
     fn fill(&mut self, count: usize, bytes: &mut Vec<u8>, came: &mut usize) -> io::Result<()> {
         if self.proven {
             bytes.reserve_exact(count);
@@ -407,12 +407,12 @@ struct Queue {
 
 struct State {
     waiting: VecDeque<(Event, usize)>,
-    /// Of memory, of all that wait, bytes.
+    /// Memory of all queued events, bytes.
     weight: usize,
     limit: usize,
-    /// Nothing comes any more, and why.
+    /// The stream has ended, and why.
     end: Option<Option<String>>,
-    /// Nobody takes any more.
+    /// The receiver was dropped.
     closed: bool,
 }
 
@@ -422,12 +422,12 @@ impl Queue {
         Queue { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Bytes that may wait; whatever its size, one event always may.
+    /// Limit of the queued bytes. A single event is always queued.
     fn set_limit(&self, limit: usize) {
         self.lock().limit = limit;
     }
 
-    /// Waits for limit. False: nobody takes any more.
+    /// Adds an event, waiting until it fits. False: the receiver was dropped.
     fn push(&self, event: Event) -> bool {
         let weight = weight(&event);
         let mut state = self.lock();
@@ -442,7 +442,7 @@ impl Queue {
         !state.closed
     }
 
-    /// Nothing comes any more. What is said first stays.
+    /// Ends the stream. The first reason is kept.
     fn end(&self, why: Option<String>) {
         self.lock().end.get_or_insert(why);
         self.changed.notify_all();
@@ -486,6 +486,6 @@ fn weight(event: &Event) -> usize {
         Event::Frame(frame) | Event::Lines { frame, .. } => frame.bytes.len(),
         _ => 0,
     };
-    // A line of a single byte is not free.
+    // Even an event of a single byte takes memory.
     bytes + size_of::<(Event, usize)>()
 }

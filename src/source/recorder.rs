@@ -1,18 +1,18 @@
-//! Frames as they arrived, appended to a file (`.frames`), and given back byte for byte. Whatever interrupts the writing, every frame but
-//! the last is there. All numbers are little-endian.
+//! The `.frames` file: frames as they arrived, with their times, bit for bit. If writing is interrupted, every frame but the last is
+//! preserved. All numbers are little-endian.
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 8 | `ECHOFRMS` |
 //! | 4 | version, 1 |
 //! | 4 | length n of what follows, at most 16 MiB |
-//! | n | JSON: where samples lie swept forwards and backwards, what is stored, which stored values are 0 and 1 |
+//! | n | JSON of [`Header`]: geometry of forward and backward sweeps, stored type, stored values shown as 0 and 1 |
 //! | 4 | CRC-32 (ISO-HDLC, zlib's) of everything so far |
-//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), m bytes of samples, CRC-32 of all of the frame before it |
+//! | ... | frames, each `FRAM`, volume, number, slice, flags (bit 0 backward, bit 1 stamped), length m (six words of 4 in all), time stamp and time of arrival in s (two f64), m bytes of samples, CRC-32 of all preceding bytes of the frame |
 //! | ... | at a clean end: `INDX`, count (4), for each frame its offset (8) and volume (4), CRC-32 of the index, offset of `INDX` (8), `XEND` |
 //!
-//! Without an index, or with one that is damaged, the frames are gone through once. A frame whose checksum is wrong is left out and
-//! counted; where the lengths lead nowhere, or no frame is for 1 GiB, what is behind is lost.
+//! If the index is missing or damaged, all frames are read once. A frame with a wrong checksum is left out and counted. Frames after a
+//! gap of 1 GiB without a valid one are lost.
 
 pub use super::frame::Header;
 
@@ -31,32 +31,32 @@ const VERSION: u32 = 1;
 const FRAME: &[u8; 4] = b"FRAM";
 const INDEX: &[u8; 4] = b"INDX";
 const END: &[u8; 4] = b"XEND";
-/// Bytes of a frame before its samples.
+/// Length of a frame before its samples, bytes.
 const FRAME_HEAD: usize = 40;
-/// Longest header, bytes: tables of lines and slices.
+/// Longest header, bytes. It may have tables of lines and slices.
 const MAX_HEADER_BYTES: u32 = 16 << 20;
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// A recording that is being made. Dropped without [`Writer::finish`] it has no index and is read all the same.
+/// Writes a `.frames` file. Without [`Writer::finish`] it has no index, but can still be read.
 pub struct Writer {
     path: PathBuf,
     file: File,
     header: Header,
-    /// Of each frame: its offset and its volume.
+    /// Offset and volume of each frame.
     index: Vec<(u64, u32)>,
     at: u64,
-    /// A frame in one piece, so that one call to the system writes it.
+    /// Buffer of a frame, so that it is written by one system call.
     frame: Vec<u8>,
-    /// The last write failed: what it left behind is cut off before the next.
+    /// The last write failed. What it left is truncated before the next one.
     torn: bool,
 }
 
 impl Writer {
-    /// Begins a file. One that is there already is not written over.
+    /// Creates a file. An existing one is not overwritten.
     ///
     /// # Errors
-    /// A header that cannot be right, a file that is there or cannot be made.
+    /// A header that is not valid, a file that exists or cannot be created.
     pub fn create(path: &Path, header: Header) -> Result<Writer, InputError> {
         header.check().map_err(|(field, fault)| InputError::new(path, field, fault))?;
         let text = serde_json::to_vec(&header).map_err(|e| InputError::new(path, "header", e.to_string()))?;
@@ -86,11 +86,11 @@ impl Writer {
         }
     }
 
-    /// Appends a frame that arrived at `arrived` s, on the recorder's own clock. It is with the system when this returns; a volume that is
-    /// whole is on the disk.
+    /// Appends a frame that arrived at `arrived` s, on the recorder's clock. When this returns, the operating system has the frame, and
+    /// earlier volumes are on the disk.
     ///
     /// # Errors
-    /// A frame of another size or place than the header's, a disk that is full. The frames before it stay, and the next one may succeed.
+    /// A frame whose size or slice does not fit the header, a full disk. Earlier frames are kept, and the next one may succeed.
     pub fn frame(&mut self, frame: &Frame, arrived: f64) -> Result<(), InputError> {
         let fault = |field: &str, fault: String| Err(InputError::new(&self.path, field, fault));
         let expected = self.header.frame_bytes().unwrap_or(0);
@@ -120,28 +120,28 @@ impl Writer {
         self.append()?;
         let begins = self.index.last().is_some_and(|(_, volume)| *volume != frame.volume);
         self.index.push((offset, frame.volume));
-        // Once a volume: a frame in the system's hands outlives this process, and a power cut costs a volume at most.
+        // Synchronised once a volume: a written frame survives the end of this process, and a power cut costs one volume at most.
         match begins {
             true => self.file.sync_data().map_err(|e| InputError::unwritable(&self.path, &e)),
             false => Ok(()),
         }
     }
 
-    /// Takes it back: what is there is not to be taken for all of it.
-    pub fn discard(self) {
-        // Nothing more can be done about a file that will not go.
+    /// Removes the incomplete file.
+    pub(crate) fn discard(self) {
+        // If it cannot be removed, nothing else can be done.
         let _ = std::fs::remove_file(&self.path);
     }
 
-    /// Frames so far.
+    /// Number of frames so far.
     pub fn frames(&self) -> usize {
         self.index.len()
     }
 
-    /// Ends the file with its index, all of it on the disk.
+    /// Writes the index and synchronises the file to the disk.
     ///
     /// # Errors
-    /// A disk that is full; the file is then one without an index.
+    /// A full disk. The file then has no index.
     pub fn finish(mut self) -> Result<(), InputError> {
         let offset = self.at;
         self.frame.clear();
@@ -158,7 +158,7 @@ impl Writer {
         self.file.sync_all().map_err(|e| InputError::unwritable(&self.path, &e))
     }
 
-    /// Writes what is in hand at the end of what is whole.
+    /// Appends the buffer to the complete frames.
     fn append(&mut self) -> Result<(), InputError> {
         let unwritten = |e| InputError::unwritable(&self.path, &e);
         if std::mem::replace(&mut self.torn, true) {
@@ -172,21 +172,21 @@ impl Writer {
     }
 }
 
-/// Bytes of the index behind its entries: its checksum, where it begins, and the end's mark.
+/// Length of the index after its entries, bytes: checksum, offset, end mark.
 const TAIL: u64 = 16;
-/// Bytes of an entry.
+/// Length of an entry, bytes.
 const ENTRY: u64 = 12;
-/// Longest index that is believed, entries: a file with holes in it has room for any. A longer one is made anew.
+/// Most entries of an index that is used: a sparse file could claim any number. A longer one is rebuilt.
 const MAX_ENTRIES: u64 = 1 << 24;
-/// Where there was no frame for so many bytes, none is looked for behind.
+/// After so many bytes without a valid frame, the search ends.
 const MAX_GAP: u64 = 1 << 30;
 
-/// A file of frames that is read.
+/// Reads a `.frames` file.
 pub struct Reader {
     path: PathBuf,
     file: File,
     header: Header,
-    /// Of each frame that is whole: its offset and its volume.
+    /// Offset and volume of each valid frame.
     index: Vec<(u64, u32)>,
     /// First frame of each volume, in order.
     volumes: Vec<usize>,
@@ -198,13 +198,15 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Whether a file begins as ours do.
-    pub fn is_one(start: &[u8]) -> bool {
+    /// True if a file begins as a `.frames` file.
+    pub(crate) fn is_one(start: &[u8]) -> bool {
         start.starts_with(MAGIC)
     }
 
+    /// Opens a file. If its index is missing or damaged, all frames are read once.
+    ///
     /// # Errors
-    /// A file that cannot be read, is of another format or version, or whose header is damaged.
+    /// A file that cannot be read, has another format or version, or has a damaged header.
     pub fn open(path: &Path) -> Result<Reader, InputError> {
         let unreadable = |e: std::io::Error| InputError::unreadable(path, &e);
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
@@ -263,31 +265,32 @@ impl Reader {
         Ok(replay)
     }
 
+    /// What all frames have in common.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Frames that are whole.
+    /// Number of valid frames.
     pub fn frames(&self) -> usize {
         self.index.len()
     }
 
-    /// Frames that were left out because their checksum is wrong.
+    /// Number of frames that were left out because of a wrong checksum.
     pub fn damaged(&self) -> u64 {
         self.damaged
     }
 
-    /// Bytes at the end that are no whole frame.
+    /// Bytes at the end that are not a complete frame.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// The index was not there or not right, and was made anew.
+    /// True if the index was missing or damaged and was rebuilt.
     pub fn rebuilt(&self) -> bool {
         self.rebuilt
     }
 
-    /// When the frame that was given last arrived, s on the recorder's clock.
+    /// When the last frame that was returned had arrived, s on the recorder's clock.
     pub fn arrived(&self) -> f64 {
         self.arrived
     }
@@ -296,7 +299,7 @@ impl Reader {
         FRAME_HEAD as u64 + self.header.frame_bytes().unwrap_or(0) + 4
     }
 
-    /// The index at the file's end, if every word of it can be true.
+    /// The index at the end of the file, if it is valid.
     fn stored_index(&mut self, first: u64, length: u64) -> Option<Vec<(u64, u32)>> {
         let mut tail = [0; TAIL as usize];
         self.file.seek(SeekFrom::Start(length.checked_sub(TAIL)?)).ok()?;
@@ -326,17 +329,17 @@ impl Reader {
         (fits && rises).then_some(entries)
     }
 
-    /// Goes through the frames from the first. All have the same length, so one that is damaged hides none behind it.
+    /// Rebuilds the index from the frames. All have the same length, so a damaged one does not hide those after it.
     fn rebuild(&mut self, first: u64, length: u64) -> std::io::Result<()> {
         self.rebuilt = true;
         let record = self.record_bytes();
-        // A header may claim frames that the file has no room for.
+        // A header may claim frames that are larger than the file.
         let mut bytes = vec![0; if first + record <= length { record as usize } else { 0 }];
         let (mut at, mut empty_from) = (first, first);
         self.file.seek(SeekFrom::Start(at))?;
         while at + record <= length {
             self.file.read_exact(&mut bytes)?;
-            // The index of a file that was cut behind it.
+            // The index of a file that was cut short after it.
             if bytes.starts_with(INDEX) {
                 break;
             }
@@ -365,7 +368,7 @@ impl Reader {
     }
 }
 
-/// A frame and when it arrived; none if its checksum or its words are wrong.
+/// Parses a frame and its time of arrival; None if its checksum or a field is wrong.
 fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
     let (body, sum) = record.split_at_checked(record.len().checked_sub(4)?)?;
     let word = |n: usize| body.get(4 * n..4 * n + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -391,7 +394,7 @@ fn parsed(record: &[u8]) -> Option<(Frame, f64)> {
 
 impl Source for Reader {
     fn geometry(&self, volume: usize) -> Geometry {
-        // Which way it was swept, its first frame says; that is looked up without moving on.
+        // The direction is that of the first frame, read without moving the position.
         let backward = self.volumes.get(volume).is_some_and(|n| self.backward(*n));
         if backward { self.header.backward.clone() } else { self.header.forward.clone() }
     }
@@ -446,7 +449,7 @@ impl Source for Reader {
 }
 
 impl Reader {
-    /// Whether a frame was swept backwards; what cannot be read was not.
+    /// True if a frame was swept backwards; false if it cannot be read.
     fn backward(&self, n: usize) -> bool {
         let mut flags = [0; 4];
         let read = File::open(&self.path).and_then(|mut file| {
@@ -458,10 +461,10 @@ impl Reader {
 }
 
 impl Reader {
-    /// What the file is, for people to read: title and value. Goes through all frames once, since only then is it known which are whole.
+    /// A description of the file for users: pairs of title and value. Reads all frames once to check them.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// Errors of the operating system.
     pub fn description(mut self) -> Result<Vec<(String, String)>, InputError> {
         let summary = self.summarize()?;
         let mut facts: Vec<(String, String)> = Vec::new();
@@ -538,15 +541,15 @@ impl Reader {
 struct Summary {
     frames: usize,
     volumes: usize,
-    /// Volumes with as many frames as they must have.
+    /// Number of complete volumes.
     whole: usize,
-    /// Volumes.
+    /// Number of volumes swept backwards.
     backward: usize,
     stamped: usize,
     /// First and last, s.
     times: Option<[f64; 2]>,
     arrivals: Option<[f64; 2]>,
-    /// Longest time between the arrival of two frames, s.
+    /// Longest time between the arrivals of two frames, s.
     gap: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A recorded file as a stream of frames in bounded memory: one frame at a time.
+//! Recorded files (MetaImage, PLUS sequences, Kretz volumes), read one frame at a time in bounded memory.
 
 use super::frame::{Frame, Source};
 use super::layout::{Layout, LineOrder, PixelStream, StoredGeometry};
@@ -11,49 +11,53 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// A file of recorded frames.
+/// A recorded file that is read frame by frame.
 pub struct Recording {
     path: PathBuf,
     layout: Layout,
-    place: Place,
+    placement: Placement,
     volumes: Volumes,
     probe_file: Option<PathBuf>,
     range: [f64; 2],
     measured: bool,
     replaced: Replaced,
-    /// Frames whose replaced samples are counted already.
+    /// Number of frames whose replaced samples were counted.
     counted: usize,
-    /// Open at frame `next`; none after a rewind or an error.
+    /// Positioned at frame `next`; None after a rewind or an error.
     stream: Option<PixelStream>,
     next: usize,
-    /// A whole frame has been seen to be there, so that the next may be allocated at once.
+    /// A complete frame was read, so that the next one may be allocated at once.
     proven: bool,
 }
 
-/// Where the samples of all volumes lie, without the motion of each.
-enum Place {
+/// Geometry of all volumes, without the advance of each.
+enum Placement {
     Sweep(Box<Probe>),
     Cartesian(Grid),
 }
 
 impl Recording {
-    /// Opens a file and finds out its geometry: from the `probe` file given, else from one that lies beside the recording
-    /// ([`ProbeFile::find_for`]), else from the recording itself. Unless the range of values is known, they are all read.
+    /// Opens a file. Its geometry comes from the given probe file, otherwise from one in the folder of the recording
+    /// ([`ProbeFile::find_for`]), otherwise from the recording itself. All samples are read once unless the range of their values is
+    /// known.
+    ///
+    /// # Errors
+    /// A file that cannot be read, has an unknown format or is damaged, or a geometry that is missing or impossible.
     pub fn open(path: &Path, probe: Option<&Path>) -> Result<Recording, InputError> {
         let mut layout = read_layout(path)?;
         let probe_file = choose_probe_file(path, probe, &mut layout)?;
-        let (place, volumes) = match (&probe_file, &layout.geometry) {
+        let (placement, volumes) = match (&probe_file, &layout.geometry) {
             (Some(file), _) => {
                 let (probe, volumes) = file.geometry(layout.frame_size[0], layout.frame_size[1], layout.frames)?;
-                (Place::Sweep(Box::new(probe)), volumes)
+                (Placement::Sweep(Box::new(probe)), volumes)
             }
             (None, StoredGeometry::Sweep(probe)) => {
                 probe.check().map_err(|e| geometry_error(path, &e))?;
-                (Place::Sweep(probe.clone()), Volumes::forward(layout.frames, 1))
+                (Placement::Sweep(probe.clone()), Volumes::forward(layout.frames, 1))
             }
             (None, StoredGeometry::Pictures(grid, count)) => {
                 grid.check().map_err(|e| geometry_error(path, &e))?;
-                (Place::Cartesian(*grid), Volumes::forward(grid.size[2], *count))
+                (Placement::Cartesian(*grid), Volumes::forward(grid.size[2], *count))
             }
             (None, StoredGeometry::Missing(error)) => return Err(error.clone()),
         };
@@ -61,7 +65,7 @@ impl Recording {
         let mut recording = Recording {
             path: path.into(),
             layout,
-            place,
+            placement,
             volumes,
             probe_file: probe_file.as_ref().map(|f| f.path().into()),
             range: [0.0, 255.0],
@@ -80,30 +84,32 @@ impl Recording {
         Ok(recording)
     }
 
-    /// "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep" or "Kretz volume".
+    /// The file format: "MetaImage", "PLUS sequence", "MetaImage pre-scan sweep" or "Kretz volume".
     pub fn format(&self) -> &'static str {
         self.layout.format
     }
 
+    /// Type of the samples in the file.
     pub fn sample_type(&self) -> SampleType {
         self.layout.sample
     }
 
+    /// Type of the samples in the frames.
     pub fn stored_type(&self) -> StoredType {
         self.layout.sample.stored()
     }
 
-    /// All frames, also those after the last whole volume.
+    /// Number of all frames, including those after the last complete volume.
     pub fn frames_in_file(&self) -> usize {
         self.layout.frames
     }
 
-    /// The recording, where its samples are, and its probe file.
+    /// The recording, the file with its samples, and its probe file.
     pub fn files(&self) -> Vec<PathBuf> {
         [self.path.clone(), self.layout.pixels.path.clone()].into_iter().chain(self.probe_file.clone()).collect()
     }
 
-    /// Whole volumes.
+    /// Number of complete volumes.
     pub fn volumes(&self) -> usize {
         self.volumes.count
     }
@@ -112,34 +118,37 @@ impl Recording {
         self.volumes.frames
     }
 
-    /// Where the samples of a volume lie, the motor's way during each frame included.
+    /// Geometry of a volume, including the motor's travel during each frame.
     pub fn geometry(&self, volume: usize) -> Geometry {
-        match &self.place {
-            Place::Sweep(probe) => {
+        match &self.placement {
+            Placement::Sweep(probe) => {
                 let advance = self.volumes.advance(volume, &probe.slices);
                 Geometry::Sweep(Probe { advance, ..(**probe).clone() })
             }
-            Place::Cartesian(grid) => Geometry::Cartesian(*grid),
+            Placement::Cartesian(grid) => Geometry::Cartesian(*grid),
         }
     }
 
-    /// The values that are shown as 0 and 1, in units of the stored type: the probe file's, or all of u8, or the smallest
-    /// and largest in the file. The second is always above the first.
+    /// Stored values that are shown as 0 and 1: those of the probe file, otherwise 0 and 255 for u8, otherwise the smallest and largest
+    /// in the file. The second is always above the first.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    /// Samples that were NaN or infinite and read as 0, in the frames read so far; all frames if the range was measured.
+    /// Number of samples that were NaN or infinite and read as 0, in the frames read so far; in all frames if the range was measured.
     pub fn replaced(&self) -> u64 {
         self.replaced.not_finite
     }
 
-    /// Denormal f32 samples that read as 0, counted like [`Recording::replaced`].
+    /// Number of denormal f32 samples that read as 0, counted like [`Recording::replaced`].
     pub fn flushed(&self) -> u64 {
         self.replaced.denormal
     }
 
-    /// The next frame in the order of acquisition; none after the last whole volume.
+    /// The next frame in order of acquisition; None after the last complete volume.
+    ///
+    /// # Errors
+    /// Data that cannot be read, are cut short or are corrupt.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, InputError> {
         let index = self.next;
         if index >= self.frames_to_read() {
@@ -164,12 +173,15 @@ impl Recording {
         }))
     }
 
-    /// Back to the first frame.
+    /// Moves back to the first frame.
     pub fn rewind(&mut self) {
         (self.stream, self.next) = (None, 0);
     }
 
-    /// On, or back, to the first frame of a volume. In a compressed file all frames before it are inflated again.
+    /// Moves to the first frame of a volume. In a compressed file all frames before it are inflated again.
+    ///
+    /// # Errors
+    /// A volume that does not exist, or data that cannot be read.
     pub fn skip_to_volume(&mut self, volume: usize) -> Result<(), InputError> {
         if volume >= self.volumes.count {
             let there = self.volumes.count;
@@ -190,7 +202,7 @@ impl Recording {
         Ok(())
     }
 
-    /// What the file is, for people to read: title and value. Never a patient's name or number.
+    /// A description of the file for users: pairs of title and value. Never a patient's name or number.
     pub fn description(&self) -> Vec<(String, String)> {
         let mut facts: Vec<(String, String)> = Vec::new();
         let mut say = |title: &str, value: String| facts.push((title.into(), value));
@@ -198,16 +210,16 @@ impl Recording {
         say("compression", if self.layout.pixels.compressed { "zlib" } else { "none" }.into());
         say("samples", self.sample_type().to_string());
         let [first, second] = self.layout.frame_size;
-        match self.place {
-            Place::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
-            Place::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
+        match self.placement {
+            Placement::Sweep(_) => say("frame", format!("{second} lines of {first} samples")),
+            Placement::Cartesian(_) => say("frame", format!("{first} x {second} pixels")),
         }
         say("frames", self.layout.frames.to_string());
         say("volumes", describe::volumes(&self.volumes));
         say("geometry from", self.probe_file.as_ref().map_or("the file itself".into(), |p| describe::path(p)));
-        match &self.place {
-            Place::Sweep(probe) => facts.extend(describe::probe(probe)),
-            Place::Cartesian(grid) => facts.extend(describe::grid(grid)),
+        match &self.placement {
+            Placement::Sweep(probe) => facts.extend(describe::probe(probe)),
+            Placement::Cartesian(grid) => facts.extend(describe::grid(grid)),
         }
         let [low, high] = self.range.map(|v| describe::number(v - self.sample_type().shift()));
         let how = if self.measured { " (measured)" } else { "" };
@@ -225,7 +237,7 @@ impl Recording {
         self.volumes.count * self.volumes.frames
     }
 
-    /// Reads everything once for its smallest and largest value.
+    /// Reads all frames once for the smallest and largest value.
     fn measure(&mut self) -> Result<(), InputError> {
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         while let Some(frame) = self.next_frame()? {
@@ -251,7 +263,7 @@ impl Recording {
         });
         outcome.map_err(|e| self.broken(&e, bytes.len()))?;
         self.proven = true;
-        // Only the end of a compressed stream says whether what came before it was whole.
+        // The checksum at the end of a compressed stream tells whether all of it is intact.
         if index + 1 == self.layout.frames {
             let more = stream.finish().map_err(|e| self.broken(&e, bytes.len()))?;
             if more > 0 {
@@ -260,7 +272,7 @@ impl Recording {
         }
         let replaced = samples::store(self.layout.sample, self.layout.big_endian, &mut bytes);
         self.count(index, replaced);
-        if matches!((&self.layout.line_order, &self.place), (LineOrder::Reversed, Place::Sweep(_))) {
+        if matches!((&self.layout.line_order, &self.placement), (LineOrder::Reversed, Placement::Sweep(_))) {
             let line = self.layout.frame_size[0] * self.stored_type().bytes();
             bytes = bytes.rchunks_exact(line).flatten().copied().collect();
         }
@@ -279,7 +291,7 @@ impl Recording {
         self.replaced += replaced;
     }
 
-    /// What became of reading the samples, `got` bytes into the frame at hand.
+    /// The error of reading the samples, `got` bytes into the current frame.
     fn broken(&self, error: &io::Error, got: usize) -> InputError {
         let size = self.layout.frame_bytes();
         let (got, claimed) = (self.next as u64 * size + got as u64, self.layout.frames as u64 * size);
@@ -295,7 +307,7 @@ impl Recording {
     }
 }
 
-/// The probe file to go by, read; `None` if there is none or the one beside is for others.
+/// The probe file to use. None if there is none, or if the `probe.toml` of the folder does not apply to this recording.
 fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> Result<Option<ProbeFile>, InputError> {
     let found = given.map(Path::to_path_buf).or_else(|| ProbeFile::find_for(path));
     let Some(found) = found else { return Ok(None) };
@@ -313,10 +325,10 @@ fn choose_probe_file(path: &Path, given: Option<&Path>, layout: &mut Layout) -> 
     ProbeFile::read(&found).map(Some)
 }
 
-/// Chooses the reader: by content, then by the name's ending.
+/// Reads the layout of a file with the reader for its content, or else for the extension of its name.
 fn read_layout(path: &Path) -> Result<Layout, InputError> {
     let unreadable = |e| InputError::unreadable(path, &e);
-    // A pipe or a folder has no end to measure claims against, and opening a pipe may wait for ever.
+    // A pipe or a folder has no size to check claims against, and opening a pipe may block for ever.
     if !fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(InputError::new(path, "file", "is not a regular file"));
     }

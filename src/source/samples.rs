@@ -1,9 +1,9 @@
-//! The number types of samples, and their way from a file's bytes to the ones that are stored and uploaded.
+//! The number types of samples, and the conversion from the bytes of a file to those that are stored and uploaded.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What a sample is in the file.
+/// Type of a sample in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SampleType {
     U8,
@@ -12,7 +12,7 @@ pub enum SampleType {
     F32,
 }
 
-/// What a sample is in a [`Frame`](super::Frame).
+/// Type of a sample in a [`Frame`](super::Frame).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StoredType {
     U8,
@@ -20,14 +20,16 @@ pub enum StoredType {
     F32,
 }
 
-/// What is added to an i16 to store it as u16.
+/// Added to an i16 to store it as u16.
 const I16_SHIFT: f64 = 32768.0;
 
 impl SampleType {
+    /// Size of a sample, bytes.
     pub fn bytes(self) -> usize {
         self.stored().bytes()
     }
 
+    /// The type that it is stored as.
     pub fn stored(self) -> StoredType {
         match self {
             SampleType::U8 => StoredType::U8,
@@ -36,7 +38,7 @@ impl SampleType {
         }
     }
 
-    /// A MetaImage's word for it.
+    /// The name of the type in a MetaImage header.
     pub(super) fn metaimage(self) -> &'static str {
         match self {
             SampleType::U8 => "MET_UCHAR",
@@ -63,6 +65,7 @@ impl From<StoredType> for SampleType {
 }
 
 impl StoredType {
+    /// Size of a sample, bytes.
     pub fn bytes(self) -> usize {
         match self {
             StoredType::U8 => 1,
@@ -83,12 +86,12 @@ impl fmt::Display for SampleType {
     }
 }
 
-/// Samples that no pass must ever see.
+/// Number of samples that were replaced by 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Replaced {
     /// NaN or infinite.
     pub not_finite: u64,
-    /// Not zero, but too small for a normal f32: many GPUs flush them, so all do.
+    /// Denormal f32. Many GPUs flush them to 0, so they are always flushed.
     pub denormal: u64,
 }
 
@@ -99,7 +102,7 @@ impl std::ops::AddAssign for Replaced {
     }
 }
 
-/// Turns the file's bytes into stored ones, in place. Bytes beyond the last whole sample are left alone.
+/// Converts the bytes of a file to stored samples, in place. Bytes after the last complete sample are not changed.
 pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> Replaced {
     let mut replaced = Replaced::default();
     match sample {
@@ -111,7 +114,7 @@ pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> R
             }
             for pair in bytes.as_chunks_mut::<2>().0 {
                 let value = if big_endian { u16::from_be_bytes(*pair) } else { u16::from_le_bytes(*pair) };
-                // Adding 32768 to an i16 turns its top bit.
+                // Adding 32768 to an i16 flips its top bit.
                 *pair = (value ^ flip).to_le_bytes();
             }
         }
@@ -132,7 +135,7 @@ pub(super) fn store(sample: SampleType, big_endian: bool, bytes: &mut [u8]) -> R
     replaced
 }
 
-/// Smallest and largest stored sample, widening `range`.
+/// Extends `range` to the smallest and largest stored sample.
 pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
     fn span<const N: usize, T: PartialOrd + Copy>(
         bytes: &[u8],
@@ -154,7 +157,7 @@ pub(super) fn widen(range: &mut [f64; 2], stored: StoredType, bytes: &[u8]) {
     }
 }
 
-/// A range that can be divided by: constant data get the unit above their value, or as much as keeps f32 apart.
+/// A range that is not empty. Constant data get a range of 1 above their value, or of as much as f32 can tell apart.
 pub(super) fn not_empty([low, high]: [f64; 2]) -> [f64; 2] {
     match low < high {
         true => [low, high],

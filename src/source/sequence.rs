@@ -1,4 +1,4 @@
-//! Polar frames as a PLUS sequence (.mha), with their geometry in NAME.probe.toml beside it.
+//! Polar frames as a PLUS sequence (.mha), with their geometry in a probe file (NAME.probe.toml).
 
 use super::frame::Source;
 use super::samples::SampleType;
@@ -7,32 +7,32 @@ use crate::probe::{Geometry, ProbeFile, Volumes};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Most frames of one file: their time stamps are in its header, of which at most 1 MiB is read.
+/// Most frames of one file. Their time stamps are in its header, of which readers accept 1 MiB.
 pub(super) const MAX_FRAMES: usize = 20_000;
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// What of a source makes a sequence.
+/// A selection of the volumes of a source that a sequence can represent.
 pub struct Sequence {
     kept: Vec<CompleteVolume>,
     left_out: usize,
-    /// Of a volume.
+    /// Frames of a volume.
     frames: usize,
     header: String,
     probe: String,
 }
 
-/// Where the geometry of a sequence goes.
-pub fn probe_file_path(path: &Path) -> PathBuf {
+/// The path of the probe file of a sequence.
+pub(crate) fn probe_file_path(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push(".probe.toml");
     path.with_file_name(name)
 }
 
 impl Sequence {
-    /// Goes through a source for its whole volumes: the header says how many there are. `path`: where it came from.
+    /// Reads a source once to find its complete volumes, whose number goes into the header. `path`: the source, for messages.
     ///
     /// # Errors
-    /// A source that is no sweep or has no whole volume, more frames than a sequence takes, a probe that no file can say.
+    /// A source that is not a sweep or has no complete volume, too many frames, a probe that no probe file can describe.
     pub fn of(source: &mut dyn Source, path: &Path) -> Result<Sequence, InputError> {
         let fault = |field: &str, fault: String| InputError::new(path, field, fault);
         let (kept, left_out) = choose(source, path)?;
@@ -62,23 +62,25 @@ impl Sequence {
         Ok(Sequence { kept, left_out, frames, header, probe: text })
     }
 
+    /// Number of volumes.
     pub fn volumes(&self) -> usize {
         self.kept.len()
     }
 
+    /// Number of frames.
     pub fn frames(&self) -> usize {
         self.kept.len() * self.frames
     }
 
-    /// Volumes that a sequence cannot say: with frames missing, or swept the same way twice where others are swept both ways.
+    /// Number of volumes that are left out: with missing frames, or with the direction of the previous one although directions alternate.
     pub fn left_out(&self) -> usize {
         self.left_out
     }
 
-    /// Writes the frames of the same source, in order of acquisition. `each` hears of every volume that is written.
+    /// Writes the frames of the same source, in order of acquisition. `each` is called after every volume.
     ///
     /// # Errors
-    /// A source that cannot be read any more, another ending than .mha, a disk that is full; then no file is left.
+    /// A source that cannot be read any more, an extension other than .mha, a full disk. No file is left then.
     pub fn write(&self, source: &mut dyn Source, path: &Path, each: impl Fn()) -> Result<(), InputError> {
         write_both(path, &self.header, &self.probe, |file| {
             for volume in &self.kept {
@@ -95,21 +97,21 @@ impl Sequence {
     }
 }
 
-/// A volume that is whole.
+/// A complete volume.
 struct CompleteVolume {
-    /// From 0, in order.
+    /// Index in the source, from 0.
     place: usize,
-    /// What its frames say.
+    /// Volume number of its frames.
     number: u32,
     backward: bool,
     times: Vec<Option<f64>>,
 }
 
-/// The volumes that make a sequence, and how many do not.
+/// The volumes of the sequence, and the number of those left out.
 fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<CompleteVolume>, usize), InputError> {
     let mut whole: Vec<CompleteVolume> = Vec::new();
     for place in 0..source.volumes() {
-        // Where all of a volume is damaged, the next one is read in its stead, and once more in its own place.
+        // If a volume is completely damaged, the next one is read instead, and a second time at its own index.
         let next = volume(source, place)?.filter(|v| whole.last().is_none_or(|before| before.number != v.number));
         whole.extend(next);
         if whole.len() * source.frames_per_volume() > MAX_FRAMES {
@@ -118,14 +120,14 @@ fn choose(source: &mut dyn Source, path: &Path) -> Result<(Vec<CompleteVolume>, 
         }
     }
     if whole.iter().any(|v| v.backward != whole[0].backward) {
-        // A probe file says of both ways only that they take turns.
+        // A probe file can only describe directions that alternate.
         whole.dedup_by_key(|v| v.backward);
     }
     let left_out = source.volumes() - whole.len();
     Ok((whole, left_out))
 }
 
-/// A volume if all of its frames are there, in order.
+/// A volume, if all its frames exist, in order.
 fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume>, InputError> {
     source.skip_to_volume(place)?;
     let count = source.frames_per_volume();
@@ -148,7 +150,7 @@ fn volume(source: &mut dyn Source, place: usize) -> Result<Option<CompleteVolume
     Ok(kept)
 }
 
-/// MetaImage with the fields of PLUS: samples, lines and frames, lines of its own, and time stamps by frame, s.
+/// The header of a PLUS sequence. `more`: additional lines. `times`: time stamps by frame, s.
 pub(super) fn header(
     [samples, lines, frames]: [usize; 3],
     sample: SampleType,
@@ -172,7 +174,7 @@ fn unwritable(path: &Path) -> impl Fn(io::Error) -> InputError {
     move |e| InputError::unwritable(path, &e)
 }
 
-/// The sequence and its probe file, both or none.
+/// Writes the sequence and its probe file: both or neither.
 pub(super) fn write_both(
     path: &Path,
     header: &str,
@@ -193,7 +195,7 @@ pub(super) fn write_both(
     let beside = probe_file_path(path);
     let mut geometry = Unfinished::create(&beside).map_err(unwritable(&beside))?;
     geometry.write_all(probe.as_bytes()).and_then(|()| geometry.finish()).map_err(unwritable(&beside))?;
-    // The geometry first: frames never stand there without it.
+    // The probe file first, so that frames never exist without it.
     geometry.rename().map_err(unwritable(&beside))?;
     sequence.rename().map_err(unwritable(path))
 }

@@ -1,14 +1,14 @@
 //! The shaders as SPIR-V: [`reflect()`] reads the interface that a module declares. The other modules rewrite a shader when its
-//! pipeline is made: for a scene ([`strip_bindings`]), for a software device ([`hoist_uniforms`], [`texture_to_storage`],
-//! [`storage_to_texel_buffer`]), and for fault injection ([`mutate`]).
+//! pipeline is made: for a scene (`strip_bindings`), for a software device (`hoist_uniforms`, `texture_to_storage`,
+//! `storage_to_texel_buffer`), and for fault injection (`mutate`).
 
-pub mod hoist_uniforms;
+pub(crate) mod hoist_uniforms;
 mod module;
-pub mod mutate;
+pub(crate) mod mutate;
 mod reflect;
-pub mod storage_to_texel_buffer;
-pub mod strip_bindings;
-pub mod texture_to_storage;
+pub(crate) mod storage_to_texel_buffer;
+pub(crate) mod strip_bindings;
+pub(crate) mod texture_to_storage;
 
 pub use module::{EMBEDDED, SpirvError, embedded, words};
 pub use reflect::{Access, Binding, Constant, Dimension, Kind, Member, Module, PARAMS, reflect};

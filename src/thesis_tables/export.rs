@@ -5,12 +5,12 @@ use super::{Conditions, DEPTH, FAN_ANGLE, Report, Row, SAMPLES, SECTOR_ANGLE, SO
 use crate::profile::export::acquisition_floor;
 use std::fmt::Write as _;
 
-/// A text as one field.
+/// A CSV field in quotes.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
-/// One line a row of Tables 3-6; a time that was not measured is an empty field.
+/// Tables 3-6 as CSV, one line per row; a missing time is an empty field.
 pub fn tables_csv(report: &Report) -> String {
     let mut text = String::from(
         "table,varied,value,usual,picture_ms,picture_least_ms,picture_most_ms,ratio,thesis_ms,thesis_ratio,stage_1_ms,\
@@ -29,7 +29,7 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
     let number = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
     let three = |ns: &[f64]| {
         let spread = Spread::new(ns);
-        [spread.map(|s| s.median), spread.map(|s| s.least), spread.map(|s| s.most)].map(number)
+        [spread.map(|s| s.median), spread.map(|s| s.min), spread.map(|s| s.max)].map(number)
     };
     let mut fields = vec![table.number.to_string(), table.varied.into(), quoted(&row.label), usual.to_string()];
     fields.extend(three(&row.times.picture));
@@ -42,7 +42,7 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
     fields.join(",") + "\n"
 }
 
-/// One line a picture, sigma and starting window of Tables 7-9 and a step of growth; shares in 0..1.
+/// Tables 7-9 as CSV, one line per picture, sigma, starting window and step of growth; shares in 0..1.
 pub fn growth_csv(grown: &[Grown]) -> String {
     let mut text = String::from("picture,sigma,window,largest,grew,share\n");
     for picture in grown {
@@ -58,10 +58,10 @@ pub fn growth_csv(grown: &[Grown]) -> String {
     text
 }
 
-/// The thesis' example of the least time of a volume: frames, lines.
+/// The thesis' example of the acquisition floor: frames, lines.
 const THESIS_FLOOR: [usize; 2] = [35, 64];
 
-/// Seconds that sound travels for a volume: a line takes 2 d / c (thesis 4.3).
+/// Travel time of sound for a volume, s: 2 d / c per line (thesis 4.3).
 fn acquisition(frames: usize, lines: usize) -> f64 {
     (frames * lines) as f64 * 2.0 * DEPTH * 1e-3 / SOUND_SPEED
 }
@@ -70,7 +70,7 @@ fn ms(value: f64) -> String {
     format!("{value:.3}")
 }
 
-/// What Markdown would take for markup, or a terminal for a command, does not get through.
+/// Text without Markdown table markup and terminal control characters.
 fn plain(text: &str) -> String {
     text.chars()
         .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
@@ -78,7 +78,7 @@ fn plain(text: &str) -> String {
         .replace('|', "\\|")
 }
 
-/// A table whose pipes stand under each other: the first column aligned left, the others right.
+/// A Markdown table with aligned pipes: the first column left-aligned, the others right-aligned.
 fn piped(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0).max(3);
@@ -102,7 +102,7 @@ fn piped(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Tables 3-6 beside the thesis' figures, what they were measured under, and Tables 7-9 of every picture given.
+/// The report as Markdown: conditions, Tables 3-6 with the figures of the thesis, notes, and Tables 7-9 of every picture.
 pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Tables of the thesis on this device\n\n");
     conditions(&mut text, report);
@@ -197,7 +197,7 @@ fn rows(table: &Table) -> Vec<Vec<String>> {
 
 fn spread(ns: &[f64]) -> [String; 2] {
     match Spread::new(ns) {
-        Some(s) => [ms(s.median), format!("{}..{}", ms(s.least), ms(s.most))],
+        Some(s) => [ms(s.median), format!("{}..{}", ms(s.min), ms(s.max))],
         None => ["-".into(), "-".into()],
     }
 }

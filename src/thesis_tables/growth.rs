@@ -10,33 +10,33 @@ use crate::source::StoredType;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Starting windows of Tables 7-9 and where their growth stops, pixels.
+/// Starting and largest windows of Tables 7-9, pixels.
 pub const WINDOWS: [[u32; 2]; 6] = [[3, 17], [5, 19], [7, 19], [9, 21], [11, 21], [13, 23]];
-/// Standard deviations of the noise that the thesis measures with, 0..1.
+/// Standard deviations of the noise for which the thesis measures, 0..1.
 pub const SIGMAS: [f64; 3] = [0.03, 0.1, 0.17];
 
-/// The growth of one picture's windows.
+/// Growth of the windows on one picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Growth {
     pub sigma: f64,
     /// Starting and largest window, pixels.
     pub windows: [u32; 2],
-    /// Pixels whose window grew by n rings, at place n.
+    /// Number of pixels whose window grew by n rings, at index n.
     pub counts: Vec<u64>,
 }
 
 impl Growth {
-    /// From the number of rings that each pixel's window grew by.
+    /// From the number of rings by which the window of each pixel grew.
     pub fn new(sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
-        let most = (windows[1] - windows[0]) / 2;
-        let mut counts = vec![0; most as usize + 1];
+        let max_rings = (windows[1] - windows[0]) / 2;
+        let mut counts = vec![0; max_rings as usize + 1];
         for ring in rings {
-            counts[(ring.round().max(0.0) as usize).min(most as usize)] += 1;
+            counts[(ring.round().max(0.0) as usize).min(max_rings as usize)] += 1;
         }
         Growth { sigma, windows, counts }
     }
 
-    /// Share of the pixels that grew by n rings, 0..1.
+    /// Share of the pixels whose window grew by n rings, 0..1; None if it cannot grow that far.
     pub fn share(&self, rings: usize) -> Option<f64> {
         let all: u64 = self.counts.iter().sum();
         self.counts.get(rings).map(|n| *n as f64 / all.max(1) as f64)
@@ -47,7 +47,7 @@ fn columns(rows: &[Growth]) -> usize {
     rows.iter().map(|r| r.counts.len()).max().unwrap_or(0)
 }
 
-/// One line a starting window, in percent.
+/// A table for a terminal, one line per starting window, in percent.
 pub fn table(rows: &[Growth]) -> String {
     let mut text = format!("{:>6} {:>7} {:>7}", "sigma", "window", "largest");
     for n in 0..columns(rows) {
@@ -67,7 +67,7 @@ pub fn table(rows: &[Growth]) -> String {
     text
 }
 
-/// The same with shares in 0..1; a window that cannot grow so far has an empty field.
+/// The same as CSV with shares in 0..1; a window that cannot grow that far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
     let mut text = "sigma,window,largest".to_string();
     (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
@@ -85,14 +85,15 @@ pub fn csv(rows: &[Growth]) -> String {
 /// How far the windows of the enhanced sigma filter grew on one picture (Tables 7-9).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grown {
-    /// The picture's name.
+    /// Name of the picture.
     pub picture: String,
     pub rows: Vec<Growth>,
 }
 
-/// One row of the growth table: sigma, starting and largest window, and the settings that make it.
+/// One row to measure: sigma, starting and largest window, and its settings.
 pub type GrowthSettings = (f64, [u32; 2], Settings);
 
+/// Why growth cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum GrowthError {
     #[error("{0}")]
@@ -104,26 +105,26 @@ pub enum GrowthError {
 /// A picture as a Cartesian volume of one slice.
 ///
 /// # Errors
-/// Settings that cannot be.
+/// The settings are invalid.
 pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
     let grid = Grid { size: [grey.width as usize, grey.height as usize, 1], spacing: [1.0; 3], origin: [0.0; 3] };
     let stored = if grey.sixteen { StoredType::U16 } else { StoredType::U8 };
     Scene::new(Geometry::Cartesian(grid), Input { stored, range: [0.0, grey.white()] }, settings)
 }
 
-/// One picture through the filter for every row; only the filter changes in between.
+/// Filters one picture for every row and returns the growth of its windows.
 ///
 /// # Errors
-/// Windows beyond what is filtered; a picture that the device cannot hold.
+/// A window is out of range, or the device cannot hold the picture.
 pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -> Result<Vec<Growth>, GrowthError> {
     let (mut grown, mut renderer) = (Vec::new(), None);
     for (sigma, windows, settings) in rows {
         let scene = scene_of(grey, settings)?;
         let renderer: &mut Renderer = match &mut renderer {
             None => renderer.insert(Renderer::new(context, scene, &RendererOptions::default())?),
-            Some(there) => {
-                there.change(scene)?;
-                there
+            Some(renderer) => {
+                renderer.change(scene)?;
+                renderer
             }
         };
         renderer.frame(0, &grey.bytes(), 0)?;
@@ -134,17 +135,17 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -
     Ok(grown)
 }
 
-/// Tables 7-9 on a picture: as `echolume filter --growth-table` has it, centres by Perona-Malik as for planes (thesis 5.5).
+/// Measures Tables 7-9 on a picture, as `echolume filter --growth-table` does: centres by Perona-Malik as for planes (thesis 5.5).
 ///
 /// # Errors
-/// Windows beyond what is filtered; a picture that the device cannot hold.
+/// A window is out of range, or the device cannot hold the picture.
 pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, GrowthError> {
     let windows = |sigma: f64| WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
     let rows = measure(context, grey, SIGMAS.into_iter().flat_map(windows).collect())?;
     Ok(Grown { picture: picture.into(), rows })
 }
 
-/// A row of Tables 7-9.
+/// The settings of a row of Tables 7-9.
 pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
     let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
     settings.picture.size = [1, 1];

@@ -1,5 +1,4 @@
-//! Tables 3-6 of the thesis measured on a device, and 7-9 on pictures: the scenes of [`crate::thesis_tables`] rendered again
-//! and again.
+//! Measures Tables 3-6 of the thesis on a device: renders the scene of every row repeatedly.
 
 use crate::gpu::{self, Context, GpuError, Renderer};
 use crate::machine;
@@ -10,21 +9,24 @@ use crate::thesis_tables::{Conditions, DEPTH, Filter3d, Reached, Report, Row, Ta
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Half the edge of the region that is rendered across the beam, mm: all of it lies within the sweep where the surfaces are.
+/// Half the edge of the rendered region across the beam, mm: at the depth of the surfaces all of it is within the sweep.
 pub const HALF_REGION: f64 = 45.0;
 /// Sigma of the 2D filter, mm.
 const SIGMA: f64 = 0.5;
 
+/// How to measure the tables.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOptions {
+    /// Use smaller volumes: see [`Conditions::usual`].
     pub quick: bool,
-    /// Volumes measured in each row, and rendered before that.
+    /// Volumes measured in each row.
     pub repeats: usize,
+    /// Volumes rendered before those, not measured.
     pub warm_up: usize,
 }
 
 impl TableOptions {
-    /// Volumes rendered in all.
+    /// Total number of volumes rendered.
     pub fn volumes(&self) -> usize {
         tables(self.quick).iter().map(|t| t.rows.len()).sum::<usize>() * (self.repeats + self.warm_up)
     }
@@ -33,7 +35,7 @@ impl TableOptions {
 /// Measures every row; `after_each` is called after every volume.
 ///
 /// # Errors
-/// What the device cannot hold or do.
+/// The device cannot hold a scene, or fails.
 pub fn run(context: &Arc<Context>, options: &TableOptions, after_each: &mut dyn FnMut()) -> Result<Report, GpuError> {
     let device = machine::device(context);
     let mut tables = tables(options.quick);
@@ -57,7 +59,7 @@ pub fn run(context: &Arc<Context>, options: &TableOptions, after_each: &mut dyn 
     })
 }
 
-/// The rows of one table in turns, so that what else the machine does falls on all of them alike.
+/// Measures the rows of one table, interleaved, so that other load on the machine affects them alike.
 fn measure(
     context: &Arc<Context>,
     table: &mut Table,
@@ -90,23 +92,23 @@ fn measure(
     Ok(())
 }
 
-/// Copies to and from the device belong to no stage.
+/// Adds the times of a volume to a row, by stage. Copies to and from the device belong to no stage.
 fn add(row: &mut Row, times: &[PassTime]) {
-    // Without time stamps there is nothing, rather than nothing that took no time.
+    // Without time stamps there are no times, rather than times of 0.
     if times.is_empty() {
         return;
     }
-    let of = |is_first: bool| -> f64 {
+    let stage_time = |is_first: bool| -> f64 {
         let staged = times.iter().filter_map(|t| Some((by_name(t.name)?.stage, t.total)));
         staged.filter(|(stage, _)| (*stage == Stage::Preprocess) == is_first).map(|(_, ns)| ns).sum()
     };
-    row.times.preprocess.push(of(true));
-    row.times.picture.push(of(false));
+    row.times.preprocess.push(stage_time(true));
+    row.times.picture.push(stage_time(false));
 }
 
 fn reached(renderer: &mut Renderer) -> Result<Option<Reached>, GpuError> {
     let Some(map) = renderer.read(Slot::Distance)? else { return Ok(None) };
-    // Parallel rays along the depth: all begin as deep.
+    // Parallel rays along the depth: all begin at the same depth.
     let scene = renderer.scene();
     let above = scene.rays.at(0.5, 0.5).0.y - scene.probe().map_or(0.0, |p| p.array_radius());
     let depths: Vec<f64> = map.values.iter().filter(|t| is_hit(**t)).map(|t| above + t).collect();
@@ -118,7 +120,7 @@ fn broken(error: &SceneError) -> GpuError {
     GpuError::Broken(format!("the scene that measures: {error}"))
 }
 
-/// The scene of a row: no filter, light or shadow but what the thesis' conditions name. The rough detector is off, so that a
+/// The scene of a row: only the filters that the conditions of the thesis name, no shadow. The coarse detector is off, so that a
 /// ray takes all of its samples.
 ///
 /// # Errors
@@ -140,13 +142,13 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     match conditions.filter_3d {
         Filter3d::None => {}
         Filter3d::Sliding(samples) => settings.ray.sliding = samples,
-        Filter3d::Kept(taps) => settings.slices.smooth = Some(Smooth { kernel: Some(taps), ..Smooth::default() }),
+        Filter3d::Stored(taps) => settings.slices.smooth = Some(Smooth { kernel: Some(taps), ..Smooth::default() }),
     }
     let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
     let probe = super::sweep::probe(conditions.frames, conditions.lines);
     let (low, high) = probe.plane_bounds();
     let scene = Scene::new(Geometry::Sweep(probe), input, settings)?;
-    // A slice's pixels are square otherwise, and a sector is wider than deep: n x n are denser in depth.
+    // Pixels of slices are square by default, but a sector is wider than deep: n x n pixels are denser in depth.
     let pitch = [0, 1].map(|i| (high[i] - low[i]) / f64::from(n - 1));
     Ok(scene.on_grid(SliceGrid { size: [n, n], origin: low, pitch }))
 }

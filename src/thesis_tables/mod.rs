@@ -1,6 +1,6 @@
-//! Tables 3-6 of the thesis (4.3), time per rendered volume in surface mode, beside this device's times: which rows there are,
-//! under which conditions, and what the thesis measured. Text is made in [`markdown`] and [`csv`]; nothing here
-//! measures.
+//! The tables of the thesis, next to the times of this device: Tables 3-6 (4.3), time per rendered volume in surface mode, and
+//! Tables 7-9 (5.5), the growth of filter windows. This file has the rows, their conditions and the figures of the thesis;
+//! [`measure`] and [`growth`] fill them, [`export`] writes Markdown and CSV.
 
 pub(crate) mod command;
 pub mod export;
@@ -12,44 +12,48 @@ use crate::machine::Device;
 use crate::profile::statistics::Sample;
 use growth::Grown;
 
-/// Thesis conditions, each unless varied (4.3): angles in deg, depth in mm.
+/// Conditions of the thesis (4.3) unless varied. Angle over the scan lines of a frame, deg.
 pub const SECTOR_ANGLE: f64 = 77.0;
+/// Angle over the frames of a volume, deg.
 pub const FAN_ANGLE: f64 = 61.0;
+/// Depth, mm.
 pub const DEPTH: f64 = 160.0;
+/// Samples per scan line.
 pub const SAMPLES: usize = 512;
-/// m/s.
+/// Speed of sound, m/s.
 pub const SOUND_SPEED: f64 = 1540.0;
-/// What the thesis measured under all of those conditions, ms.
+/// Time that the thesis measured under these conditions, ms.
 const USUAL_MS: f64 = 54.6;
 
-/// The 3D filter on the volume's samples, and who makes it.
+/// The 3D filter on the samples of the volume, and where it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter3d {
     None,
-    /// The thesis' own: along every ray, with a sliding front slice (`ray.sliding`). Samples along each edge.
+    /// As in the thesis: along every ray, with a sliding front slice (`ray.sliding`). Samples along each edge.
     Sliding(u32),
-    /// Separable, and kept up to date slice by slice in stage 1 (`slices.smooth.kernel`). Taps along each axis.
-    Kept(u32),
+    /// Separable, applied slice by slice in stage 1 (`slices.smooth.kernel`). Taps along each axis.
+    Stored(u32),
 }
 
 impl Filter3d {
+    /// Name in the tables.
     pub fn name(self) -> String {
         match self {
             Filter3d::None => "none".into(),
             Filter3d::Sliding(n) => format!("{n}x{n}x{n} along the ray"),
-            Filter3d::Kept(n) => format!("{n}x{n}x{n} slice by slice"),
+            Filter3d::Stored(n) => format!("{n}x{n}x{n} slice by slice"),
         }
     }
 }
 
-/// What one row is measured under.
+/// Conditions of one row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// Frames a volume.
+    /// Frames per volume.
     pub frames: usize,
-    /// Scan lines a frame, of [`SAMPLES`] samples.
+    /// Scan lines per frame, of [`SAMPLES`] samples.
     pub lines: usize,
-    /// n of n^3: slices of n x n pixels, n samples on a ray from the face to the end of the volume, picture of n x n pixels.
+    /// n of n^3: slices of n x n pixels, n samples per ray from the face to the end of the volume, picture of n x n pixels.
     pub volume: u32,
     pub filter_3d: Filter3d,
     /// Edge of the sigma filter's window on the distance map, pixels.
@@ -57,90 +61,93 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// The thesis', or a quarter of its volume's edge to try things with.
+    /// The conditions of the thesis; if `quick`, with a quarter of the edge of the volume and half of the lines.
     pub fn usual(quick: bool) -> Conditions {
         let (lines, volume) = if quick { (64, 128) } else { (128, 512) };
         Conditions { frames: 37, lines, volume, filter_3d: Filter3d::Sliding(3), filter_2d: 9 }
     }
 }
 
-/// Time on the device, ns, one entry a repeat.
+/// Times on the device, ns, one entry per repeat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times {
-    /// Stages 2-4: what the thesis timed.
+    /// Stages 2-4, which the thesis timed.
     pub picture: Vec<f64>,
-    /// Stage 1, all frames of a volume.
+    /// Stage 1 of all frames of a volume.
     pub preprocess: Vec<f64>,
 }
 
-/// Median, least and most of repeats, ms.
+/// Median, minimum and maximum of repeats, ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     pub median: f64,
-    pub least: f64,
-    pub most: f64,
+    pub min: f64,
+    pub max: f64,
 }
 
 impl Spread {
-    /// None where nothing was measured.
+    /// From times in ns; None without times.
     pub fn new(ns: &[f64]) -> Option<Spread> {
         let sample = Sample::new(ns).ok()?;
-        let [median, least, most] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
-        Some(Spread { median, least, most })
+        let [median, min, max] = [sample.median(), sample.min(), sample.max()].map(|ns| ns * 1e-6);
+        Some(Spread { median, min, max })
     }
 }
 
-/// What the thesis measured in a row.
+/// The figure of the thesis for a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thesis {
-    /// ms a rendered volume.
+    /// Time per rendered volume, ms.
     pub ms: f64,
-    /// Its table has no such row: the figure is that of the same conditions in its other tables.
+    /// True if its table has no such row: the figure is from other tables of the thesis, under the same conditions.
     pub from_others: bool,
 }
 
+/// A row of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What is varied, in words.
+    /// Value of the varied condition.
     pub label: String,
     pub conditions: Conditions,
     pub thesis: Thesis,
-    /// Empty until measured, and where the device has no time stamps.
+    /// Empty until measured, and without time stamps.
     pub times: Times,
     /// None until measured.
     pub reached: Option<Reached>,
 }
 
+/// One of Tables 3-6.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// As the thesis numbers it.
+    /// Number in the thesis.
     pub number: u32,
+    /// Name of the varied condition.
     pub varied: &'static str,
     pub rows: Vec<Row>,
-    /// The row of the usual conditions: ratios are to it.
+    /// Index of the row with the usual conditions, to which ratios are given.
     pub usual: usize,
 }
 
 impl Table {
-    /// This row's median of stages 2-4 over that of the usual row.
+    /// Ratio of the median of stages 2-4 to that of the usual row; None if not measured.
     pub fn ratio(&self, row: &Row) -> Option<f64> {
         let usual = Spread::new(&self.rows.get(self.usual)?.times.picture)?;
         let own = Spread::new(&row.times.picture)?;
         (usual.median > 0.0).then(|| own.median / usual.median)
     }
 
-    /// The same of the thesis' figures.
+    /// The same ratio of the figures of the thesis.
     pub fn thesis_ratio(&self, row: &Row) -> Option<f64> {
         self.rows.get(self.usual).map(|usual| row.thesis.ms / usual.thesis.ms)
     }
 }
 
-/// Tables 3-6, not measured yet. A `quick` one has a quarter of every volume's edge.
+/// Tables 3-6 without times. `quick`: see [`Conditions::usual`].
 pub fn tables(quick: bool) -> Vec<Table> {
     let usual = Conditions::usual(quick);
     let table = |number, varied, rows: Vec<(String, Conditions, f64)>| {
         let row = |(label, conditions, ms): (String, Conditions, f64)| {
-            // Table 6 leaves out what the other tables were measured with.
+            // Table 6 has no row for the conditions of the other tables.
             let from_others = number == 6 && conditions == usual;
             Row { label, conditions, thesis: Thesis { ms, from_others }, times: Times::default(), reached: None }
         };
@@ -153,8 +160,8 @@ pub fn tables(quick: bool) -> Vec<Table> {
         (Filter3d::None, 21.5),
         (Filter3d::Sliding(3), USUAL_MS),
         (Filter3d::Sliding(5), 187.0),
-        (Filter3d::Kept(3), USUAL_MS),
-        (Filter3d::Kept(5), 187.0),
+        (Filter3d::Stored(3), USUAL_MS),
+        (Filter3d::Stored(5), 187.0),
     ];
     let windows = [(3, 54.3), (5, 54.9), (7, 55.5), (9, USUAL_MS), (11, 56.8)];
     let volume = |(n, ms): (u32, f64)| {
@@ -174,32 +181,33 @@ pub fn tables(quick: bool) -> Vec<Table> {
     ]
 }
 
-/// What the rays of a row met: how far they went tells whether rows did as much work.
+/// Where the rays of a row hit a surface, which shows whether rows did the same work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// Share of the rays that met a surface, 0..1.
+    /// Share of the rays that hit a surface, 0..1.
     pub share: f64,
-    /// Mean depth of those surfaces below the face, mm; 0 where there are none.
+    /// Mean depth of those surfaces below the face, mm; 0 without hits.
     pub depth: f64,
 }
 
-/// Everything that the text is made of.
+/// All tables with the conditions of the measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     pub device: Device,
     /// Name, version and build of the program.
     pub program: String,
-    /// By RFC 3339.
+    /// Time of the measurement, RFC 3339.
     pub date: String,
     pub quick: bool,
     pub repeats: usize,
-    /// Volumes rendered before those.
+    /// Volumes rendered before those, not measured.
     pub warm_up: usize,
     pub tables: Vec<Table>,
     pub grown: Vec<Grown>,
 }
 
 impl Report {
+    /// True if any row has times.
     pub fn has_times(&self) -> bool {
         self.tables.iter().flat_map(|t| &t.rows).any(|r| !r.times.picture.is_empty())
     }
@@ -209,7 +217,7 @@ impl Report {
 pub(crate) mod tests {
     use super::*;
 
-    /// Nothing measured.
+    /// A report without times.
     pub(crate) fn report() -> Report {
         Report {
             device: Device {

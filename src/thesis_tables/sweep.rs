@@ -1,5 +1,5 @@
-//! What is measured on: a sweep of the thesis' geometry (4.3) through a ball before a wall, both in dark fluid, so that rays end
-//! where those of an examination do. Made from a formula: the same on every machine.
+//! The synthetic input of the tables: a sweep with the geometry of the thesis (4.3) through a ball in front of a wall, both in dark
+//! fluid, so that rays end where those of an examination do. Computed from a formula, so it is the same on every machine.
 
 use crate::probe::{Advance, Array, Axis, Indices, Motion, Probe};
 use crate::source::Frame;
@@ -7,22 +7,28 @@ use crate::thesis_tables::{DEPTH, FAN_ANGLE, SAMPLES, SECTOR_ANGLE, SOUND_SPEED}
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// The thesis does not say: of abdominal wobblers, as the phantom's. mm.
+/// Radius of the array, mm. The thesis does not state it; typical of abdominal wobblers, as in the phantom.
 const ARRAY_RADIUS: f64 = 40.0;
+/// Radius of the wobble, mm.
 const WOBBLE_RADIUS: f64 = 25.0;
 
-/// As wide as a fetal head. Depths below the face, mm.
+/// Radius of the ball, mm: as wide as a fetal head.
 pub const BALL_RADIUS: f64 = 45.0;
+/// Depth of its centre below the face, mm.
 pub const BALL_DEPTH: f64 = 100.0;
+/// Depth of the wall below the face, mm.
 pub const WALL_DEPTH: f64 = 130.0;
 
-/// Samples in 0..1: fluid, and what the bodies add; the edge between them rises over this much, mm.
+/// Value of samples in fluid, 0..1.
 const FLUID: f64 = 0.15;
+/// Value that the bodies add.
 const TISSUE: f64 = 0.6;
+/// Width of the edges of bodies, mm.
 const EDGE: f64 = 1.0;
-/// Standard deviation of the grain: far below what the detector calls a surface, with no filter either.
+/// Standard deviation of the grain: far below the threshold of the detector, even without a filter.
 const GRAIN: f64 = 0.01;
 
+/// The probe of a sweep of `frames` frames of `lines` scan lines.
 pub fn probe(frames: usize, lines: usize) -> Probe {
     let spread = |angle: f64, count: usize| Axis::centred(angle.to_radians() / (count - 1) as f64, count);
     Probe {
@@ -38,13 +44,13 @@ pub fn probe(frames: usize, lines: usize) -> Probe {
     }
 }
 
-/// Depth below the face of the first surface on the line along the beam's axis at (lateral, elevation), mm.
+/// Depth below the face of the first surface on a line parallel to the depth axis at (lateral, elevation), mm.
 pub fn surface_depth(lateral: f64, elevation: f64) -> f64 {
-    let beside = BALL_RADIUS.powi(2) - lateral.powi(2) - elevation.powi(2);
-    if beside > 0.0 { WALL_DEPTH.min(BALL_DEPTH - beside.sqrt()) } else { WALL_DEPTH }
+    let half_chord_squared = BALL_RADIUS.powi(2) - lateral.powi(2) - elevation.powi(2);
+    if half_chord_squared > 0.0 { WALL_DEPTH.min(BALL_DEPTH - half_chord_squared.sqrt()) } else { WALL_DEPTH }
 }
 
-/// Without grain.
+/// Value at a place, without grain.
 fn echo(place: DVec3) -> f64 {
     let depth = place.y - ARRAY_RADIUS;
     let from_ball = (place - DVec3::new(0.0, ARRAY_RADIUS + BALL_DEPTH, 0.0)).length() - BALL_RADIUS;
@@ -52,8 +58,8 @@ fn echo(place: DVec3) -> f64 {
     FLUID + TISSUE * (0.5 - outside / EDGE).clamp(0.0, 1.0)
 }
 
-/// Of zero mean and deviation 1, nearly normal: the sum of four even ones, which are the bytes of a mixed number (Steele, Lea
-/// and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
+/// Noise of mean 0 and standard deviation 1, nearly normal: the sum of four uniform values, which are bytes of a mixed number (Steele,
+/// Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014).
 fn grain(number: u64) -> f64 {
     let mut z = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -63,7 +69,7 @@ fn grain(number: u64) -> f64 {
     sum * 3f64.sqrt()
 }
 
-/// One volume, u8 over 0..1.
+/// The frames of one volume, u8 for 0..1.
 pub fn frames(frames: usize, lines: usize) -> Vec<Frame> {
     let probe = probe(frames, lines);
     let sample = |slice: usize, line: usize, sample: usize| {

@@ -30,21 +30,22 @@ pub struct DirectOptions {
 /// No device has such a monitor, or another program uses it; the device or the monitor is lost repeatedly.
 pub fn run(
     device: &ContextOptions,
-    shape: DirectOptions,
+    options: DirectOptions,
     mut make: Box<MakeConsole>,
 ) -> Result<(Console, Arc<Context>), GpuError> {
-    let output = Output { device, target: Target::Monitor(shape.monitor.clone()), present_mode: shape.present_mode };
+    let output =
+        Output { device, target: Target::Monitor(options.monitor.clone()), present_mode: options.present_mode };
     let context = Context::for_presentation(device, &output.target)?;
-    let size = monitor_size(&context, &shape.monitor)?;
-    let screen = Screen::new(&context, output.target.clone(), size, shape.present_mode)?;
-    let devices =
-        Devices::open(size, shape.grab).map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
+    let size = monitor_size(&context, &options.monitor)?;
+    let screen = Screen::new(&context, output.target.clone(), size, options.present_mode)?;
+    let devices = Devices::open(size, options.grab)
+        .map_err(|e| GpuError::Window(format!("input devices cannot be read: {e}")))?;
     // The distance of the monitor is unknown: text has the size for a desk.
     let mut console = make(&context, size, 1.0, devices.wake());
     console.set_screen(Some(screen));
     let (recovery, cursor, has_presented) = (Recovery::default(), CursorTimer::default(), false);
-    let ends = shape.time.map(|time| Instant::now() + time);
-    let monitor = shape.monitor;
+    let ends = options.time.map(|time| Instant::now() + time);
+    let monitor = options.monitor;
     let mut direct_loop =
         DirectLoop { output, monitor, context, console, make, devices, size, recovery, cursor, has_presented, ends };
     direct_loop.run()?;

@@ -61,7 +61,7 @@ pub fn measured(report: &Report) -> Result<Vec<Rung>, String> {
     for choice in front.iter().rev() {
         let (time_share, before) = (choice.time / slowest, rungs.last().map_or(1.0, |r| r.time_share));
         if time_share <= 0.75 * before {
-            let label = choice.turned.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
+            let label = choice.changed.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
             rungs.push(Rung { label: label.join(", "), time_share, change: Change::Measured(choice.set.clone()) });
         }
     }

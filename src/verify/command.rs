@@ -5,17 +5,17 @@ use crate::files::signals::Held;
 use crate::files::{read_text, replace};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::terminal::{Failure, failed, input, say};
-use crate::verify::report::baseline::{self, Compared, compare};
-use crate::verify::report::{Level, Outcome, Run, Verdict, html, json, junit, words};
-use crate::verify::self_test::{self, Caught};
-use crate::verify::{self, Bench, Check};
+use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
+use crate::verify::report::{self, Level, Outcome, Run, Verdict, html, junit, summary};
+use crate::verify::self_test::{self, Detection};
+use crate::verify::{self, Check, DeviceUnderTest};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Longest baseline that is read, bytes.
-const LONGEST: u64 = 256 << 20;
+const MAX_BASELINE: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
@@ -78,7 +78,7 @@ impl Verify {
         if self.digest {
             let device = self.device.clone().unwrap_or(DeviceChoice::Best);
             let context = context(&ContextOptions { device, validation: false })?;
-            say!("{}", verify::repeats::digest(&context).map_err(failed)?.trim_end());
+            say!("{}", verify::determinism::digest(&context).map_err(failed)?.trim_end());
             return Ok(());
         }
         let level = if self.full { Level::Full } else { Level::Quick };
@@ -87,16 +87,16 @@ impl Verify {
             checks.iter().for_each(|check| say!("{} / {}", check.group, check.name));
             return Ok(());
         }
-        let options = baseline::Options::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
+        let options = BaselineOptions::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
         check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // Checks that were not requested are not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.looks_at(o)));
-        let mut bench = self.bench(level)?;
+        let mut dut = self.open(level)?;
         let (mut run, stopped) = match self.self_test {
-            true => (self.tested(&bench)?, None),
-            false => self.checked(&mut bench)?,
+            true => (self.tested(&dut)?, None),
+            false => self.checked(&mut dut)?,
         };
         self.save_pictures(&mut run);
         let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
@@ -105,31 +105,31 @@ impl Verify {
     }
 
     /// Runs the checks on the device. Returns the outcomes, and the signal if one ended the run early.
-    fn checked(&self, bench: &mut Bench) -> Result<(Run, Option<&'static str>), Failure> {
+    fn checked(&self, dut: &mut DeviceUnderTest) -> Result<(Run, Option<&'static str>), Failure> {
         let held = Held::first();
-        announce(bench);
+        announce(dut);
         let checks = match &self.against {
             Some(other) => {
-                let other = context(&ContextOptions { device: other.clone(), ..bench.options().clone() })?;
+                let other = context(&ContextOptions { device: other.clone(), ..dut.options().clone() })?;
                 say!("against: {}, {}", other.candidate.name, other.candidate.driver.trim());
-                verify::against::checks(bench.level, &other).map_err(failed)?
+                verify::modes::against(dut.level, &other).map_err(failed)?
             }
-            None => verify::checks(bench.level),
+            None => verify::checks(dut.level),
         };
         let checks = self.chosen(checks)?;
         let (mut ran, mut group) = (0, Vec::<Outcome>::new());
-        let hear = |outcome: &Outcome| {
+        let on_outcome = |outcome: &Outcome| {
             if group.first().is_some_and(|first| first.group != outcome.group) {
                 tell(&std::mem::take(&mut group));
             }
             // One line per group; a failure is printed at once.
             if outcome.verdict == Verdict::Failed {
-                say!("{}", words::failure(outcome).trim_end());
+                say!("{}", summary::failure(outcome).trim_end());
             }
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
             ran += 1;
         };
-        let mut run = while_told(&held, || verify::run(bench, &checks, || held.signal(), hear));
+        let mut run = while_told(&held, || verify::run(dut, &checks, || held.signal(), on_outcome));
         tell(&group);
         let stopped = held.signal().filter(|_| ran < checks.len());
         // Readers of the report files must see it, too.
@@ -138,22 +138,22 @@ impl Verify {
     }
 
     /// Runs the self-test: which check detects each injected fault.
-    fn tested(&self, bench: &Bench) -> Result<Run, Failure> {
-        announce(bench);
+    fn tested(&self, dut: &DeviceUnderTest) -> Result<Run, Failure> {
+        announce(dut);
         let begun = Instant::now();
-        let tell = |caught: &Caught| match &caught.by {
-            _ if caught.left_out => say!("{}: left out\n    {}", caught.fault, caught.found),
-            Some(by) => say!("{}: caught by {by}\n    {}", caught.fault, caught.found),
-            None => say!("{}: NOT CAUGHT ({})\n    {}", caught.fault, caught.what, caught.found),
+        let tell = |detection: &Detection| match &detection.by {
+            _ if detection.left_out => say!("{}: left out\n    {}", detection.fault, detection.message),
+            Some(by) => say!("{}: caught by {by}\n    {}", detection.fault, detection.message),
+            None => say!("{}: NOT CAUGHT ({})\n    {}", detection.fault, detection.what, detection.message),
         };
-        let caught = self_test::run(bench.options(), tell).map_err(failed)?;
-        Ok(bench.run_of(caught.iter().map(Caught::outcome).collect(), begun))
+        let detection = self_test::run(dut.options(), tell).map_err(failed)?;
+        Ok(dut.run_of(detection.iter().map(Detection::outcome).collect(), begun))
     }
 
     /// Opens the device, with validation if its layer is installed.
-    fn bench(&self, level: Level) -> Result<Bench, Failure> {
+    fn open(&self, level: Level) -> Result<DeviceUnderTest, Failure> {
         let device = self.device.clone().unwrap_or(DeviceChoice::Best);
-        let with = |validation| Bench::new(&ContextOptions { device: device.clone(), validation }, level);
+        let with = |validation| DeviceUnderTest::new(&ContextOptions { device: device.clone(), validation }, level);
         match with(!self.no_validation) {
             Err(GpuError::NoValidation) => with(false),
             made => made,
@@ -203,17 +203,17 @@ impl Verify {
         }
     }
 
-    fn write(&self, run: &Run, compared: Option<&Compared>) -> Result<(), Failure> {
-        put(&self.json, || json::to_json(run).map_err(|e| e.to_string()))?;
+    fn write(&self, run: &Run, compared: Option<&BaselineComparison>) -> Result<(), Failure> {
+        put(&self.json, || report::to_json(&run).map_err(|e| e.to_string()))?;
         put(&self.junit, || junit::junit(run, compared))?;
         put(&self.html, || html::html(run, compared))
     }
 
-    fn judge(&self, run: &Run, compared: Option<&Compared>, stopped: Option<&str>) -> Result<(), Failure> {
+    fn judge(&self, run: &Run, compared: Option<&BaselineComparison>, stopped: Option<&str>) -> Result<(), Failure> {
         if let Some(compared) = compared {
-            say!("{}", words::comparison(compared).trim_end());
+            say!("{}", summary::comparison(compared).trim_end());
         }
-        say!("{}", words::summary(run));
+        say!("{}", summary::summary(run));
         let files: Vec<_> = run.failures().flat_map(|o| &o.faults).flat_map(|f| &f.files).collect();
         if !files.is_empty() {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
@@ -224,7 +224,7 @@ impl Verify {
                 run.outcomes.len() - 1
             )));
         }
-        let worse = compared.filter(|c| c.is_worse()).map_or(0, Compared::worse_checks);
+        let worse = compared.filter(|c| c.is_worse()).map_or(0, BaselineComparison::worse_checks);
         match (run.count(Verdict::Failed), worse) {
             (0, 0) => Ok(()),
             (0, worse) => Err(failed(format!("{worse} checks became worse since the baseline"))),
@@ -241,10 +241,10 @@ fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) ->
     Ok(())
 }
 
-fn announce(bench: &Bench) {
-    let device = &bench.context.candidate;
+fn announce(dut: &DeviceUnderTest) {
+    let device = &dut.context.candidate;
     let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
-    let watched = if bench.watched() { "" } else { "; without the validation layer" };
+    let watched = if dut.watched() { "" } else { "; without the validation layer" };
     say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
 }
 
@@ -267,7 +267,7 @@ fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
 
 fn tell(group: &[Outcome]) {
     if let Some(first) = group.first() {
-        say!("{}", words::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
+        say!("{}", summary::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
     }
 }
 
@@ -299,6 +299,6 @@ fn file_name(title: &str) -> String {
 
 fn read(file: &Path) -> Result<Run, Failure> {
     let fault = |e: &dyn std::fmt::Display| input(format!("--baseline {}: {e}", file.display()));
-    let text = read_text(file, LONGEST, "--json of verify").map_err(|e| fault(&e))?;
-    json::from_json(&text).map_err(|e| fault(&e))
+    let text = read_text(file, MAX_BASELINE, "--json of verify").map_err(|e| fault(&e))?;
+    report::from_json(&text).map_err(|e| fault(&e))
 }

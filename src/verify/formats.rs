@@ -1,65 +1,63 @@
-//! What the device does with every format, what that makes fall back to what, and that everything which may fall back still gives
-//! the picture of the f64 reference.
+//! Group "formats": what the device supports for every format, and that every fallback still renders the picture of the f64 reference.
 
 use super::built_in::{BYTES, scene, wall, wobbler};
-use super::failing::count;
-use super::isolated_context::IsolatedContext;
-use super::{Bench, Check, Found, drawn, modes, shown};
+use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
+use super::compare::{count_figure, picture_comparison, picture_difference};
+use super::render;
+use super::render::stored_reference_picture;
 use crate::gpu::{Context, GpuError, RendererOptions, TexelAccess, formats};
-use crate::passes::slots::Format;
-use crate::passes::{Slot, Texels};
+use crate::passes::Texels;
 use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::probe::Geometry;
-use crate::reference;
 use crate::scene::{Sampling, Scene};
-use crate::verify::report::{Fault, Figure, Level, Shown, Unit};
+use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit};
 use std::sync::Arc;
 
-/// Volume formats, and how far a picture may be off: levels on average and at most. The largest of a ray is off by half a step of the
-/// format, by what a filter's 8 bits round between neighbours, and by half a level of the picture.
+/// Volume formats with the allowed difference of a picture, levels: mean and maximum. A maximum projection differs by half a step of the
+/// format, by the rounding of 8-bit filter weights between neighbours, and by half a level of the picture.
 const VOLUMES: [(&str, f64, f64); 4] = [("r8", 0.6, 3.0), ("r16", 0.4, 2.0), ("r16f", 0.4, 2.0), ("r32f", 0.4, 2.0)];
 
 pub fn checks(_: Level) -> Vec<Check> {
     let mut checks = vec![Check::new("formats", "uses of every format", uses)];
     for (format, mean, most) in VOLUMES {
         let name = format!("a volume in {format}");
-        checks.push(Check::new("formats", name, move |bench: &mut Bench| volume(bench, format, [mean, most])));
+        checks.push(Check::new("formats", name, move |dut: &mut DeviceUnderTest| volume(dut, format, [mean, most])));
     }
     checks.push(Check::new("formats", "what falls back", fallbacks));
     checks
 }
 
-/// What there is and what is missing, as notes; what some scene cannot do without, as faults.
-fn uses(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, context) = (Found::default(), &bench.context);
+/// Lists supported and missing features as notes; features that a built-in scene needs and that are missing are faults.
+fn uses(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, context) = (Findings::default(), &dut.context);
     for of in formats::format_support(context) {
         let [columns, rows, edge] = of.max_extent;
         let missing =
             if of.unsupported.is_empty() { String::new() } else { format!("; not {}", of.unsupported.join(", ")) };
         let can = of.supported.join(", ");
-        found.notes.push(format!("{}: {can}{missing}; {columns}x{rows}, {edge}^3", of.format));
+        findings.notes.push(format!("{}: {can}{missing}; {columns}x{rows}, {edge}^3", of.format));
     }
     let fetch = TexelAccess::for_device(&context.candidate);
-    found.notes.push(format!("{}; automatic sampling: {}", fetch.describe(), fetch.sampling().words()));
-    found.notes.push(format!(
+    findings.notes.push(format!("{}; automatic sampling: {}", fetch.describe(), fetch.sampling().words()));
+    findings.notes.push(format!(
         "{} queues; time stamps of {} bits, {} ns a tick",
         context.queue_count(),
         context.candidate.valid_bits(),
         context.limits.timestamp_period
     ));
-    found.notes.extend(context.candidate.missing_optional.iter().map(|what| format!("without {what}")));
-    let scenes = bench.scenes();
+    findings.notes.extend(context.candidate.missing_optional.iter().map(|what| format!("without {what}")));
+    let scenes = dut.scenes();
     let mut refused = Vec::new();
     for (name, scene) in scenes.iter() {
         let scene = formats::adapt_scene(context, fetch, scene.clone());
         let fits = formats::check(context, &Plan::new(&scene), &scene);
         refused.extend(fits.err().map(|error| format!("'{name}': {error}")));
     }
-    found.figures.push(count("scenes", scenes.len()));
-    found.figures.push(Figure::error("scenes refused", refused.len() as f64, 0.0, Unit::Count));
-    found.faults.extend(refused.into_iter().take(4).map(Fault::new));
-    Ok(found)
+    findings.figures.push(count_figure("scenes", scenes.len()));
+    findings.figures.push(Figure::error("scenes refused", refused.len() as f64, 0.0, Unit::Count));
+    findings.faults.extend(refused.into_iter().take(4).map(Fault::new));
+    Ok(findings)
 }
 
 fn small(mode: &str, format: &str, ray: &str) -> Result<Scene, GpuError> {
@@ -70,18 +68,9 @@ fn small(mode: &str, format: &str, ray: &str) -> Result<Scene, GpuError> {
     scene(Geometry::Sweep(wobbler()), BYTES, &toml).map_err(GpuError::Broken)
 }
 
-/// A picture by the f64 reference, of frames as they are stored.
-pub fn reference(scene: &Scene, frames: &[Texels]) -> Picture {
-    let format = Slot::Frames.format(scene);
-    let stored: Vec<_> = frames.iter().map(|f| Texels::decode(f.size, format, &f.encode(format))).collect();
-    let screen = reference::render(scene, &stored).remove(&Slot::Screen);
-    let screen = screen.unwrap_or_else(|| Texels::untouched([0; 3], 4));
-    Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
-}
-
-/// Mean and largest difference, levels. A ray along the border of what was seen may fall on either side: of the largest hundredth of
-/// all values the least counts.
-fn apart(a: &Picture, b: &Picture) -> [f64; 2] {
+/// Mean and 99th percentile of the difference, levels. Rays along the border of the sweep may fall on either side, so the largest
+/// hundredth of the values does not count.
+fn difference(a: &Picture, b: &Picture) -> [f64; 2] {
     let mut apart: Vec<u8> = a.rgba.iter().zip(&b.rgba).map(|(a, b)| a.abs_diff(*b)).collect();
     apart.sort_unstable();
     let mean = apart.iter().map(|d| f64::from(*d)).sum::<f64>() / apart.len().max(1) as f64;
@@ -89,77 +78,77 @@ fn apart(a: &Picture, b: &Picture) -> [f64; 2] {
     [mean, most]
 }
 
-/// The largest of what was seen so far.
+/// LargestDifference differences so far.
 #[derive(Default)]
-pub struct Largest {
+pub struct LargestDifference {
     pictures: usize,
     apart: [f64; 2],
 }
 
-impl Largest {
-    /// Adds a fault where a picture is further off than allowed.
-    pub fn add(&mut self, found: &mut Found, what: &str, expected: &Picture, got: &Picture, allowed: [f64; 2]) {
-        let is = apart(expected, got);
+impl LargestDifference {
+    /// Compares a picture and adds a fault if it differs by more than allowed.
+    pub fn add(&mut self, findings: &mut Findings, what: &str, expected: &Picture, got: &Picture, allowed: [f64; 2]) {
+        let is = difference(expected, got);
         self.pictures += 1;
         self.apart = [self.apart[0].max(is[0]), self.apart[1].max(is[1])];
         if is[0] <= allowed[0] && is[1] <= allowed[1] {
             return;
         }
-        let fault = Some(found.faults.len());
-        found.pictures.push(Shown { fault, ..shown::pictures(what, expected, got) });
+        let fault = Some(findings.faults.len());
+        findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
         let [mean, most] = is;
         let said = format!("{what}: {mean:.2} levels off on average, {most} at most");
-        found.faults.push(Fault { worst: Some(modes::apart(expected, got).worst), ..Fault::new(said) });
+        findings.faults.push(Fault { worst: Some(picture_difference(expected, got).worst), ..Fault::new(said) });
     }
 
-    fn tell(&self, found: &mut Found, [mean, most]: [f64; 2]) {
-        found.figures.push(count("pictures compared", self.pictures));
-        found.figures.push(Figure::error("mean difference", self.apart[0], mean, Unit::Levels));
-        found.figures.push(Figure::error("largest difference", self.apart[1], most, Unit::Levels));
+    fn add_figures(&self, findings: &mut Findings, [mean, most]: [f64; 2]) {
+        findings.figures.push(count_figure("pictures compared", self.pictures));
+        findings.figures.push(Figure::error("mean difference", self.apart[0], mean, Unit::Levels));
+        findings.figures.push(Figure::error("largest difference", self.apart[1], most, Unit::Levels));
     }
 }
 
-/// A volume in one format, by every way to sample it and to read its texels.
-fn volume(bench: &mut Bench, format: &str, allowed: [f64; 2]) -> Result<Found, GpuError> {
-    let (mut found, mut largest) = (Found::default(), Largest::default());
-    let modes: &[&str] = if bench.level == Level::Quick { &["mip"] } else { &["mip", "vr", "mean", "sr"] };
+/// A volume in one format, with every kind of sampling and texel fetch.
+fn volume(dut: &mut DeviceUnderTest, format: &str, allowed: [f64; 2]) -> Result<Findings, GpuError> {
+    let (mut findings, mut largest) = (Findings::default(), LargestDifference::default());
+    let modes: &[&str] = if dut.level == Level::Quick { &["mip"] } else { &["mip", "vr", "mean", "sr"] };
     for mode in modes {
         let exact = small(mode, format, "sampling = 'exact'")?;
         let frames = wall(&exact, 0);
-        let expected = reference(&exact, &frames);
+        let expected = stored_reference_picture(&exact, &frames);
         for sampling in ["hardware", "exact", "quads"] {
             let scene = small(mode, format, &format!("sampling = '{sampling}'"))?;
             for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
                 let what = format!("{mode} in {format}, {sampling}, {}", fetch.describe());
                 let options = RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
-                match drawn::sent(&bench.context, &scene, &frames, &options) {
-                    Ok(mut renderer) => largest.add(&mut found, &what, &expected, &renderer.picture()?, allowed),
-                    // It was asked for, so nothing else is taken instead.
-                    Err(error @ GpuError::Format { .. }) => found.notes.push(format!("{what}: refused, {error}")),
+                match render::sent(&dut.context, &scene, &frames, &options) {
+                    Ok(mut renderer) => largest.add(&mut findings, &what, &expected, &renderer.picture()?, allowed),
+                    // The fetch was requested explicitly, so there is no fallback.
+                    Err(error @ GpuError::Format { .. }) => findings.notes.push(format!("{what}: refused, {error}")),
                     Err(error) => return Err(error),
                 }
             }
         }
     }
-    largest.tell(&mut found, allowed);
-    Ok(found)
+    largest.add_figures(&mut findings, allowed);
+    Ok(findings)
 }
 
-/// What a device may lack, what is drawn on it then, and what that must fall back to.
-struct Lack {
+/// A feature that a device may missing, the options to render with, and the sampling that must be used instead.
+struct MissingFeature {
     name: &'static str,
     change: fn(&mut Context),
     options: RendererOptions,
     sampling: Option<Sampling>,
 }
 
-fn lacks() -> Vec<Lack> {
+fn missing_features() -> Vec<MissingFeature> {
     let plain = RendererOptions::default;
     let reading = |fetch| RendererOptions { texel_access: Some(fetch), ..RendererOptions::default() };
-    let of = |name, change, options, sampling| Lack { name, change, options, sampling };
+    let of = |name, change, options, sampling| MissingFeature { name, change, options, sampling };
     vec![
         of("no filter", formats::disable_linear_filter, reading(TexelAccess::Textures), Some(Sampling::Exact)),
-        // The largest allocation holds the volume, and not four times as much.
+        // The maximum allocation holds the volume, but not four times as much.
         of(
             "no room for quads",
             |c| c.candidate.max_bytes = 80 << 10,
@@ -184,34 +173,34 @@ fn lacks() -> Vec<Lack> {
     ]
 }
 
-fn fallbacks(bench: &mut Bench) -> Result<Found, GpuError> {
-    let (mut found, mut largest, allowed) = (Found::default(), Largest::default(), [0.6, 3.0]);
+fn fallbacks(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, mut largest, allowed) = (Findings::default(), LargestDifference::default(), [0.6, 3.0]);
     let modes = ["mip", "sr", "vr"].map(|mode| small(mode, "r8", "sampling = 'auto'"));
     let mut scenes: Vec<(Scene, Vec<Texels>, Picture)> = Vec::new();
     for scene in modes {
         let scene = scene?;
         let frames = wall(&scene, 0);
-        let expected = reference(&scene, &frames);
+        let expected = stored_reference_picture(&scene, &frames);
         scenes.push((scene, frames, expected));
     }
-    for lack in lacks() {
-        let aside = IsolatedContext::lacking(bench, lack.change)?;
-        let context: &Arc<Context> = &aside.context;
+    for missing in missing_features() {
+        let isolated = IsolatedContext::lacking(dut, missing.change)?;
+        let context: &Arc<Context> = &isolated.context;
         let mut took = String::new();
         for (scene, frames, expected) in &scenes {
-            let mut renderer = drawn::sent(context, scene, frames, &lack.options)?;
+            let mut renderer = render::sent(context, scene, frames, &missing.options)?;
             let picture = renderer.picture()?;
-            let what = format!("{}, mode {:?}", lack.name, scene.settings.mode);
-            largest.add(&mut found, &what, expected, &picture, allowed);
+            let what = format!("{}, mode {:?}", missing.name, scene.settings.mode);
+            largest.add(&mut findings, &what, expected, &picture, allowed);
             let sampling = renderer.scene().sampling;
-            found.expect(lack.sampling.is_none_or(|expected| expected == sampling), || {
+            findings.expect(missing.sampling.is_none_or(|expected| expected == sampling), || {
                 format!("{what}: samples are taken {}", sampling.words())
             });
             took = format!("samples {}, {}", sampling.words(), renderer.texel_access().describe());
         }
-        found.notes.push(format!("{}: {took}", lack.name));
-        aside.tell(&mut found);
+        findings.notes.push(format!("{}: {took}", missing.name));
+        isolated.report_validation(&mut findings);
     }
-    largest.tell(&mut found, allowed);
-    Ok(found)
+    largest.add_figures(&mut findings, allowed);
+    Ok(findings)
 }

@@ -1,28 +1,30 @@
-//! Frames that arrive while pictures are drawn, on one queue and as if there were three: every picture is the one that is drawn when
-//! everything is waited for, to the byte. Passes are slowed down, so that what may overlap does.
+//! Group "hazards": frames arrive while pictures are rendered, on one to three queues. Every picture must be identical to the one that is
+//! rendered with a wait after every step. Passes are slowed down so that work overlaps.
 
 use super::built_in::{BYTES, Noise, scene, wall, wobbler};
-use super::isolated_context::IsolatedContext;
-use super::repeats::{counted, same};
-use super::{Bench, Check, Found, drawn, shown};
+use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
+use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
+use super::render;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;
 use crate::probe::{Advance, Geometry, Probe};
 use crate::queues::MAX_QUEUES;
 use crate::scene::Scene;
-use crate::verify::report::{Fault, Level, Shown};
+use crate::verify::report::{Fault, Level, PictureComparison};
 use std::sync::Arc;
 
-/// On so many queues: how many pictures were compared, and how many differ.
-type Story = fn(&mut Found, &IsolatedContext, usize, Level) -> Result<[usize; 2], GpuError>;
+/// A scenario on a number of queues; returns how many pictures were compared and how many differ.
+type Scenario = fn(&mut Findings, &IsolatedContext, usize, Level) -> Result<[usize; 2], GpuError>;
 
 pub fn checks(_: Level) -> Vec<Check> {
-    let of = |name: &str, story: Story| Check::new("hazards", name, move |bench: &mut Bench| on_queues(bench, story));
+    let of = |name: &str, scenario: Scenario| {
+        Check::new("hazards", name, move |dut: &mut DeviceUnderTest| on_queues(dut, scenario))
+    };
     vec![
-        of("a volume arrives while another is drawn", |found, aside, queues, level| {
+        of("a volume arrives while another is drawn", |findings, isolated, queues, level| {
             let rounds = if level == Level::Quick { 6 } else { 60 };
-            taking_turns(found, &aside.context, queues, rounds, |round| (round as u32 + 1) % 2)
+            alternating_images(findings, &isolated.context, queues, rounds, |round| (round as u32 + 1) % 2)
         }),
         of("slices are replaced while they are drawn", replaced),
         of("frames and pictures in any order", any_order),
@@ -30,24 +32,24 @@ pub fn checks(_: Level) -> Vec<Check> {
     ]
 }
 
-/// The same story on one, two and three queues.
-fn on_queues(bench: &mut Bench, story: Story) -> Result<Found, GpuError> {
-    let (mut found, mut sums) = (Found::default(), [0, 0]);
+/// Runs a scenario on one, two and three queues.
+fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, GpuError> {
+    let (mut findings, mut totals) = (Findings::default(), [0, 0]);
     for queues in 1..=MAX_QUEUES {
-        let aside = IsolatedContext::of_queues(bench, queues)?;
-        let [compared, wrong] = story(&mut found, &aside, queues, bench.level)?;
-        sums = [sums[0] + compared, sums[1] + wrong];
-        aside.tell(&mut found);
+        let isolated = IsolatedContext::of_queues(dut, queues)?;
+        let [compared, wrong] = scenario(&mut findings, &isolated, queues, dut.level)?;
+        totals = [totals[0] + compared, totals[1] + wrong];
+        isolated.report_validation(&mut findings);
     }
-    counted(&mut found, sums[0], sums[1]);
-    let there = bench.context.queue_count();
+    add_picture_counts(&mut findings, totals[0], totals[1]);
+    let there = dut.context.queue_count();
     if there < MAX_QUEUES {
-        found.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
+        findings.notes.push(format!("queues for different work: {there} of {MAX_QUEUES}; one does what several would"));
     }
-    Ok(found)
+    Ok(findings)
 }
 
-/// The wobbler, whose motor goes on during a frame.
+/// The wobbler with a motor that moves during a frame.
 fn moving() -> Geometry {
     let probe = wobbler();
     Geometry::Sweep(Probe { advance: Advance::Same(0.3 * probe.slices.pitch()), ..probe })
@@ -61,7 +63,7 @@ fn made(toml: &str) -> Result<Scene, GpuError> {
     scene(moving(), BYTES, toml).map_err(GpuError::Broken)
 }
 
-/// Frames as bytes.
+/// The frames of a volume as stored bytes.
 fn stored(scene: &Scene, number: u32) -> Vec<Vec<u8>> {
     wall(scene, number).iter().map(|frame| frame.encode(Slot::Frames.format(scene))).collect()
 }
@@ -70,12 +72,12 @@ fn send(renderer: &mut Renderer, frames: &[Vec<u8>], image: u32) -> Result<(), G
     frames.iter().enumerate().try_for_each(|(k, frame)| renderer.frame(k as u32, frame, image))
 }
 
-/// The picture of these frames by a renderer of its own, each step waited for.
+/// The picture of these frames by a new renderer that waits after each step.
 fn waited_for(context: &Arc<Context>, scene: &Scene, frames: &[Vec<u8>]) -> Result<Picture, GpuError> {
     Ok(volume_waited_for(context, scene, frames)?.0)
 }
 
-/// The same with the volume.
+/// The same, with the volume.
 fn volume_waited_for(
     context: &Arc<Context>,
     scene: &Scene,
@@ -91,10 +93,10 @@ fn volume_waited_for(
     Ok((renderer.picture()?, renderer.read(Slot::Volume)?))
 }
 
-/// Volumes one after the other, each sent into the image that `into` says while the one before is drawn. Images that take turns do
-/// not mix; sent into the image that is drawn they would.
-pub fn taking_turns(
-    found: &mut Found,
+/// Sends volumes one after the other, each into the image that `into` returns, while the one before is rendered. With alternating images
+/// they do not mix; sent into the image that is being rendered they would.
+pub fn alternating_images(
+    findings: &mut Findings,
     context: &Arc<Context>,
     queues: usize,
     rounds: usize,
@@ -113,18 +115,23 @@ pub fn taking_turns(
         context.faults.slow_down(slow, 12);
         renderer.show(round as u32 % 2)?;
         renderer.begin_picture()?;
-        // More frames than lanes, which all fill up, while the picture is on its way.
+        // More frames than the upload ring has lanes, while the picture is being rendered.
         send(&mut renderer, &volumes[(round + 1) % 3], into(round))?;
         let what = format!("volume {round}, {queues} queues, '{slow}' slowed down");
-        wrong += usize::from(!same(found, &what, &expected[round % 3], &renderer.end_picture()?));
+        wrong += usize::from(!expect_same_picture(findings, &what, &expected[round % 3], &renderer.end_picture()?));
     }
     context.faults.slow_down("", 1);
     Ok([rounds, wrong])
 }
 
-/// Slices of the one volume image are sent anew while it is drawn: they wait for the picture, and the next shows them.
-fn replaced(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
-    let context = &aside.context;
+/// Slices of the only volume image are replaced while it is rendered: they wait for the picture, and the next picture shows them.
+fn replaced(
+    findings: &mut Findings,
+    isolated: &IsolatedContext,
+    queues: usize,
+    level: Level,
+) -> Result<[usize; 2], GpuError> {
+    let context = &isolated.context;
     let (scene, mut noise) = (made(PLAIN)?, Noise(5));
     let volumes: Vec<_> = (0..3).map(|number| stored(&scene, number)).collect();
     let options = RendererOptions { queues: Some(queues), ..RendererOptions::default() };
@@ -143,19 +150,25 @@ fn replaced(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Le
             renderer.frame(slice as u32, &there[slice], 0)?;
         }
         let what = format!("round {round}, {queues} queues");
-        wrong += usize::from(!same(found, &what, &expected, &renderer.end_picture()?));
+        wrong += usize::from(!expect_same_picture(findings, &what, &expected, &renderer.end_picture()?));
         context.faults.slow_down("", 1);
     }
     renderer.show(0)?;
     let what = format!("after all rounds, {queues} queues");
-    wrong += usize::from(!same(found, &what, &waited_for(context, &scene, &there)?, &renderer.picture()?));
+    wrong +=
+        usize::from(!expect_same_picture(findings, &what, &waited_for(context, &scene, &there)?, &renderer.picture()?));
     Ok([rounds + 1, wrong])
 }
 
-/// Frames of two volumes in any order, whole or line by line, torn and begun again, into two volume images, while pictures are begun
-/// and ended in between.
-fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
-    let (context, mut noise, mut sums) = (&aside.context, Noise(17), [0, 0]);
+/// Frames of two volumes in random order, complete or line by line, abandoned and begun again, into two volume images, while pictures
+/// are begun and ended in between.
+fn any_order(
+    findings: &mut Findings,
+    isolated: &IsolatedContext,
+    queues: usize,
+    level: Level,
+) -> Result<[usize; 2], GpuError> {
+    let (context, mut noise, mut totals) = (&isolated.context, Noise(17), [0, 0]);
     for toml in [PLAIN, SMOOTH] {
         let scene = made(toml)?;
         let line = scene.frame_size()[0] as usize;
@@ -173,13 +186,14 @@ fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: L
                 if noise.next() < 0.5 {
                     renderer.frame(k, frame, image)?;
                 } else {
-                    // A frame that is given up for being begun again, and then all of its lines.
+                    // A frame that is abandoned by beginning it again, and then all of its lines.
                     renderer.lines(k, 0, &frame[..5 * line], image)?;
-                    let mut whole = 0;
+                    let mut completed = 0;
                     for (n, lines) in frame.chunks(7 * line).enumerate() {
-                        whole += u32::from(renderer.lines(k, 7 * n as u32, lines, image)?);
+                        completed += u32::from(renderer.lines(k, 7 * n as u32, lines, image)?);
                     }
-                    found.expect(whole == 1, || format!("slice {k} was whole {whole} times, {queues} queues"));
+                    findings
+                        .expect(completed == 1, || format!("slice {k} was whole {completed} times, {queues} queues"));
                 }
                 if noise.next() < 0.3 {
                     match std::mem::replace(&mut drawing, noise.next() < 0.7) {
@@ -193,30 +207,37 @@ fn any_order(found: &mut Found, aside: &IsolatedContext, queues: usize, level: L
                 let (expected, volume) = volume_waited_for(context, &scene, frames)?;
                 renderer.show(image as u32)?;
                 let what = format!("image {image} of round {round}, {queues} queues, {:?}", scene.settings.mode);
-                let is_same = same(found, &what, &expected, &renderer.picture()?);
+                let is_same = expect_same_picture(findings, &what, &expected, &renderer.picture()?);
                 let there = renderer.read(Slot::Volume)?;
                 if there != volume {
-                    let fault = Some(found.faults.len());
+                    let fault = Some(findings.faults.len());
                     if let (Some(volume), Some(there)) = (&volume, &there) {
                         let plane = volume.size[0] * volume.size[1] * volume.channels;
                         let other = volume.values.iter().zip(&there.values).position(|(e, g)| e != g);
                         let slice = other.map_or(0, |i| i / plane.max(1));
-                        found.pictures.push(Shown { fault, ..shown::shown("volume", volume, there, slice) });
+                        findings
+                            .pictures
+                            .push(PictureComparison { fault, ..texel_comparison("volume", volume, there, slice) });
                     }
-                    found.faults.push(Fault::new(format!("{what}: the volume is another")));
+                    findings.faults.push(Fault::new(format!("{what}: the volume is another")));
                 }
-                sums = [sums[0] + 1, sums[1] + usize::from(!is_same)];
+                totals = [totals[0] + 1, totals[1] + usize::from(!is_same)];
             }
         }
         context.faults.slow_down("", 1);
-        found.expect(renderer.incomplete_frames() > 0, || "no frame was given up".into());
+        findings.expect(renderer.incomplete_frames() > 0, || "no frame was given up".into());
     }
-    Ok(sums)
+    Ok(totals)
 }
 
-/// The scene changes while a picture and frames are on their way: another view, other filters of frames, another size.
-fn changes(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Level) -> Result<[usize; 2], GpuError> {
-    let context = &aside.context;
+/// The scene changes while a picture and frames are in flight: another view, other frame filters, another size.
+fn changes(
+    findings: &mut Findings,
+    isolated: &IsolatedContext,
+    queues: usize,
+    level: Level,
+) -> Result<[usize; 2], GpuError> {
+    let context = &isolated.context;
     let scenes = [
         made(PLAIN)?,
         made(&format!("{PLAIN}\ncamera = {{ azimuth = 40 }}"))?,
@@ -227,7 +248,7 @@ fn changes(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Lev
     let frames: [Vec<Texels>; 2] = [wall(&scenes[0], 0), wall(&scenes[0], 1)];
     let mut expected = Vec::new();
     for scene in &scenes {
-        expected.push([drawn::picture(context, scene, &frames[0])?, drawn::picture(context, scene, &frames[1])?]);
+        expected.push([render::picture(context, scene, &frames[0])?, render::picture(context, scene, &frames[1])?]);
     }
     let options = RendererOptions { volume_images: 2, queues: Some(queues), ..RendererOptions::default() };
     let mut renderer = Renderer::new(context, scenes[0].clone(), &options)?;
@@ -235,18 +256,18 @@ fn changes(found: &mut Found, aside: &IsolatedContext, queues: usize, level: Lev
     for round in 0..rounds {
         let at = if round < scenes.len() { round } else { (noise.next() * scenes.len() as f64) as usize };
         context.faults.slow_down("tone", 8);
-        // Frames and a picture of the scene before are on their way still.
+        // Frames and a picture of the previous scene are still in flight.
         renderer.begin_picture()?;
         renderer.change(scenes[at].clone())?;
         for (image, volume) in frames.iter().enumerate() {
-            drawn::send(&mut renderer, volume, image as u32)?;
+            render::send(&mut renderer, volume, image as u32)?;
         }
         renderer.show(round as u32 % 2)?;
         renderer.begin_picture()?;
         let late = frames[round % 2][3].encode(Slot::Frames.format(&scenes[at]));
         renderer.frame(3, &late, round as u32 % 2)?;
         let what = format!("round {round}, scene {at}, {queues} queues");
-        wrong += usize::from(!same(found, &what, &expected[at][round % 2], &renderer.end_picture()?));
+        wrong += usize::from(!expect_same_picture(findings, &what, &expected[at][round % 2], &renderer.end_picture()?));
     }
     context.faults.slow_down("", 1);
     Ok([rounds, wrong])

@@ -1,30 +1,31 @@
-//! Every pass alone against its f64 reference: on noise and extremes, at awkward sizes, in every variant of the geometry. Each pass gets
-//! its own inputs, so that errors do not add up; outputs are poisoned before, so that what a pass leaves out is seen.
+//! Group "passes": every pass alone against its f64 reference, on noise and extremes, at awkward sizes, in every variant of the geometry.
+//! Each pass gets its own inputs, so that errors do not accumulate; outputs are poisoned first, so that unwritten texels are detected.
 
-use super::compared::Slack;
-use super::inputs::{KINDS, inputs_of, turn_of};
-use super::shown::shown;
-use super::{Bench, Check, Comparison, Found, compare};
+use super::built_in::Noise;
+use super::check::{Check, DeviceUnderTest, Findings};
+use super::compare::{Comparison, ExtraTolerance, compare_outputs, texel_comparison};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::resources::shape_size;
-use crate::passes::slots::Format;
-use crate::passes::{Arrays, Bind, PASSES, Pass, Texels};
+use crate::passes::preprocess::packed_neighbours;
+use crate::passes::slots::{Format, Initializer};
+use crate::passes::{Arrays, Bind, DispatchArgs, MISS, PASSES, Part, Pass, Slot, Texels};
+use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Figure, Level, Unit};
 use std::collections::HashSet;
 
-/// What outputs hold before a pass: no pass computes it by chance, and every format stores it (nearly).
+/// Value of outputs before a pass: no pass computes it by chance, and every format stores it (nearly).
 pub const POISON: f64 = 0.654_321;
 
-/// Largest mean error of a dispatch, with its sign, as a share of what is allowed of each texel. Rounding errs both ways.
-pub const BIAS: f64 = 0.1;
+/// Maximum mean signed error of a dispatch, as a share of the allowed error of a texel. Rounding errors have both signs.
+pub const MAX_BIAS: f64 = 0.1;
 
-/// Faults of one pass that are told one by one.
-const TOLD: usize = 8;
+/// Maximum number of faults of one pass that are listed.
+const MAX_FAULTS: usize = 8;
 
-/// One dispatch beside its reference.
-pub struct Beside {
+/// The inputs and outputs of one dispatch, with those of its reference.
+pub struct DispatchComparison {
     pub inputs: Arrays,
     pub expected: Arrays,
     pub got: Arrays,
@@ -32,78 +33,74 @@ pub struct Beside {
     pub comparison: Comparison,
 }
 
-/// Dispatches one pass alone, on inputs of that kind.
+/// Dispatches one pass alone on inputs of a kind (one of [`KINDS`]), and compares it with its reference.
 ///
 /// # Errors
 /// A device that fails.
-pub fn beside(
-    single: &mut PassRunner,
+pub fn run_with_reference(
+    runner: &mut PassRunner,
     scene: &Scene,
     pass: &'static Pass,
     iteration: u32,
     kind: &str,
     seed: u64,
-) -> Result<Beside, GpuError> {
-    let turn = turn_of(scene, iteration);
-    let inputs = inputs_of(scene, pass, &turn, kind, seed);
-    let writes = (pass.writes)(scene, &turn);
+) -> Result<DispatchComparison, GpuError> {
+    let args = dispatch_args_of(scene, iteration);
+    let inputs = inputs_of(scene, pass, &args, kind, seed);
+    let writes = (pass.writes)(scene, &args);
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
         expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
     }
-    pass.expected(scene, &turn, &inputs, &mut expected);
-    let slack = Slack::of(pass, scene, &turn, single.filter_bits());
-    let got = single.run(scene, pass, &turn, &inputs, POISON)?;
-    let comparison = compare(pass, scene, slack, POISON, &expected, &got, &writes);
-    Ok(Beside { inputs, expected, got, writes, comparison })
+    pass.expected(scene, &args, &inputs, &mut expected);
+    let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
+    let got = runner.run(scene, pass, &args, &inputs, POISON)?;
+    let comparison = compare_outputs(pass, scene, extra, POISON, &expected, &got, &writes);
+    Ok(DispatchComparison { inputs, expected, got, writes, comparison })
 }
 
-/// A check a pass.
+/// One check per pass.
 pub fn checks(_: Level) -> Vec<Check> {
-    PASSES
-        .iter()
-        .enumerate()
-        .map(|(n, pass)| Check::new("passes", pass.name, move |bench| check(bench, n, pass)))
-        .collect()
+    PASSES.iter().enumerate().map(|(n, pass)| Check::new("passes", pass.name, move |dut| check(dut, n, pass))).collect()
 }
 
 type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
-/// What makes a pipeline: its shader, its constants, and the formats of what it reads and writes.
+/// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings.
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
-    let turn = turn_of(scene, 0);
-    let bound = (pass.reads)(scene, &turn).into_iter().chain((pass.writes)(scene, &turn));
-    ((pass.shader)(scene, &turn), (pass.constants)(scene, &turn), bound.map(|b| b.slot.format(scene)).collect())
+    let args = dispatch_args_of(scene, 0);
+    let bound = (pass.reads)(scene, &args).into_iter().chain((pass.writes)(scene, &args));
+    ((pass.shader)(scene, &args), (pass.constants)(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
 }
 
-fn check(bench: &mut Bench, n: usize, pass: &'static Pass) -> Result<Found, GpuError> {
-    let (mut sum, scenes) = (Sum::default(), bench.scenes());
+fn check(dut: &mut DeviceUnderTest, n: usize, pass: &'static Pass) -> Result<Findings, GpuError> {
+    let (mut sum, scenes) = (PassSummary::default(), dut.scenes());
     let mut variants = HashSet::new();
     for s in (0..scenes.len()).filter(|s| pass.is_needed(&scenes[*s].1)) {
-        // Quickly: every pipeline once, and of its other scenes some.
+        // At the quick level: every pipeline once, and some of the other scenes.
         let is_new = variants.insert(variant(&scenes[s].1, pass));
-        if bench.level == Level::Full || is_new || s % 5 == n % 5 {
-            sum.add(bench, n, pass, s, is_new)?;
+        if dut.level == Level::Full || is_new || s % 5 == n % 5 {
+            sum.add(dut, n, pass, s, is_new)?;
         }
     }
-    Ok(sum.found(pass))
+    Ok(sum.into_findings(pass))
 }
 
-/// What one pass does in one of the bench's scenes, by their places in [`PASSES`] and [`Bench::scenes`].
+/// Checks one pass in one scene, by their indices in [`PASSES`] and [`DeviceUnderTest::scenes`].
 ///
 /// # Errors
 /// A device that fails.
-pub fn in_scene(bench: &mut Bench, n: usize, scene: usize) -> Result<Found, GpuError> {
-    let mut sum = Sum::default();
-    sum.add(bench, n, &PASSES[n], scene, true)?;
-    Ok(sum.found(&PASSES[n]))
+pub fn in_scene(dut: &mut DeviceUnderTest, n: usize, scene: usize) -> Result<Findings, GpuError> {
+    let mut sum = PassSummary::default();
+    sum.add(dut, n, &PASSES[n], scene, true)?;
+    Ok(sum.into_findings(&PASSES[n]))
 }
 
-/// What came of many dispatches of a pass.
+/// Results of many dispatches of a pass.
 #[derive(Default)]
-struct Sum {
-    found: Found,
+struct PassSummary {
+    findings: Findings,
     runs: u32,
     failed: usize,
     largest: f64,
@@ -112,35 +109,35 @@ struct Sum {
     bias: f64,
 }
 
-impl Sum {
-    /// `is_new`: no scene before had its pipeline.
+impl PassSummary {
+    /// `is_new`: no earlier scene had this pipeline.
     fn add(
         &mut self,
-        bench: &mut Bench,
+        dut: &mut DeviceUnderTest,
         n: usize,
         pass: &'static Pass,
         s: usize,
         is_new: bool,
     ) -> Result<(), GpuError> {
-        let (scenes, level) = (bench.scenes(), bench.level);
+        let (scenes, level) = (dut.scenes(), dut.level);
         let (name, scene) = &scenes[s];
         for (k, kind) in KINDS.iter().enumerate() {
-            // Noise always, and quickly one of the extremes by turns.
+            // Always noise; at the quick level only one of the extremes, alternating.
             if level == Level::Quick && k > 0 && (!is_new || 1 + s % (KINDS.len() - 1) != k) {
                 continue;
             }
             for iteration in 0..(pass.repeat)(scene) {
-                let result = beside(bench.single()?, scene, pass, iteration, kind, (n * 8 + k) as u64)?;
+                let result = run_with_reference(dut.pass_runner()?, scene, pass, iteration, kind, (n * 8 + k) as u64)?;
                 let of = &result.comparison;
                 (self.largest, self.used) = (self.largest.max(of.largest), self.used.max(of.used));
                 (self.outliers, self.runs) = (self.outliers.max(of.outliers), self.runs + 1);
                 self.bias = self.bias.max(of.bias);
-                let is_biased = of.bias > BIAS;
+                let is_biased = of.bias > MAX_BIAS;
                 if of.worst.is_none() && !is_biased {
                     continue;
                 }
                 self.failed += 1;
-                if self.failed > TOLD {
+                if self.failed > MAX_FAULTS {
                     continue;
                 }
                 let what = match &of.worst {
@@ -149,11 +146,11 @@ impl Sum {
                 };
                 if let Some(worst) = &of.worst {
                     let (e, g) = (result.expected.get(&worst.output), result.got.get(&worst.output));
-                    let mut picture = shown(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
-                    picture.fault = Some(self.found.faults.len());
-                    self.found.pictures.push(picture);
+                    let mut picture = texel_comparison(&format!("{} of '{name}'", worst.output), e, g, worst.at[2]);
+                    picture.fault = Some(self.findings.faults.len());
+                    self.findings.pictures.push(picture);
                 }
-                self.found.faults.push(Fault {
+                self.findings.faults.push(Fault {
                     what,
                     pass: Some(pass.name.into()),
                     input: format!("'{name}', iteration {iteration}, {kind}"),
@@ -165,11 +162,11 @@ impl Sum {
         Ok(())
     }
 
-    fn found(self, pass: &Pass) -> Found {
-        let Sum { mut found, runs, failed, largest, used, outliers, bias } = self;
-        found.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
-        found.expect(failed <= TOLD, || format!("{} more inputs beyond tolerance", failed - TOLD));
-        found.figures.push(Figure {
+    fn into_findings(self, pass: &Pass) -> Findings {
+        let PassSummary { mut findings, runs, failed, largest, used, outliers, bias } = self;
+        findings.expect(runs > 0, || format!("no scene needs '{}'", pass.name));
+        findings.expect(failed <= MAX_FAULTS, || format!("{} more inputs beyond tolerance", failed - MAX_FAULTS));
+        findings.figures.push(Figure {
             what: "largest error".into(),
             value: largest,
             allowed: None,
@@ -177,10 +174,128 @@ impl Sum {
             samples: Vec::new(),
             fleeting: false,
         });
-        found.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
-        found.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));
-        found.figures.push(Figure::error("mean error, share of the tolerance", bias, BIAS, Unit::Share));
-        found.notes.push(format!("{runs} dispatches; tolerance: {}", pass.tolerance.why));
-        found
+        findings.figures.push(Figure::error("share of the tolerance", used, 1.0, Unit::Share));
+        findings.figures.push(Figure::error("texels beyond it", outliers, pass.tolerance.outliers, Unit::Share));
+        findings.figures.push(Figure::error("mean error, share of the tolerance", bias, MAX_BIAS, Unit::Share));
+        findings.notes.push(format!("{runs} dispatches; tolerance: {}", pass.tolerance.why));
+        findings
     }
+}
+
+/// Kinds of inputs: noise, all zero, all one, a single bright texel. Noise of distances is a smooth surface with cliffs and misses, of
+/// volumes blurred, so that it resembles tissue.
+pub const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
+
+fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
+    let format = bind.slot.format(scene);
+    let mut size = shape_size(bind.slot.shape(scene));
+    if bind.part == Part::Layer {
+        size[2] = 1;
+    }
+    let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
+    if let Initializer::ByScene(make) = bind.slot.filled() {
+        texels.values = make(scene).into_iter().map(f64::from).collect();
+        return texels;
+    }
+    let count = texels.values.len();
+    let is_distance = matches!(bind.slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB);
+    let tilt = noise.range(-0.4, 0.4);
+    for i in 0..count {
+        let (x, y) = ((i / format.channels() % size[0]) as f64, (i / format.channels() / size[0]) as f64);
+        texels.values[i] = match (kind, is_distance) {
+            ("noise", true) => match noise.next() {
+                share if share < 0.1 => MISS,
+                share if share < 0.2 => noise.range(10.0, 90.0),
+                _ => 60.0 + tilt * x - 0.2 * y + if x > 9.0 { 8.0 } else { 0.0 } + noise.range(-0.3, 0.3),
+            },
+            ("zero", true) => MISS,
+            ("one", true) => 42.0,
+            ("hot", true) if i == count / 2 => 33.0,
+            ("hot", true) => MISS,
+            ("noise", false) => noise.next(),
+            ("one", false) => 1.0,
+            ("hot", false) if i == count / 2 => 1.0,
+            _ => 0.0,
+        };
+    }
+    if bind.slot == Slot::Picture || bind.slot == Slot::SmoothPicture {
+        // The passes write alpha as 0 or 1.
+        texels.values.chunks_exact_mut(4).for_each(|p| p[3] = p[3].round());
+    }
+    if bind.slot == Slot::Surface {
+        texels.values.chunks_exact_mut(2).for_each(|p| p[1] = p[1].round());
+    }
+    if bind.slot == Slot::Volume && kind == "noise" {
+        texels = blurred(&texels);
+    }
+    // Both the device and the reference get values that the format can store.
+    Texels::decode(size, format, &texels.encode(format))
+}
+
+fn blurred(noise: &Texels) -> Texels {
+    Texels::from_fn(noise.size, 1, |[x, y, z], _| {
+        let mut sum = 0.0;
+        for (dx, dy, dz) in (0..125).map(|i| (i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2)) {
+            sum += noise.clamped(x as i64 + dx, y as i64 + dy, z as i64 + dz);
+        }
+        (0.5 + 4.0 * (sum / 125.0 - 0.5)).clamp(0.0, 1.0)
+    })
+}
+
+/// The empty-space slots of a volume, computed by the references of their passes.
+fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
+    let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
+    let made = |name: &str| ["tile_ranges", "brick_ranges", "classify", "leap"].iter().any(|p| name.starts_with(p));
+    for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
+        let args = DispatchArgs { slices: scene.slices(), ..step.args() };
+        let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
+        for bind in (step.pass.reads)(scene, &args) {
+            let there = slots.get(&bind.slot).cloned();
+            inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
+        }
+        for bind in (step.pass.writes)(scene, &args) {
+            let channels = bind.slot.format(scene).channels();
+            outputs.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
+        }
+        (step.pass.reference)(scene, &args, &inputs, &mut outputs);
+        for bind in (step.pass.writes)(scene, &args) {
+            slots.insert(bind.slot, outputs.get(bind.name).clone());
+        }
+        if slots.contains_key(&slot) {
+            break;
+        }
+    }
+    // A plan with a pass that reads this slot has the passes that write it.
+    slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
+}
+
+/// Dispatch arguments that are not the first of anything.
+pub fn dispatch_args_of(scene: &Scene, iteration: u32) -> DispatchArgs {
+    DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 }
+}
+
+/// Inputs of a pass, of one of [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
+pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
+    let mut noise = Noise(seed);
+    let mut inputs = Arrays::default();
+    let reads = (pass.reads)(scene, args);
+    for (n, bind) in reads.iter().enumerate() {
+        // An image bound under two names has the same contents.
+        let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
+        inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
+    }
+    if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
+        // Empty space must be consistent with the volume.
+        let leaps = empty_space_of(scene, bricks.slot, inputs.get("volume"));
+        inputs.insert("bricks", leaps);
+    }
+    if reads.iter().any(|b| b.slot == Slot::Quads) {
+        let mut quads = Arrays::default();
+        let channels = Slot::Quads.format(scene).channels();
+        quads.insert("quads", Texels::untouched(shape_size(Slot::Quads.shape(scene)), channels));
+        let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
+        (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
+        inputs.insert("quads", quads.get("quads").clone());
+    }
+    inputs
 }

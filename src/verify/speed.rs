@@ -1,15 +1,16 @@
-//! How long each pass takes alone, by the device's own clock. Nothing here fails by itself: a baseline says what it took before.
+//! Group "speed": the time of each pass alone, by the clock of the device. These checks never fail by themselves; a baseline has the
+//! earlier times.
 
 use super::built_in::{ALL_FILTERS, BYTES, cartesian, scene, wobbler};
-use super::{Bench, Check, Found};
+use super::check::{Check, DeviceUnderTest, Findings};
 use crate::gpu::{Context, ContextOptions, GpuError, pass_runner};
 use crate::passes::{PASSES, Pass};
 use crate::probe::{Axis, Geometry, Probe};
 use crate::scene::{Sampling, Scene};
 use crate::verify::report::{Figure, Level};
 
-/// Scenes of pictures as large as a small display's tile, that among them need every pass: the first that needs a pass is what it is
-/// timed in.
+/// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
+/// needs it.
 const SCENES: [&str; 12] = [
     "mode = 'sr'",
     "mode = 'vr'",
@@ -33,7 +34,7 @@ fn probe() -> Probe {
 
 fn scenes() -> Result<Vec<Scene>, String> {
     let sweeps = SCENES.iter().map(|toml| (Geometry::Sweep(probe()), *toml));
-    // A volume that is loaded as it is needs a pass of its own.
+    // A Cartesian volume needs a pass of its own.
     let all = sweeps.chain([(cartesian([96, 96, 33]), "mode = 'mip'")]);
     let one = |(geometry, toml)| {
         let mut scene = scene(geometry, BYTES, toml)?;
@@ -44,7 +45,7 @@ fn scenes() -> Result<Vec<Scene>, String> {
     all.map(one).collect()
 }
 
-/// The scene that a pass is timed in.
+/// The scene in which a pass is timed.
 fn scene_of<'a>(scenes: &'a [Scene], pass: &Pass) -> Option<&'a Scene> {
     scenes.iter().find(|scene| {
         let quads = pass.name != "quads" || scene.settings.ray.sampling == Sampling::Quads;
@@ -53,28 +54,28 @@ fn scene_of<'a>(scenes: &'a [Scene], pass: &Pass) -> Option<&'a Scene> {
 }
 
 pub fn checks(_: Level) -> Vec<Check> {
-    let check = |pass: &'static Pass| Check::new("speed", pass.name, move |bench| time(bench, pass));
+    let check = |pass: &'static Pass| Check::new("speed", pass.name, move |dut| time(dut, pass));
     PASSES.iter().map(check).collect()
 }
 
-fn time(bench: &mut Bench, pass: &'static Pass) -> Result<Found, GpuError> {
-    // What a comparison of so many passes needs at least.
-    let repeats = if bench.level == Level::Full { 30 } else { 8 };
+fn time(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuError> {
+    // The minimum for a comparison of this many passes.
+    let repeats = if dut.level == Level::Full { 30 } else { 8 };
     let scenes = scenes().map_err(GpuError::Broken)?;
     let Some(scene) = scene_of(&scenes, pass) else {
-        return Ok(Found::left_out("no scene that is timed needs it"));
+        return Ok(Findings::left_out("no scene that is timed needs it"));
     };
-    // Validation looks at every command and at every submission: times are taken without it.
-    let own = bench.watched().then(|| Context::new(&ContextOptions { validation: false, ..bench.options().clone() }));
-    let context = own.transpose()?.unwrap_or_else(|| bench.context.clone());
+    // Validation slows down commands and submissions, so times are measured without it.
+    let own = dut.watched().then(|| Context::new(&ContextOptions { validation: false, ..dut.options().clone() }));
+    let context = own.transpose()?.unwrap_or_else(|| dut.context.clone());
     let samples = pass_runner::time_pass(&context, scene, pass, repeats)?;
-    let mut found = Found::default();
+    let mut findings = Findings::default();
     if samples.is_empty() {
-        return Ok(Found::left_out("the device has no time stamps"));
+        return Ok(Findings::left_out("the device has no time stamps"));
     }
     let figure = Figure::times("time on the device", samples);
-    found.figures.push(figure.map_err(|e| GpuError::Broken(format!("times of '{}': {e}", pass.name)))?);
-    Ok(found)
+    findings.figures.push(figure.map_err(|e| GpuError::Broken(format!("times of '{}': {e}", pass.name)))?);
+    Ok(findings)
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! Minutes of everything at once on one device: scenes, sizes and modes change, frames arrive, renderers are made and dropped. Pictures
-//! are held against a fresh renderer's now and then, and at the end nothing is left.
+//! Group "stress": random work on one device for a while. Scenes, sizes and modes change, frames arrive, renderers are created and dropped.
+//! Some pictures are compared with those of a new renderer, and at the end no memory may leak.
 
 use super::built_in::{self, Noise};
-use super::failing::{count, returned};
-use super::isolated_context::IsolatedContext;
-use super::repeats::{counted, same};
-use super::{Bench, Check, Found, drawn};
+use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
+use super::compare::{add_picture_counts, count_figure, expect_same_picture};
+use super::failures::expect_memory_returned;
+use super::render;
 use crate::files::signals;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TexelAccess};
 use crate::passes::{Slot, Texels};
@@ -18,35 +18,35 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// s of a quick run, and of a full one unless another time is asked for.
+/// Duration of a quick and a full run, s.
 const SECONDS: [f64; 2] = [3.0, 180.0];
 
-/// Most renderers at once.
-const MOST: usize = 3;
+/// Maximum number of renderers at the same time.
+const MAX_RENDERERS: usize = 3;
 
-/// Pictures that are compared at least, however short the time is.
-const COMPARED: usize = 4;
+/// Minimum number of pictures compared.
+const MIN_COMPARED: usize = 4;
 
-/// Volumes that are sent.
+/// Number of different volumes.
 const VOLUMES: u32 = 4;
 
 pub fn checks(level: Level) -> Vec<Check> {
     vec![check(SECONDS[usize::from(level == Level::Full)])]
 }
 
-/// A stress of so many seconds.
+/// A stress test of this duration, s.
 pub fn check(seconds: f64) -> Check {
-    Check::new("stress", "everything at once", move |bench: &mut Bench| stress(bench, seconds, &|_, _| Ok(())))
+    Check::new("stress", "everything at once", move |dut: &mut DeviceUnderTest| stress(dut, seconds, &|_, _| Ok(())))
 }
 
-/// Done to a renderer and its volume image before each picture.
-pub type Spoil = dyn Fn(&mut Renderer, u32) -> Result<(), GpuError>;
+/// A hook called with the renderer and the volume image before each picture; tests use it to cause errors.
+pub type BeforePicture = dyn Fn(&mut Renderer, u32) -> Result<(), GpuError>;
 
-/// Every mode in several sizes, with all filters and with few; all take the same frames.
+/// Every mode in several sizes, with all filters and with few. All take the same frames.
 fn scenes() -> Result<Vec<Scene>, String> {
     let mut scenes = Vec::new();
-    for (n, asked) in built_in::modes().iter().enumerate() {
-        let scene = asked.make()?;
+    for (n, spec) in built_in::modes().iter().enumerate() {
+        let scene = spec.build()?;
         for (m, size) in [[37, 29], [8, 61], [96, 80]].into_iter().enumerate() {
             let mut settings = scene.settings.clone();
             settings.picture.size = size;
@@ -62,68 +62,70 @@ fn scenes() -> Result<Vec<Scene>, String> {
     Ok(scenes)
 }
 
-/// A renderer, and what it should show.
-struct Lived {
+/// A renderer with its expected state.
+struct RunningRenderer {
     renderer: Renderer,
     scene: usize,
-    /// The volume that each image holds.
+    /// The volume in each image; None if incomplete.
     holds: Vec<Option<u32>>,
-    been: BTreeSet<usize>,
+    compiled: BTreeSet<usize>,
 }
 
-/// All that is sent and drawn, and what was counted of it.
+/// State of the stress test.
 struct Stress<'a> {
     context: &'a Arc<Context>,
-    spoil: &'a Spoil,
+    before_picture: &'a BeforePicture,
     scenes: Vec<Scene>,
     volumes: Vec<Vec<Texels>>,
     noise: Noise,
-    lived: Vec<Lived>,
+    running: Vec<RunningRenderer>,
     made: usize,
     pictures: usize,
     compared: usize,
     wrong: usize,
-    /// Pipelines that may have been made.
+    /// Upper bound of the pipelines created.
     pipelines: usize,
 }
 
+/// Runs the stress test for `seconds`.
+///
 /// # Errors
-/// A device that fails.
-pub fn stress(bench: &mut Bench, seconds: f64, spoil: &Spoil) -> Result<Found, GpuError> {
-    let (mut found, aside) = (Found::default(), IsolatedContext::of_changes(bench)?);
-    let context = &aside.context;
+/// The device fails.
+pub fn stress(dut: &mut DeviceUnderTest, seconds: f64, before_picture: &BeforePicture) -> Result<Findings, GpuError> {
+    let (mut findings, isolated) = (Findings::default(), IsolatedContext::of_changes(dut)?);
+    let context = &isolated.context;
     let (held, pipelines) = (context.allocated(), || context.counts.pipelines.load(Ordering::Relaxed));
     let (before, begun) = (pipelines(), Instant::now());
     let scenes = scenes().map_err(GpuError::Broken)?;
     let volumes = scenes.first().map(|scene| (0..VOLUMES).map(|n| built_in::wall(scene, n)).collect());
     let mut stress = Stress {
         context,
-        spoil,
+        before_picture,
         scenes,
         volumes: volumes.unwrap_or_default(),
         noise: Noise(41),
-        lived: Vec::new(),
+        running: Vec::new(),
         made: 0,
         pictures: 0,
         compared: 0,
         wrong: 0,
         pipelines: 0,
     };
-    let goes_on = |stress: &Stress| begun.elapsed().as_secs_f64() < seconds || stress.compared < COMPARED;
-    // Minutes are too long for whoever waits for its end.
-    while goes_on(&stress) && found.faults.len() < 8 && signals::received().is_none() {
-        stress.step(&mut found)?;
+    let goes_on = |stress: &Stress| begun.elapsed().as_secs_f64() < seconds || stress.compared < MIN_COMPARED;
+    // A signal ends it early.
+    while goes_on(&stress) && findings.faults.len() < 8 && signals::received().is_none() {
+        stress.step(&mut findings)?;
     }
-    found.left_out = signals::received().map(|signal| format!("not to its end: {signal}"));
+    findings.left_out = signals::received().map(|signal| format!("not to its end: {signal}"));
     let (made, most) = ((pipelines() - before) as usize, stress.pipelines);
-    found.expect(made <= most, || format!("{made} pipelines were made, {most} different ones were needed"));
+    findings.expect(made <= most, || format!("{made} pipelines were made, {most} different ones were needed"));
     let done = [("pictures", stress.pictures), ("renderers", stress.made), ("pipelines", made)];
-    found.figures.extend(done.map(|(what, n)| Figure { fleeting: true, ..count(what, n) }));
-    counted(&mut found, stress.compared, stress.wrong);
+    findings.figures.extend(done.map(|(what, n)| Figure { fleeting: true, ..count_figure(what, n) }));
+    add_picture_counts(&mut findings, stress.compared, stress.wrong);
     drop(stress);
-    returned(&mut found, context, held, "all renderers are gone");
-    aside.tell(&mut found);
-    Ok(found)
+    expect_memory_returned(&mut findings, context, held, "all renderers are gone");
+    isolated.report_validation(&mut findings);
+    Ok(findings)
 }
 
 impl Stress<'_> {
@@ -131,109 +133,109 @@ impl Stress<'_> {
         ((self.noise.next() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
-    fn step(&mut self, found: &mut Found) -> Result<(), GpuError> {
-        if self.lived.is_empty() || self.noise.next() < 0.06 {
+    fn step(&mut self, findings: &mut Findings) -> Result<(), GpuError> {
+        if self.running.is_empty() || self.noise.next() < 0.06 {
             self.renew()?;
         }
-        let at = self.pick(self.lived.len());
+        let at = self.pick(self.running.len());
         match self.pick(8) {
             0 | 1 => self.change(at),
             2 => self.send_some(at),
-            _ => self.draw(at, found),
+            _ => self.draw(at, findings),
         }
     }
 
-    /// Another renderer, instead of one of the old where there are enough.
+    /// Creates a renderer; replaces one if there are enough.
     fn renew(&mut self) -> Result<(), GpuError> {
-        if self.lived.len() >= MOST {
-            let gone = self.pick(MOST);
-            self.lived.swap_remove(gone);
+        if self.running.len() >= MAX_RENDERERS {
+            let gone = self.pick(MAX_RENDERERS);
+            self.running.swap_remove(gone);
         }
         let (images, scene) = (1 + self.pick(3), self.pick(self.scenes.len()));
         let fetch = [None, Some(TexelAccess::Textures), Some(TexelAccess::Storage)][self.pick(3)];
         let options =
             RendererOptions { volume_images: images as u32, texel_access: fetch, ..RendererOptions::default() };
         let renderer = Renderer::new(self.context, self.scenes[scene].clone(), &options)?;
-        let lived = Lived { renderer, scene, holds: vec![None; images], been: BTreeSet::new() };
+        let running = RunningRenderer { renderer, scene, holds: vec![None; images], compiled: BTreeSet::new() };
         self.made += 1;
-        self.lived.push(lived);
-        self.counts(self.lived.len() - 1);
+        self.running.push(running);
+        self.counts(self.running.len() - 1);
         Ok(())
     }
 
-    /// What its scene may make it compile, once.
+    /// Counts the pipelines that its scene may compile, once per scene.
     fn counts(&mut self, at: usize) {
-        let scene = self.lived[at].scene;
-        if self.lived[at].been.insert(scene) {
-            self.pipelines += Plan::new(self.lived[at].renderer.scene()).steps.len();
+        let scene = self.running[at].scene;
+        if self.running[at].compiled.insert(scene) {
+            self.pipelines += Plan::new(self.running[at].renderer.scene()).steps.len();
         }
     }
 
     fn change(&mut self, at: usize) -> Result<(), GpuError> {
         let scene = self.pick(self.scenes.len());
-        let lived = &mut self.lived[at];
-        let rerun = lived.renderer.change(self.scenes[scene].clone())?;
+        let running = &mut self.running[at];
+        let rerun = running.renderer.change(self.scenes[scene].clone())?;
         if !matches!(rerun, Rerun::Steps { .. }) {
-            lived.holds.fill(None);
+            running.holds.fill(None);
         }
-        lived.scene = scene;
+        running.scene = scene;
         self.counts(at);
         Ok(())
     }
 
-    /// A part of a volume, of which nothing is shown before the rest has come.
+    /// Sends a part of a volume; its image is not shown until it is complete.
     fn send_some(&mut self, at: usize) -> Result<(), GpuError> {
-        let (volume, image) = (self.pick(self.volumes.len()), self.pick(self.lived[at].holds.len()));
-        let (lived, frames) = (&mut self.lived[at], &self.volumes[volume]);
-        let format = Slot::Frames.format(lived.renderer.scene());
-        lived.holds[image] = None;
+        let (volume, image) = (self.pick(self.volumes.len()), self.pick(self.running[at].holds.len()));
+        let (running, frames) = (&mut self.running[at], &self.volumes[volume]);
+        let format = Slot::Frames.format(running.renderer.scene());
+        running.holds[image] = None;
         for (k, frame) in frames.iter().enumerate().skip(volume) {
-            lived.renderer.frame(k as u32, &frame.encode(format), image as u32)?;
+            running.renderer.frame(k as u32, &frame.encode(format), image as u32)?;
         }
         Ok(())
     }
 
     fn send(&mut self, at: usize, image: usize) -> Result<u32, GpuError> {
         let volume = self.pick(self.volumes.len());
-        let (lived, frames) = (&mut self.lived[at], &self.volumes[volume]);
-        let format = Slot::Frames.format(lived.renderer.scene());
+        let (running, frames) = (&mut self.running[at], &self.volumes[volume]);
+        let format = Slot::Frames.format(running.renderer.scene());
         for (k, frame) in frames.iter().enumerate() {
-            lived.renderer.frame(k as u32, &frame.encode(format), image as u32)?;
+            running.renderer.frame(k as u32, &frame.encode(format), image as u32)?;
         }
-        lived.holds[image] = Some(volume as u32);
+        running.holds[image] = Some(volume as u32);
         Ok(volume as u32)
     }
 
-    fn draw(&mut self, at: usize, found: &mut Found) -> Result<(), GpuError> {
-        let images = self.lived[at].holds.len();
+    fn draw(&mut self, at: usize, findings: &mut Findings) -> Result<(), GpuError> {
+        let images = self.running[at].holds.len();
         let image = self.pick(images);
-        let volume = match self.lived[at].holds[image] {
+        let volume = match self.running[at].holds[image] {
             Some(volume) => volume,
             None => self.send(at, image)?,
         };
-        (self.spoil)(&mut self.lived[at].renderer, image as u32)?;
-        self.lived[at].renderer.show(image as u32)?;
-        self.lived[at].renderer.begin_picture()?;
-        // The next volume, beside the picture.
+        (self.before_picture)(&mut self.running[at].renderer, image as u32)?;
+        self.running[at].renderer.show(image as u32)?;
+        self.running[at].renderer.begin_picture()?;
+        // Send the next volume while the picture is rendered.
         if images > 1 && self.noise.next() < 0.5 {
             self.send(at, (image + 1) % images)?;
         }
-        let picture = self.lived[at].renderer.end_picture()?;
+        let picture = self.running[at].renderer.end_picture()?;
         self.pictures += 1;
         if self.pictures.is_multiple_of(4) {
-            self.compare(found, at, volume, &picture)?;
+            self.compare(findings, at, volume, &picture)?;
         }
         Ok(())
     }
 
-    fn compare(&mut self, found: &mut Found, at: usize, volume: u32, picture: &Picture) -> Result<(), GpuError> {
-        let scene = &self.scenes[self.lived[at].scene];
-        let fresh = drawn::picture(self.context, scene, &self.volumes[volume as usize])?;
+    fn compare(&mut self, findings: &mut Findings, at: usize, volume: u32, picture: &Picture) -> Result<(), GpuError> {
+        let scene = &self.scenes[self.running[at].scene];
+        let fresh = render::picture(self.context, scene, &self.volumes[volume as usize])?;
         self.made += 1;
         self.pipelines += Plan::new(scene).steps.len();
         self.compared += 1;
         let what = format!("picture {}, mode {:?}", self.pictures, scene.settings.mode);
-        self.wrong += usize::from(!same(found, &what, &fresh, picture));
+        self.wrong += usize::from(!expect_same_picture(findings, &what, &fresh, picture));
         Ok(())
     }
 }

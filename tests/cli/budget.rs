@@ -1,9 +1,9 @@
-//! Settings chosen by what a report measured.
+//! Settings chosen from the measurements of a report.
 
 use crate::common::program::*;
 use std::fs;
 
-/// An error report of the bone's volume with one dial: as it is 20 ms, with longer steps 8 ms.
+/// An error report of the bone with one dial: 20 ms by default, 8 ms with longer steps.
 pub fn error_report(volume: &str) -> String {
     let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
         let time = ms * 1e6;
@@ -22,7 +22,7 @@ pub fn error_report(volume: &str) -> String {
 }
 
 #[test]
-fn a_budget_of_time_takes_what_a_report_measured_and_no_setting_of_the_users() {
+fn a_time_budget_uses_the_report_and_overrides_no_setting_of_the_user() {
     let folder = Folder::new("budget");
     let report = folder.write("error.json", error_report("[160, 216, 33]"));
     let picture = |name: &str, more: &[&str]| {

@@ -1,4 +1,4 @@
-//! A monitor that is not there. Only names that no monitor has: a machine that has one would show things on it.
+//! A missing monitor. Only names that no monitor has: a machine with a monitor would show something on it.
 
 use crate::common::program::*;
 use std::process::Command;
@@ -6,11 +6,11 @@ use std::process::Command;
 const DIRECT: [&str; 5] = ["view", "--source", "phantom", "--direct", "--monitor"];
 
 #[test]
-fn without_such_a_monitor_one_line_says_so() {
+fn a_missing_monitor_is_reported_in_one_line() {
     let nowhere = [&DIRECT[..], &["no such monitor", "--size", "640x480", "--refresh", "60"]].concat();
     let ran = run(&nowhere);
     refuses(&nowhere, &ran, 1, &[]);
-    // A driver may know monitors and have none, or know none.
+    // A driver may support monitors and have none, or not support them.
     let why = ["no monitor is connected", "no monitor is called", "VK_KHR_display", "VK_KHR_surface"];
     assert!(why.iter().any(|why| ran.2.contains(why)), "{ran:?}");
     let blind = finish(without_device(Command::new(PROGRAM).args(&nowhere)));
@@ -18,7 +18,7 @@ fn without_such_a_monitor_one_line_says_so() {
 }
 
 #[test]
-fn what_only_a_monitor_has_is_not_taken_elsewhere() {
+fn options_of_a_monitor_are_refused_elsewhere() {
     for (arguments, named) in [
         (&["--refresh", "60"][..], "--direct"),
         (&["--direct", "--full-screen"], "--full-screen"),

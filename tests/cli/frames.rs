@@ -1,16 +1,16 @@
-//! Files of frames: what is in them, and the way back.
+//! Files of frames: their contents, and the conversion back.
 
 use crate::common::program::*;
 use std::fs;
 
-/// Samples behind a MetaImage's header.
+/// The samples after the header of a MetaImage.
 fn samples(path: &str) -> Vec<u8> {
     let bytes = fs::read(path).expect("read a MetaImage");
     let end = bytes.windows(6).position(|w| w == b"LOCAL\n").expect("the header ends") + 6;
     bytes[end..].to_vec()
 }
 
-/// Facts that both say, but for those of the file's kind.
+/// Facts that both files state, without those of the file format.
 fn geometry(path: &str) -> Vec<String> {
     let same = ["array", "scan lines", "depth", "motion", "slices", "speed of sound", "frame ", "value range"];
     done(&["info", path]).lines().filter(|l| same.iter().any(|s| l.starts_with(s))).map(str::to_string).collect()
@@ -38,12 +38,12 @@ fn a_sweep_goes_into_frames_and_back_without_a_change() {
     }
     let rate = said.lines().find(|l| l.starts_with("arrival")).expect("a line of arrivals");
     assert!(rate.contains("frames a second, at most"), "{rate}");
-    // A volume of either is the same.
+    // A volume is the same in both.
     for (from, to) in [(&head, &a), (&frames, &b)] {
         done(&["convert", from, to, "--spacing", "3", "--volume", "1"]);
     }
     assert!(fs::read(&a).expect("a volume") == fs::read(&b).expect("a volume"));
-    // And so are all frames.
+    // So are all frames.
     let said = done(&["convert", &frames, &back, "--sequence"]);
     assert!(said.ends_with("back.mha, 111 frames of 3 volumes\n"), "{said}");
     assert!(samples(&head) == samples(&back));
@@ -58,7 +58,7 @@ fn a_sweep_goes_into_frames_and_back_without_a_change() {
 }
 
 #[test]
-fn what_is_damaged_or_missing_is_said_and_makes_no_sequence() {
+fn damaged_and_missing_frames_are_reported_and_make_no_sequence() {
     let folder = Folder::new("damaged");
     let [head, frames, back, volume] = ["head.mha", "head.frames", "back.mha", "v.mha"].map(|n| folder.path(n));
     done(&["phantom", "-o", &head, "--volumes", "3", "--both-ways", "--no-speckle", "--speed-ratio", "0"]);
@@ -82,7 +82,7 @@ fn what_is_damaged_or_missing_is_said_and_makes_no_sequence() {
 }
 
 #[test]
-fn no_sequence_is_made_of_what_is_none() {
+fn no_sequence_is_made_of_other_files() {
     let folder = Folder::new("sequence");
     let [out, nrrd, frames] = ["out.mha", "out.nrrd", "out.frames"].map(|n| folder.path(n));
     for (arguments, named) in [

@@ -1,4 +1,4 @@
-//! Inputs without an end, or longer than any can be: each is refused in one line, soon, and without taking the machine with it.
+//! Endless inputs, or inputs beyond any limit: each is refused in one line, soon, and without exhausting the machine.
 #![cfg(target_os = "linux")]
 
 use crate::common::program::*;
@@ -6,7 +6,7 @@ use std::fs::{self, File};
 use std::io::{Seek, SeekFrom, Write};
 use std::process::Command;
 
-/// As long as a file may be here: holes take no room.
+/// A length that files may have here: holes take no space.
 const HUGE: u64 = 1 << 40;
 /// KiB of address space that a refusal may need.
 const ROOM: &str = "3000000";
@@ -17,7 +17,7 @@ fn bounded(arguments: &[&str]) -> Ran {
     finish(command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY"))
 }
 
-/// A file that begins so and goes on with zeros.
+/// A file that begins with these bytes and continues with zeros.
 fn huge(folder: &Folder, name: &str, start: &[u8]) -> String {
     let path = folder.write(name, start);
     File::options().write(true).open(&path).expect("opened").set_len(HUGE).expect("a file with a hole");
@@ -25,12 +25,12 @@ fn huge(folder: &Folder, name: &str, start: &[u8]) -> String {
 }
 
 #[test]
-fn nothing_that_is_read_may_be_endless() {
+fn no_input_may_be_endless() {
     let folder = Folder::new("endless");
     let (out, volume) = (folder.path("out.png"), folder.path("out.mha"));
     let fifo = folder.path("fifo.toml");
     assert!(Command::new("mkfifo").arg(&fifo).status().expect("run mkfifo").success());
-    // Where @ stands the input goes; what a file of its kind begins with; and whether what it lacks is told at once.
+    // The arguments (@ is the input); how a file of the kind begins; whether a missing part is reported at once.
     let rows: &[(&[&str], &[u8])] = &[
         (&["info", "@"], b"ObjectType = Image\n"),
         (&["info", "@"], b"KRETZFILE 1.0   "),
@@ -57,7 +57,7 @@ fn nothing_that_is_read_may_be_endless() {
     for (row, start) in rows {
         let long = huge(&folder, "long.toml", start);
         for file in [&long, &fifo, &here, "/dev/zero"] {
-            // A transfer function is a file by its ending.
+            // A transfer function is read as a file if its name has the ending.
             if row.contains(&"--transfer") && !file.ends_with(".toml") {
                 continue;
             }
@@ -78,7 +78,7 @@ fn standard_input_without_an_end_or_a_line_is_refused() {
     assert!(output.status.code() == Some(1) && said.contains("header: is longer than"), "{said}");
 }
 
-/// A file with a hole has room for any index, and for frames that are not there.
+/// A file with a hole has space for any index, and for missing frames.
 #[test]
 fn a_recording_that_goes_on_in_a_hole_is_read_as_far_as_it_goes() {
     let folder = Folder::new("hole");
@@ -89,7 +89,7 @@ fn a_recording_that_goes_on_in_a_hole_is_read_as_far_as_it_goes() {
     let mut file = File::options().write(true).open(&tape).expect("opened");
     file.set_len(u64::from_le_bytes(index.try_into().expect("eight bytes"))).expect("without its index");
     file.set_len(HUGE).expect("a hole");
-    // An end that says that all of the hole is an index.
+    // A trailer that declares all of the hole to be an index.
     file.seek(SeekFrom::End(-16)).expect("its end");
     file.write_all(&[&[0; 4][..], index, b"XEND"].concat()).expect("written");
     drop(file);

@@ -1,10 +1,11 @@
-//! The program as a user meets it: what it answers to right and wrong commands, and what it leaves behind.
+//! The program as a user sees it: its answers to correct and wrong commands, and the files that it leaves.
 
 mod budget;
 #[path = "../common/mod.rs"]
 mod common;
 #[cfg(feature = "view")]
 mod direct;
+mod docs;
 mod filter;
 mod frames;
 mod inputs;
@@ -45,7 +46,7 @@ fn a_wrong_command_line_is_not_left_without_its_usage_nor_a_command_without_help
 }
 
 #[test]
-fn no_wrong_recording_is_met_with_a_panic_or_a_picture() {
+fn wrong_recordings_cause_neither_a_panic_nor_a_picture() {
     let folder = Folder::new("recordings");
     let sweep = fs::read(SWEEP).expect("read the sweep");
     let split = sweep.windows(6).position(|w| w == b"LOCAL\n").expect("the header ends") + 6;
@@ -144,7 +145,7 @@ fn without_a_device_the_plan_is_still_explained_and_the_rest_says_what_is_missin
         refuses(arguments, &blind(arguments), 1, &["no Vulkan device", "install"]);
     }
     let (code, plan, err) = blind(&["render", BONE, "--size", "16384x16384", "--explain"]);
-    let lines = ["- scan_convert        the volume is Cartesian already", "16384 x 16384 x 1", "in all"];
+    let lines = ["- scan_convert        the volume is Cartesian already", "16384 x 16384 x 1", "total"];
     assert!(code == Some(0) && err.is_empty() && lines.iter().all(|l| plan.contains(l)), "{plan}{err}");
     assert!(folder.names().is_empty());
 }
@@ -170,7 +171,7 @@ fn info_does_not_hide_the_facts_and_devices_not_the_software() {
 }
 
 #[test]
-fn presets_do_not_break_the_rules_of_vulkan_nor_differ_between_formats() {
+fn presets_pass_validation_and_do_not_differ_between_formats() {
     let folder = Folder::new("presets");
     let [_, mha, vol] =
         [(BONE, "bone", "a"), (SWEEP, "fetal", "b"), (KRETZ, "fetal", "c")].map(|(file, preset, name)| {
@@ -201,7 +202,7 @@ fn no_slot_is_missing_from_the_dump_and_no_pass_from_the_times() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said_and_nothing_is_destroyed() {
+fn unwritable_outputs_are_reported_and_nothing_is_destroyed() {
     let folder = Folder::new("outputs");
     let (file, copy) = (folder.write("file", "mine"), folder.path("copy.mha"));
     fs::copy(BONE, &copy).expect("copy the recording");
@@ -285,7 +286,7 @@ fn no_file_is_needed_to_see_a_face_and_a_phantom_is_a_recording_like_any_other()
 #[test]
 fn the_program_needs_no_source_tree_no_path_and_no_place() {
     let folder = Folder::new("moved");
-    // By another process: a file that this one has open for writing could not be started.
+    // Copied by another process: a file that this one has open for writing could not be executed.
     assert!(Command::new("cp").args([PROGRAM, &folder.path("moved")]).status().expect("run cp").success());
     let mut command = Command::new(folder.path("moved"));
     command.args(["render", BONE, "-o", "p.png", "--size", "64x48"]).env("PATH", "").current_dir(&folder.0);

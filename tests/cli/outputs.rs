@@ -1,5 +1,5 @@
-//! Every option that writes a file: where nothing can be written, on a full disk, over what is read. One line, the old file as it was,
-//! and nothing left beside it.
+//! Every option that writes a file: to places that cannot be written, on a full disk, over an input. One line, an unchanged old file,
+//! and no other file left.
 #![cfg(unix)]
 
 use crate::common::program::*;
@@ -8,12 +8,12 @@ use std::process::Command;
 
 const SMALL: [&str; 4] = ["--size", "8x8", "--mode", "mip"];
 
-/// What a command writes to.
+/// The kind of an output.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    /// A file that takes the place of an old one.
+    /// A file that replaces an old one.
     File,
-    /// A file that must not be there.
+    /// A file that must not exist.
     New,
     Folder,
 }
@@ -25,7 +25,7 @@ struct Row {
     /// The ending of its name.
     ending: &'static str,
     kind: Kind,
-    /// Too slow, or of no use, on a full disk.
+    /// Too slow, or useless, on a full disk.
     early: bool,
 }
 
@@ -89,14 +89,14 @@ fn filled<'a>(row: &'a Row, output: &'a str) -> Vec<&'a str> {
 }
 
 #[test]
-fn where_nothing_can_be_written_one_line_says_so_before_any_work() {
+fn outputs_that_cannot_be_written_are_refused_before_any_work() {
     let folder = Folder::new("readonly");
     let rows = rows(&folder);
     let file = folder.write("file", "mine");
     let before = folder.names();
     for row in &rows {
         let name = format!("echolume.{}", row.ending);
-        // A file is no folder, and the kernel's takes no files.
+        // A file is no folder, and /proc takes no files.
         for output in [format!("{file}/{name}"), format!("/proc/{name}")] {
             let all = filled(row, &output);
             let ran = run(&all);
@@ -120,7 +120,7 @@ fn a_full_disk_costs_no_old_file_and_leaves_nothing() {
             Dir => place.path("out"),
         };
         let all = filled(row, &output);
-        // No file may grow: what a full disk does, without needing one.
+        // No file may grow: the same as a full disk.
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$@\"", "sh", PROGRAM]).args(&all);
         let (code, _, err) = finish(&mut command);
@@ -141,14 +141,14 @@ fn a_full_disk_costs_no_old_file_and_leaves_nothing() {
 }
 
 #[test]
-fn what_is_read_is_not_written_over_nor_one_file_twice() {
+fn inputs_are_not_overwritten_and_no_file_is_written_twice() {
     let folder = Folder::new("inputs");
     let copy = |from: &str, name: &str| folder.write(name, fs::read(from).expect("read"));
     let probe = copy(MOTOR_PROBE, "p.toml");
     let report = folder.write("error.json", crate::budget::error_report("[160, 216, 33]"));
     let scene = folder.write("scene.toml", "mode = 'mip'\n");
     let picture = folder.write("in.pgm", b"P5 4 4 255\n0123456789abcdef");
-    // Samples in a file of their own.
+    // Samples in a separate file.
     let header = "ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementType = MET_UCHAR\nElementDataFile = own.raw\n";
     let (split, raw) = (folder.write("own.mhd", header), folder.write("own.raw", [7; 64]));
     let points = folder.write("fire.toml", "points = [{ at = 0, colour = [0, 0, 0] }, { at = 1, colour = [1, 1, 1] }]");

@@ -1,4 +1,4 @@
-//! `tools/kiosk/echolume.service`: what it starts is what the program takes.
+//! `tools/kiosk/echolume.service`: the program accepts its command line.
 
 use crate::common::program::*;
 use std::process::Command;
@@ -22,7 +22,7 @@ fn the_service_starts_what_the_program_takes() {
 #[test]
 fn systemd_finds_no_fault_in_the_service() {
     let folder = Folder::new("service");
-    // Its program need not be installed here, nor does a user of that name.
+    // Neither its program nor its user need exist here.
     let unit = UNIT.replace("/usr/local/bin/echolume", PROGRAM).replace("User=echolume", "User=root");
     let file = folder.write("echolume-test.service", unit);
     let Ok(output) = Command::new("systemd-analyze").args(["verify", "--man=no", &file]).output() else { return };

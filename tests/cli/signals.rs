@@ -1,9 +1,9 @@
-//! A signal in the middle of what takes long: what was there stays, nothing half-made is left, and a stream ends as it always does.
+//! Signals during long work: old files are kept, no partial files are left, and a stream ends as usual.
 #![cfg(unix)]
 
 use crate::common::program::*;
 use crate::common::wait::eventually;
-use echolume::verify::report::{Verdict, json};
+use echolume::verify::report::{self, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -67,7 +67,7 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     .enumerate()
     {
         let mut child = start(with_default_signals().args(row));
-        // It says which device it has taken, and works.
+        // It prints the chosen device before it begins.
         let mut line = String::new();
         BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
         assert!(line.starts_with("device: "), "{row:?} said {line:?}");
@@ -79,7 +79,7 @@ fn a_signal_ends_what_only_computes_at_once_and_nothing_is_left() {
     }
 }
 
-/// What was found until then is written, and the rest is not said to be sound.
+/// Results so far are written, and missing checks do not count as passed.
 #[test]
 fn a_signal_ends_verify_with_what_it_found() {
     let folder = Folder::new("verify-stopped");
@@ -94,7 +94,7 @@ fn a_signal_ends_verify_with_what_it_found() {
     child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
     assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said:?}");
     assert!(said.iter().any(|line| line.starts_with("SIGINT: stopping after this check")), "{said:?}");
-    let run = json::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
     let all = run.outcomes.len() - 1;
     let last = &run.outcomes[all];
     assert_eq!((last.name.as_str(), last.verdict), ("every check was run", Verdict::Failed));

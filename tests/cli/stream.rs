@@ -1,4 +1,4 @@
-//! `echolume stream`: sources that come, go, and lie.
+//! `echolume stream`: sources that appear, disappear, and send wrong data.
 
 use crate::common::program::*;
 use std::fs;
@@ -20,7 +20,7 @@ fn fed(arguments: &[&str], input: &[u8]) -> Ran {
     let mut command = Command::new(PROGRAM);
     let child = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = child.expect("start the program");
-    // Whoever refuses the first line reads no further.
+    // A program that refuses the first line reads no further.
     let _ = child.stdin.take().expect("a pipe").write_all(input);
     let output = child.wait_with_output().expect("the program ends");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -37,7 +37,7 @@ fn a_recording_of_a_stream_is_replayed_to_the_same_pictures_bit_for_bit() {
     assert!(said.contains("93 frames, 3 volumes shown, 0 dropped, 0 incomplete, 3 pictures"), "{said}");
     for how in [&["--rounds", "1"][..], &["--rate", "20"], &["--real-time", "--update", "rolling"]] {
         done(&[&["stream", "--source", &tape, "--out", &second, "--validate"], how, &SMALL[..]].concat());
-        // The last picture always shows all that came.
+        // The last picture always shows all frames.
         let last = |folder: &str| {
             let names = fs::read_dir(folder).expect("list the pictures").map(|e| e.expect("an entry").path());
             fs::read(names.max().expect("a picture")).expect("read a picture")
@@ -45,7 +45,7 @@ fn a_recording_of_a_stream_is_replayed_to_the_same_pictures_bit_for_bit() {
         assert!(last(&first) == last(&second), "{how:?}");
         fs::remove_dir_all(&second).expect("remove the pictures");
     }
-    // A picture of what was recorded is that of the recording.
+    // A picture of the recording is that of its source.
     let rendered = folder.path("rendered.png");
     done(&[&["render", SWEEP, "-o", &rendered], &SMALL[..]].concat());
     let pixels = |file: &str| image::open(file).expect("a picture").to_rgba8();
@@ -53,7 +53,7 @@ fn a_recording_of_a_stream_is_replayed_to_the_same_pictures_bit_for_bit() {
 }
 
 #[test]
-fn a_pipe_is_drawn_to_its_last_whole_volume_and_what_is_wrong_with_it_is_said() {
+fn a_pipe_is_drawn_to_its_last_complete_volume_and_its_faults_are_reported() {
     let folder = Folder::new("pipe");
     let out = folder.path("out");
     let stream = ["stream", "--source", "-", "--mode", "mip", "--size", "24x24", "--out", &out];
@@ -108,7 +108,7 @@ fn a_stream_that_cannot_begin_says_why_and_writes_nothing() {
 }
 
 #[test]
-fn the_phantom_streams_until_it_is_told_to_end() {
+fn the_phantom_streams_until_it_is_stopped() {
     let said = done(&[&["stream", "--null", "--rate", "4", "--volumes", "3", "--validate"], &SMALL[..]].concat());
     let last = said.lines().last().expect("a line");
     assert!(last.contains(" 3 volumes shown") || last.contains(" 4 volumes shown"), "{said}");
@@ -118,7 +118,7 @@ fn the_phantom_streams_until_it_is_told_to_end() {
     assert!(said.contains("what sound allows") && said.contains("latency ms p50"), "{said}");
 }
 
-/// As two terminals would: a simulated motor in one, and what it sweeps in the other, until SIGINT.
+/// As in two terminals: a simulated motor in one, a stream swept by it in the other, until SIGINT.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
@@ -152,7 +152,7 @@ fn a_motor_sweeps_the_phantom_until_a_signal_stops_both() {
     assert!(said.contains("index") && said.contains("as it was written"), "{said}");
 }
 
-/// Prevents an exam that seems to be recorded and is not: a disk that is full, or a file that is there.
+/// Prevents an exam that seems to be recorded and is not: on a full disk, or with an existing file.
 #[test]
 fn a_recording_that_cannot_be_made_is_a_failure() {
     let folder = Folder::new("full");

@@ -1,4 +1,4 @@
-//! `echolume support-bundle`: everything of the machine, nothing of a patient.
+//! `echolume support-bundle`: complete data of the machine, no data of a patient.
 
 use crate::common::program::*;
 use flate2::read::GzDecoder;
@@ -8,7 +8,7 @@ use std::io::Read;
 use std::path::Path;
 use std::process::Command;
 
-/// A name that must not be found anywhere.
+/// A patient name that must not occur anywhere.
 const NAME: &str = "Zquigley";
 
 /// Entries by their names, and every byte of the archive.
@@ -36,7 +36,7 @@ fn pack(folder: &Folder, config: &str) -> (BTreeMap<String, String>, Vec<u8>) {
 }
 
 #[test]
-fn what_is_packed_is_listed_and_says_what_machine_this_is() {
+fn the_archive_lists_its_files_and_describes_the_machine() {
     let folder = Folder::new("bundle");
     folder.write("a.log", "2026-11-22T01:00:00.000000Z  WARN newest\n");
     folder.write("a.log.1", "2026-11-22T00:00:00.000000Z  WARN older\n");
@@ -64,7 +64,7 @@ fn what_is_packed_is_listed_and_says_what_machine_this_is() {
 }
 
 #[test]
-fn a_name_that_was_planted_is_in_no_byte_of_it() {
+fn an_injected_patient_name_is_in_no_byte_of_the_archive() {
     let folder = Folder::new("planted");
     let home = folder.0.join(format!("{NAME}, A"));
     fs::create_dir_all(&home).expect("a folder with a name");
@@ -85,7 +85,7 @@ fn a_name_that_was_planted_is_in_no_byte_of_it() {
     let text =
         |more: &str| format!("source = {source:?} # {NAME}\n{more}\n[files]\nlog = {log:?}\npictures = {home:?}\n");
     let right = folder.write("right.toml", text("rate = 2"));
-    // Refused because of a key, a value that names it, and as a whole; the last says no more where its log is.
+    // Refused for a key, for a value that contains the name, and completely; the last one does not say where its log is.
     let unknown = folder.write("unknown.toml", text("rat = 2"));
     let value = folder.write("value.toml", text(&format!("rate = '{}'", source.display())));
     let broken = folder.write("broken.toml", text("rate = = 2"));
@@ -117,7 +117,7 @@ fn a_name_that_was_planted_is_in_no_byte_of_it() {
 }
 
 #[test]
-fn nothing_is_written_over_and_what_is_asked_for_wrongly_is_refused() {
+fn nothing_is_overwritten_and_wrong_options_are_refused() {
     let folder = Folder::new("bundle-refused");
     let there = folder.write("there.tar.gz", "mine");
     let config = folder.write("c.toml", "[files]\nlog = 'none.log'");
@@ -171,7 +171,7 @@ fn every_key_of_the_source_is_a_flag_that_there_is() {
     let folder = Folder::new("bundle-keys");
     let all = include_str!("../fuzz/seeds/configuration/all.toml");
     assert!(["real_time", "clip", "port", "timeout"].iter().all(|key| all.contains(&format!("\n{key} = "))));
-    // Those that exclude each other are the other way round.
+    // Options that exclude each other are given the other way round.
     let other =
         all.replace("rate = 2\nreal_time = false", "real_time = true\nrounds = 2").replace("loop = false\n", "");
     for text in [all, &other.replace("delay = 12", "stamps = true")] {

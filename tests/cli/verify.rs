@@ -1,7 +1,7 @@
-//! `echolume verify` as CI and a cart call it: its exit codes, its files, and what it says of an earlier run.
+//! `echolume verify` as CI and a cart call it: its exit codes, its files, and the comparison with an earlier run.
 
 use crate::common::program::*;
-use echolume::verify::report::{Run, Unit, Verdict, json};
+use echolume::verify::report::{self, Run, Unit, Verdict};
 use echolume::verify::self_test;
 use std::fs;
 use std::process::Command;
@@ -17,12 +17,12 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
     let file = folder.path(name);
     let (code, out, err) = verify(&[more, &["--json", &file]].concat());
     assert_eq!(code, Some(0), "{out}{err}");
-    (file.clone(), json::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
+    (file.clone(), report::from_json(&fs::read_to_string(&file).expect("written")).expect("read back"))
 }
 
-/// Everything that CI has time for passes on this device, and every file says so.
+/// All quick checks pass on this device, and every report file says so.
 #[test]
-fn everything_quick_is_as_it_should_be_here() {
+fn every_quick_check_passes_on_this_device() {
     let folder = Folder::new("verify-quick");
     let [junit, html] = ["junit.xml", "page.html"].map(|name| folder.path(name));
     let pictures = folder.path("pictures");
@@ -44,13 +44,13 @@ fn everything_quick_is_as_it_should_be_here() {
     assert!(!std::path::Path::new(&pictures).exists(), "there is nothing to show");
 }
 
-/// Every planted fault, every dropped barrier, and that nothing is noticed where nothing is planted.
+/// Every injected fault and every dropped barrier is caught, and a run without a fault reports nothing.
 #[test]
-fn every_planted_fault_and_every_dropped_barrier_is_caught() {
+fn every_injected_fault_and_every_dropped_barrier_is_caught() {
     let folder = Folder::new("verify-self-test");
     let (_, run) = kept(&folder, "run.json", &["--self-test"]);
     let planted = self_test::faults().count();
-    // AsyncPipelineCompiler them barriers by the oracle, by the layer, and nothing.
+    // In addition: barriers checked by the oracle, barriers checked by the layer, and no fault.
     assert!(planted >= 24 && run.outcomes.len() == planted + 3, "{planted} of {}", run.outcomes.len());
     let caught: Vec<String> = run.outcomes.iter().map(|o| format!("{}: {}", o.name, o.notes.join("; "))).collect();
     println!("{}", caught.join("\n"));
@@ -67,14 +67,14 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
     let chosen = [&FEW[..], &["--only", "median_distance"]].concat();
     let (file, earlier) = kept(&folder, "before.json", &chosen);
     let again = |name: &str, changed: &Run, threshold: &str| {
-        let file = folder.write(name, json::to_json(changed).expect("JSON"));
+        let file = folder.write(name, report::to_json(&changed).expect("JSON"));
         verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
     };
     // A busy machine is no slower device: any time passes that is not a hundred times longer.
     let (code, out, err) = verify(&[&chosen[..], &["--baseline", &file, "--threshold", "100"]].concat());
     assert_eq!(code, Some(0), "{out}{err}");
     assert!(out.contains("compared with"), "{out}");
-    // Before, everything took a millionth of the time.
+    // In the earlier run everything took a millionth of the time.
     let mut quick = earlier.clone();
     for figure in quick.outcomes.iter_mut().flat_map(|o| &mut o.figures).filter(|f| f.unit == Unit::Ns) {
         figure.value /= 1e6;
@@ -83,7 +83,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
     let (code, out, err) = again("quick.json", &quick, "100");
     assert_eq!(code, Some(1), "{out}{err}");
     assert!(out.contains("slower") && err.contains("became worse since the baseline"), "{out}{err}");
-    // Before, the sphere was found a thousand times better: told, and no failure.
+    // In the earlier run the sphere had a thousandth of the error: reported, and no failure.
     let mut exact = earlier.clone();
     let sphere = exact.outcomes.iter_mut().find(|o| o.name == "a sphere in a sweep").expect("it was run");
     sphere.figures[0].value /= 1e3;
@@ -93,7 +93,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
 }
 
 #[test]
-fn what_cannot_be_verified_is_said_in_one_line_with_its_own_exit_code() {
+fn refusals_of_verify_are_one_line_with_their_own_exit_code() {
     let folder = Folder::new("verify-refused");
     let text = folder.write("text.json", "no baseline");
     let other = folder.write("other.json", "{\"format\": \"somebody else's\"}");

@@ -1,4 +1,4 @@
-//! `echolume view` where there is nothing to show on, or nothing to show: one line that says so. Windows are in tests/window.
+//! `echolume view` without a display or without an input: one line that says so. Windows are in tests/window.
 
 use crate::common::program::*;
 use std::process::Command;
@@ -10,7 +10,7 @@ fn bare(arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn what_a_view_cannot_be_of_is_refused_in_one_line_before_a_window_opens() {
+fn impossible_views_are_refused_in_one_line_before_a_window_opens() {
     let folder = Folder::new("view");
     let cut = folder.write("cut.mha", &std::fs::read(SWEEP).expect("read")[..3000]);
     let wrong = folder.write("cart.toml", "source = 'phantom'\nrate = -1\n");
@@ -30,7 +30,7 @@ fn what_a_view_cannot_be_of_is_refused_in_one_line_before_a_window_opens() {
     ] {
         refuses(arguments, &bare(arguments), code, named);
     }
-    // What a configuration says cannot be said by flags as well.
+    // Flags cannot override a configuration.
     let (code, _, err) = bare(&["--config", &config, "--source", SWEEP]);
     assert!(code == Some(2) && err.contains("cannot be used with"), "{err}");
 }

@@ -11,15 +11,15 @@ use std::sync::Arc;
 
 pub use super::files::*;
 pub use super::probes::wobbler;
-pub use super::scenes::*;
+pub use super::scenes::{BYTES, FLOATS, scene};
 pub use echolume::verify::built_in::{
     ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
 };
 
-/// A context that fails its test if validation said anything.
+/// A context that fails its test if validation reported anything.
 pub struct Device {
     context: Arc<Context>,
-    /// Messages were asked for.
+    /// The test expects messages.
     pub provoked: bool,
 }
 
@@ -33,13 +33,13 @@ impl Device {
         Device::watched(true)
     }
 
-    /// Without validation where not watched: its layers keep something of all that was ever made.
+    /// `validation` false switches the layers off: they keep some memory for every object ever created.
     pub fn watched(validation: bool) -> Device {
         let context = Context::new(&ContextOptions { device: chosen(), validation }).expect("a Vulkan device");
         Device { context, provoked: false }
     }
 
-    /// Looked at with `--nocapture`: which device and driver the tests ran on.
+    /// The device and driver, for output with `--nocapture`.
     pub fn describe(&self) -> String {
         format!("{}, {}", self.context.candidate.name, self.context.candidate.driver.trim())
     }
@@ -56,22 +56,22 @@ impl Drop for Device {
     fn drop(&mut self) {
         let messages = self.context.messages();
         if !std::thread::panicking() && !self.provoked {
-            // The first says it; a flood of the same hides it.
+            // One message is enough; many of the same would hide it.
             assert!(messages.is_empty(), "{} messages of validation, first: {}", messages.len(), messages[0]);
         }
     }
 }
 
-/// Scenes by name that among them need every pass.
+/// Scenes by name that together need every pass.
 pub fn scenes() -> Vec<(String, Scene)> {
-    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.make().expect("scene"))).collect()
+    built_in::scenes().iter().map(|asked| (asked.name.clone(), asked.build().expect("scene"))).collect()
 }
 
 pub fn frame_format(scene: &Scene) -> Format {
     Slot::Frames.format(scene)
 }
 
-/// A renderer with the frames sent.
+/// A renderer that has received these frames.
 pub fn rendered(device: &Device, scene: Scene, frames: &[Texels]) -> Renderer {
     let mut renderer = Renderer::new(device, scene, &RendererOptions::default()).expect("renderer");
     send(&mut renderer, frames, 0);

@@ -22,7 +22,7 @@ pub fn settings(simulator: &Simulator, timeout_ms: u64) -> PortSettings {
     PortSettings { timeout: Duration::from_millis(timeout_ms), ..PortSettings::new(path) }
 }
 
-/// The module was told to stop after the last thing that moves it.
+/// True if the module received a stop after the last request that moves it.
 pub fn stopped_at_last(received: &[Request]) -> bool {
     let last = |of: &dyn Fn(&Request) -> bool| received.iter().rposition(of);
     last(&|r| r.command == command::STOP) > last(&|r| r.moves())

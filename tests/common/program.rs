@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_echolume");
 
 impl Folder {
-    /// A refused rendering leaves the picture that was there, and nothing beside it.
+    /// A refused rendering keeps the old picture and writes no other file.
     pub fn refuses(&self, arguments: &[&str], named: &[&str]) {
         let old = self.write("old.png", "old");
         let (all, before) = ([&["render"], arguments, &["-o", &old]].concat(), self.names());
@@ -46,7 +46,7 @@ pub fn run(arguments: &[&str]) -> Ran {
     finish(Command::new(PROGRAM).args(arguments))
 }
 
-/// Runs what has to work, and gives what it prints.
+/// Runs the program, which must succeed. Returns its standard output.
 pub fn done(arguments: &[&str]) -> String {
     let (code, out, err) = run(arguments);
     assert_eq!(code, Some(0), "{arguments:?}: {err}");
@@ -75,7 +75,7 @@ pub fn png_size(path: &str) -> [u32; 2] {
     [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
 }
 
-/// Words of the lines that begin so, each line's first word after it.
+/// The first word after `start` of each line that begins with it.
 pub fn first_words(text: &str, start: &str) -> Vec<String> {
     let lines = text.lines().filter_map(|l| l.strip_prefix(start));
     lines.filter_map(|l| l.split_whitespace().next()).map(str::to_string).collect()

@@ -1,7 +1,7 @@
-//! Every parser against bytes that are nearly right: none panics, takes more memory than it states, or goes on for ever. Needs no GPU.
+//! Every parser against nearly valid bytes: none panics, uses more memory than it states, or runs for ever. Needs no GPU.
 //!
-//! The same inputs every time. `FUZZ_SECONDS=600` goes on for so long, `FUZZ_TARGET=igtl` takes one parser alone. An input that fails is
-//! kept, and named; mended, it goes to `tests/fuzz/seeds/<target>`, which is run first. `tools/fuzz` has the same under libFuzzer.
+//! The inputs are the same every time. `FUZZ_SECONDS=600` continues for so long, `FUZZ_TARGET=igtl` runs one parser alone. An input that fails is
+//! saved and named; once the fault is fixed, it goes to `tests/fuzz/seeds/<target>`, which run first. `tools/fuzz` does the same under libFuzzer.
 
 mod memory;
 mod mutate;
@@ -15,11 +15,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use targets::{TARGETS, Target};
 
-/// What a seed is cut to, bytes: a header and some frames.
+/// Maximum length of a seed, bytes: a header and some frames.
 const LONGEST_SEED: usize = 8 << 10;
-/// Inputs that led to something new and are mutated further, beside the seeds.
+/// Inputs with a new outcome that are mutated further, in addition to the seeds.
 const MOST_KEPT: usize = 512;
-/// One input takes milliseconds; this is for a machine busy with other things.
+/// One input takes milliseconds; this is for a busy machine.
 const LONGEST: Duration = Duration::from_secs(60);
 
 fn top() -> PathBuf {
@@ -45,17 +45,17 @@ fn seeds(target: &Target) -> Vec<Vec<u8>> {
         add(&own, &mut seeds);
     }
     target.also.iter().for_each(|path| add(&top().join(path), &mut seeds));
-    // What is read as numbers needs no seed but bytes.
+    // Parsers of numbers need no seeds but bytes.
     let mut random = Random(1);
     seeds.push((0..600).map(|_| random.next() as u8).collect());
     seeds.push(Vec::new());
     seeds
 }
 
-/// What is being run since when, for the one who watches.
+/// The input in progress and its start, for the watchdog.
 type Running = Arc<Mutex<Option<(Instant, &'static str, Vec<u8>)>>>;
 
-/// Ends the process with a line that names the input that does not end.
+/// Ends the process with a line that names the input that does not terminate.
 fn watch(running: &Running) {
     let running = running.clone();
     std::thread::spawn(move || {
@@ -72,19 +72,19 @@ fn watch(running: &Running) {
     });
 }
 
-/// FNV-1a: what is long is told apart by a number.
+/// FNV-1a: long outcomes are compared by their hash.
 fn sum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// Writes an input that failed where it can be found.
+/// Saves a failing input.
 fn kept(name: &str, bytes: &[u8]) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{:016x}", sum(bytes)));
     std::fs::write(&path, bytes).expect("the input is kept");
     path
 }
 
-/// Runs one input. What became of it, without its numbers.
+/// Runs one input. Returns its outcome without numbers.
 fn run(target: &Target, bytes: &[u8], running: &Running) -> Result<String, String> {
     *running.lock().unwrap_or_else(|e| e.into_inner()) = Some((Instant::now(), target.name, bytes.to_vec()));
     let (result, most) = memory::most_during(|| catch_unwind(AssertUnwindSafe(|| (target.run)(bytes))));
@@ -99,7 +99,7 @@ fn run(target: &Target, bytes: &[u8], running: &Running) -> Result<String, Strin
     }
 }
 
-/// The first input that fails, and why; or how many were run and how many outcomes there were.
+/// The first failing input, and why; or the number of inputs and of distinct outcomes.
 fn fuzz(target: &Target, seconds: Option<f64>, running: &Running) -> Result<(u32, usize), (Vec<u8>, String)> {
     let (mut corpus, mut random) = (seeds(target), Random(0x5eed));
     let (mut outcomes, own, begun, mut rounds) = (HashSet::new(), corpus.len(), Instant::now(), 0);
@@ -122,7 +122,7 @@ fn fuzz(target: &Target, seconds: Option<f64>, running: &Running) -> Result<(u32
     Ok((rounds, outcomes.len()))
 }
 
-/// Memory is counted for the whole process: one at a time.
+/// Memory is counted for the complete process: one target at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
 #[test]
@@ -155,9 +155,9 @@ fn no_bytes_break_any_parser() {
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// Faults that are planted are found: a number that is believed, a length that is allocated, a word that two bits away is another.
+/// Injected faults are found: an unchecked number, an unchecked length, a word that differs by two bits.
 #[test]
-fn what_is_planted_is_found() {
+fn injected_faults_are_found() {
     fn number(bytes: &[u8]) -> String {
         let text = String::from_utf8_lossy(bytes);
         let value = text.split_once("gear = ").and_then(|(_, v)| v.split_whitespace().next()?.parse::<f64>().ok());

@@ -1,9 +1,9 @@
-//! How much memory is in use, and the most that was.
+//! Present and peak memory use.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Refused beyond this, bytes, which ends the process: no test is to take the machine with it.
+/// Allocations beyond this many bytes are refused, which ends the process: no test may exhaust the machine.
 const MOST: usize = 6 << 30;
 
 static NOW: AtomicUsize = AtomicUsize::new(0);
@@ -14,13 +14,13 @@ struct Counting;
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-// SAFETY: every call goes on to the system's allocator unchanged, or is refused with null.
+// SAFETY: every call is forwarded to the system's allocator unchanged, or refused with null.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if !counted(layout.size()) {
             return std::ptr::null_mut();
         }
-        // SAFETY: whoever calls answers for the layout.
+        // SAFETY: the caller guarantees a valid layout.
         unsafe { System.alloc(layout) }
     }
 
@@ -34,12 +34,12 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
         NOW.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: whoever calls got the place from here, and so from there.
+        // SAFETY: the caller got the pointer from `alloc`, which got it from the system's allocator.
         unsafe { System.dealloc(place, layout) }
     }
 }
 
-/// Also what is claimed and never touched: it was asked for.
+/// Claimed memory counts even if it is never touched.
 fn counted(bytes: usize) -> bool {
     let now = NOW.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
     if now > MOST {
@@ -50,7 +50,7 @@ fn counted(bytes: usize) -> bool {
     true
 }
 
-/// The most bytes that were in use at once during this, beyond those before it.
+/// The peak of the bytes in use while `run` runs, beyond those in use before.
 pub fn most_during<T>(act: impl FnOnce() -> T) -> (T, usize) {
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);

@@ -1,9 +1,9 @@
-//! Bytes that are nearly right, the same for the same number.
+//! Nearly valid bytes, the same for the same seed.
 
 /// Longest input, bytes.
 const LONGEST: usize = 1 << 16;
 
-/// Numbers that are exchanged for those of a text.
+/// Numbers that replace those of a text.
 const TOKENS: [&str; 26] = [
     "0",
     "-0",
@@ -32,10 +32,10 @@ const TOKENS: [&str; 26] = [
     "nan",
     "inf",
 ];
-/// And words.
+/// Words that replace those of a text.
 const WORDS: [&str; 12] =
     ["true", "false", "none", "[]", "{}", "''", "\"\\u0000\"", "[0,0,0]", "[1e308,-1e308]", "auto", "é", "\u{1b}[2J"];
-/// Words of two, four and eight bytes, written either way round.
+/// Words of two, four and eight bytes, in either byte order.
 const LENGTHS: [u64; 14] =
     [0, 1, 2, 7, 0x7f, 0xff, 0x100, 0x7fff, 0xffff, 0x1_0000, 0x7fff_ffff, 0xffff_ffff, 1 << 60, u64::MAX];
 
@@ -104,7 +104,7 @@ fn change(bytes: &mut Vec<u8>, corpus: &[Vec<u8>], random: &mut Random) {
             bytes.splice(at..at, again);
         }
         _ => {
-            // A part of another one, in place of a part of this.
+            // A part of another input replaces a part of this one.
             let other = random.of(corpus);
             let part = other[random.range(other.len())].to_vec();
             bytes.splice(random.range(bytes.len()), part);
@@ -147,7 +147,7 @@ fn change_text(bytes: &mut Vec<u8>, corpus: &[Vec<u8>], random: &mut Random) {
     }
 }
 
-/// A run of bytes that are one token, around or behind a random place in the first 4 KiB: headers come first.
+/// A run of bytes that form one token, at or after a random position in the first 4 KiB: headers come first.
 fn token(
     bytes: &[u8],
     random: &mut Random,

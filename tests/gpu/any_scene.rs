@@ -1,4 +1,4 @@
-//! Scenes that nobody would ask for: each is refused in one line or drawn, and validation has nothing to say.
+//! Random scenes: each is refused in one line or drawn, and validation is silent.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
@@ -7,10 +7,10 @@ use echolume::scene::Scene;
 use echolume::scene::load::{Layers, PRESETS};
 use std::time::Instant;
 
-/// Within the tests.
+/// Number of scenes within the tests.
 const SCENES: u64 = 40;
 
-/// Settings, and values of each: of a size that a software device draws in milliseconds.
+/// Settings and their values, of sizes that a software device draws in milliseconds.
 const SETTINGS: &[(&str, &[&str])] = &[
     ("mode", &["vr", "sr", "mixed", "mip", "minip", "xray", "mpr", "orthogonal", "tomography", "cube"]),
     ("layout", &["single", "four"]),
@@ -83,7 +83,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("post.gamma", &["0.1", "10"]),
     ("post.contrast", &["0", "10"]),
 ];
-/// Of any setting: next to none of them can mean it.
+/// Values for any setting: almost all of them are invalid.
 const WRONG: [&str; 10] = ["nan", "-1", "0", "1e308", "inf", "true", "nonsense", "[]", "{}", "[-1e308,1e308,nan]"];
 const SIZES: [&str; 5] = ["[1,1]", "[7,3]", "[24,24]", "[33,40]", "[64,48]"];
 
@@ -102,7 +102,7 @@ fn geometries() -> Vec<Geometry> {
     sweeps.into_iter().map(Geometry::Sweep).chain([cartesian([20, 22, 18])]).collect()
 }
 
-/// Settings that may be anything, and how many of them were refused.
+/// Random settings, and how many of them were refused.
 fn settings(noise: &mut Noise) -> (Layers, u32) {
     let (mut layers, mut refused) = (Layers::default(), 0);
     if noise.next() < 0.25 {
@@ -112,7 +112,7 @@ fn settings(noise: &mut Noise) -> (Layers, u32) {
     for _ in 0..noise.range(0.0, 12.0) as u32 {
         let (key, values) = SETTINGS[noise.range(0.0, SETTINGS.len() as f64) as usize];
         let value = if noise.next() < 0.1 { one_of(noise, &WRONG) } else { one_of(noise, values) };
-        // What is refused may have left something behind: the command line ends there, too.
+        // A refused setting may have changed the layers: the command line ends there, too.
         let mut next = layers.clone();
         match next.set(&format!("{key}={value}")) {
             Ok(()) => layers = next,
@@ -127,8 +127,8 @@ fn settings(noise: &mut Noise) -> (Layers, u32) {
     (layers, refused)
 }
 
-/// The layers of 1.3.239 know no timeline semaphores: where a buffer lies in the place of one that has gone they do not see that the host
-/// has waited for whoever wrote it. What lies within one submission they see.
+/// The layers of 1.3.239 ignore timeline semaphores: where a buffer reuses the memory of another, they do not see that the host
+/// has waited for its writer. Hazards within one submission are reported correctly.
 fn is_blind(message: &str, is_changed: bool) -> bool {
     let is_over = is_changed || message.contains("(destroyed)");
     is_over && message.contains("SYNC-HAZARD") && message.contains("vkQueueSubmit2")
@@ -145,13 +145,13 @@ impl Drop for Told {
     }
 }
 
-/// Prevents panics, messages of validation and pictures that are none, whatever the settings. SCENE_SECONDS goes on for longer,
-/// SCENE_SEED begins elsewhere.
+/// Prevents panics, validation messages and invalid pictures, whatever the settings. SCENE_SECONDS continues for longer,
+/// SCENE_SEED chooses other scenes.
 #[test]
 fn any_scene_is_drawn_or_refused_in_one_line_and_validation_is_silent() {
     let (seed, seconds) = (of_environment("SCENE_SEED").unwrap_or(1), of_environment("SCENE_SECONDS"));
     let (mut noise, mut device, geometries, began) = (Noise(seed), Device::new(), geometries(), Instant::now());
-    // Looked at below, scene by scene.
+    // Messages are checked below, scene by scene.
     device.provoked = true;
     let mut told_by_validation = 0;
     let mut told = Told(seed, 0, String::new());
@@ -161,8 +161,8 @@ fn any_scene_is_drawn_or_refused_in_one_line_and_validation_is_silent() {
         let (layers, wrong) = settings(&mut noise);
         refused += wrong;
         let settings = layers.finish().expect("every layer was checked");
-        told.2 = toml::to_string(&settings).unwrap_or_default();
-        // Often the same volume: what is there is changed then.
+        told.2 = format!("{settings:?}");
+        // Often the same volume: the existing renderer changes its scene then.
         let there = renderer.take().filter(|_| noise.next() < 0.6);
         let (geometry, input) = match &there {
             Some(renderer) => (renderer.scene().geometry.clone(), renderer.scene().input),

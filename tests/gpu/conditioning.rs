@@ -1,14 +1,15 @@
-//! Line conditioning on lines whose answer is a formula: the gain curve, straight lines of exponential decays, ramps and wires
-//! that decimation leaves where they are.
+//! Line conditioning on lines with an analytic answer: the gain curve, straight lines from exponential decays, ramps and wires
+//! that decimation does not move.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels};
 use echolume::plan::{Plan, Rerun};
 use echolume::probe::{Array, Axis, Geometry, Motion, Probe};
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 
-/// One frame of a still linear array: slices are the lines themselves, so that depths can be read off.
+/// One frame of a still linear array: slices equal the lines, so that depths can be read directly.
 fn probe(samples: usize, lines: usize) -> Probe {
     Probe {
         array: Array::Linear,
@@ -81,7 +82,7 @@ fn an_exponential_decay_becomes_a_straight_line_that_ends_at_the_dynamic_range()
 }
 
 #[test]
-fn nothing_becomes_black_and_more_never_becomes_less() {
+fn zero_becomes_black_and_the_mapping_is_monotonic() {
     let device = Device::new();
     let scene = lines(400, "dynamic_range = 200");
     // From below the smallest denormal to full scale, zeros and negative samples on other lines.
@@ -141,13 +142,13 @@ fn a_wire_stays_where_it_is() {
     for most in [900, 450, 225, 113] {
         let scene = lines(900, &format!("samples = {most}"));
         for place in [400.0, 401.3, 402.5, 403.9] {
-            // As long as a real wire's echo: a deviation of 4 samples.
+            // As long as the echo of a real wire: a deviation of 4 samples.
             let wire = |i: f64, _| (-0.5 * ((i - place) / 4.0).powi(2)).exp();
             let volume = conditioned(&device, &scene, Slot::Volume, wire);
             let off = (centroid(&scene, &volume) - (4.0 + pitch * place)) / pitch;
             worst = worst.max(off.abs());
             assert!(off.abs() < 0.05, "factor {}, at {place}: off by {off} samples", scene.decimation());
-            // The usual mistake, a lattice centred on the samples that were averaged, would be seen.
+            // The usual mistake, a lattice centred on the averaged samples, would be detected.
             let mistaken = f64::from(scene.decimation() - 1) / 2.0;
             assert!(scene.decimation() == 1 || (off - mistaken).abs() > 0.4);
         }
@@ -156,8 +157,8 @@ fn a_wire_stays_where_it_is() {
 }
 
 /// The simulator's wires under the same low pass with half the samples and with all: decimation moves none of them along their
-/// lines. (An eighth of a sample is left: their echoes are compressed and not symmetric, and energies between samples twice as
-/// far apart are others. A lattice centred on the two samples that became one would move them by half a sample, 0.125 mm.)
+/// lines. (An eighth of a sample remains: their echoes are compressed and not symmetric, and energies between samples twice as
+/// far apart differ. A lattice centred on the two averaged samples would move them by half a sample, 0.125 mm.)
 #[test]
 fn the_wobblers_wires_stay_where_they_are() {
     use crate::recordings::{centroid, wobbler_volume};
@@ -178,7 +179,7 @@ fn the_wobblers_wires_stay_where_they_are() {
 }
 
 #[test]
-fn what_would_alias_is_taken_away_and_what_is_slow_stays() {
+fn decimation_removes_aliases_and_keeps_low_frequencies() {
     let device = Device::new();
     let factor = 8.0;
     let amplitude = |period: f64| {
@@ -195,7 +196,7 @@ fn what_would_alias_is_taken_away_and_what_is_slow_stays() {
 }
 
 #[test]
-fn it_is_in_the_plan_only_where_it_does_something() {
+fn conditioning_is_planned_only_where_it_changes_something() {
     let conditions = |scene: &Scene| Plan::new(scene).steps.iter().any(|s| s.pass.name == "condition");
     for (samples, asked, is_there) in [
         (400, "", false),
@@ -211,9 +212,9 @@ fn it_is_in_the_plan_only_where_it_does_something() {
         assert_eq!(Plan::new(&scene).slots.contains(&Slot::Conditioned), is_there, "{asked}");
         assert_eq!(Plan::new(&scene).slots.contains(&Slot::Tgc), asked.contains("tgc"), "{asked}");
     }
-    // A limit of lines means nothing where there are none; what conditions them is refused there.
+    // A limit of lines has no effect where there are none; conditioning is refused there.
     let on_cartesian = |conditioning: &str| {
-        let settings: Settings = toml::from_str(&format!("conditioning = {{ {conditioning} }}")).expect("settings");
+        let settings = settings(&format!("conditioning = {{ {conditioning} }}"));
         Scene::new(cartesian([700, 8, 3]), BYTES, settings)
     };
     assert!(!conditions(&on_cartesian("samples = 512").expect("a limit")));
@@ -228,7 +229,7 @@ fn it_is_in_the_plan_only_where_it_does_something() {
 }
 
 #[test]
-fn what_cannot_be_conditioned_is_refused_by_name() {
+fn impossible_conditioning_is_refused_by_name() {
     for (asked, field, fault) in [
         ("dynamic_range = 0", "conditioning.dynamic_range", "1..=200"),
         ("dynamic_range = nan", "conditioning.dynamic_range", "1..=200"),
@@ -241,7 +242,7 @@ fn what_cannot_be_conditioned_is_refused_by_name() {
         ("tgc = [{ depth = nan, gain = 1 }]", "conditioning.tgc", "0..="),
         ("tgc = [{ depth = 1, gain = inf }]", "conditioning.tgc", "-120..=120"),
     ] {
-        let settings: Settings = toml::from_str(&format!("conditioning = {{ {asked} }}")).expect("settings");
+        let settings = settings(&format!("conditioning = {{ {asked} }}"));
         let refused = Scene::new(Geometry::Sweep(probe(10_000, 4)), BYTES, settings).expect_err(asked).to_string();
         assert!(refused.contains(field) && refused.contains(fault), "{asked}: {refused}");
     }
@@ -275,7 +276,7 @@ fn another_curve_or_factor_sends_the_frames_again_and_gives_the_picture_of_a_fre
     }
 }
 
-/// A line of a real probe: 3640 samples are 455 after the preset of the thesis, and the picture is the same to the eye.
+/// Lines of a real probe: 3640 samples become 455 with the preset of the thesis, and the picture looks the same.
 #[test]
 fn real_lines_of_3640_samples_keep_their_picture() {
     use echolume::source::Recording;

@@ -1,11 +1,11 @@
-//! The volume as a solid block: what rays show where they enter it.
+//! The volume as a solid block: the values at the entry points of rays.
 
 use crate::common::gpu::*;
 use crate::planes::picture;
 use echolume::probe::{Geometry, Grid};
 use glam::DVec3;
 
-/// Where a ray enters the block by the slab method, and the field's value there.
+/// The entry of a ray into the block by the slab method, and the field's value there.
 #[test]
 fn the_block_shows_a_linear_field_where_rays_enter_it() {
     let device = Device::new();
@@ -26,7 +26,7 @@ fn the_block_shows_a_linear_field_where_rays_enter_it() {
         let (mut seen, mut worst) = (0, 0.0f64);
         for (x, y) in (0..57).flat_map(|y| (0..61).map(move |x| (x, y))) {
             let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
-            // Nothing is parallel to a face, but for rounding: then both quotients are infinite, of the right signs.
+            // No ray is parallel to a face except by rounding: then both quotients are infinite, with the right signs.
             let (a, b) = ((low - origin) / direction, (high - origin) / direction);
             let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
             let rgba = picture.get([x, y, 0]);
@@ -44,7 +44,7 @@ fn the_block_shows_a_linear_field_where_rays_enter_it() {
     }
 }
 
-/// The border of the sector is a face: without insets a curved array's far side is part of a known surface. Lines and frames
+/// The border of the sector is a face: without insets the far side of a curved array is part of a known surface. Lines and frames
 /// bend the field by 0.05 mm, and beyond the border slice pixels of 0.1 mm hold the outermost samples.
 #[test]
 fn behind_an_empty_corner_the_block_shows_the_sectors_own_border() {
@@ -75,7 +75,7 @@ fn behind_an_empty_corner_the_block_shows_the_sectors_own_border() {
     assert!(seen > 300 && worst < 0.12, "{seen} pixels, off by {worst} mm");
 }
 
-/// A face's brightness is that of its angle to the view, and only where two faces meet there is a line.
+/// The brightness of a face depends on its angle to the view, and lines are only where two faces meet.
 #[test]
 fn faces_are_shaded_by_their_angle_and_meet_in_lines() {
     let device = Device::new();
@@ -88,9 +88,9 @@ fn faces_are_shaded_by_their_angle_and_meet_in_lines() {
         let scene = scene(block.clone(), FLOATS, &toml);
         let frames = frames(&scene, |_| 1.0);
         let picture = picture(&mut rendered(&device, scene, &frames));
-        // The view goes towards +lateral: the near face is seen, and the left one beside it.
+        // The view is towards +lateral: the near face is visible, and the left one next to it.
         let shaded = |cos: f64| 1.0 - 0.5 * (1.0 - cos);
-        // Half of a turned face cuts, before the other half the block's own side is left.
+        // Half of a tilted face cuts; in front of the other half the side of the block remains.
         let greys = [turned, 60.0, 30.0].map(|angle| shaded(angle.to_radians().cos()));
         let (mut faces, mut lines) = ([0, 0, 0], 0);
         for x in 0..80 {
@@ -107,7 +107,7 @@ fn faces_are_shaded_by_their_angle_and_meet_in_lines() {
         }
         println!("tilt {tilt}: {faces:?} pixels of the near face, the left one and the near side, {lines} of lines");
         assert!(faces[0] > 10 && faces[1] > 5 && (faces[2] > 10) == (tilt > 0.0), "{faces:?}");
-        // Those between faces are drawn from both sides, the two at the outline from one.
+        // Lines between faces are drawn from both sides, the two at the outline from one.
         let most = if tilt > 0.0 { 12 } else { 9 };
         assert!((4..=most).contains(&lines), "{lines}");
     }

@@ -1,4 +1,4 @@
-//! The surface detector on walls and spheres that are formulas: where the surface is put.
+//! The position of surfaces found by the detector on analytic walls and spheres.
 
 use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels, is_hit};
@@ -8,7 +8,7 @@ use glam::DVec3;
 
 pub const STEP: f64 = 0.4;
 
-/// Columns of voxels that parallel rays along +Y run through the middles of, one a pixel.
+/// Columns of voxels; parallel rays along +Y run through their centres, one a pixel.
 pub fn columns(size: [usize; 3], depth_spacing: f64, surface: &str) -> Scene {
     let geometry = Geometry::Cartesian(Grid { size, spacing: [1.0, depth_spacing, 1.0], origin: [0.0; 3] });
     let toml = format!(
@@ -25,7 +25,7 @@ fn distances(device: &Device, scene: &Scene, frames: &[Texels]) -> Texels {
     renderer.read(Slot::Distance).expect("read").expect("there")
 }
 
-/// Depth of the surface in each column, none where it was missed.
+/// Depth of the surface in each column, none if it was missed.
 pub fn depths(device: &Device, scene: &Scene, frames: &[Texels]) -> Vec<([usize; 2], Option<f64>)> {
     let map = distances(device, scene, frames);
     let mut found = Vec::new();
@@ -46,13 +46,13 @@ pub fn ramp(depth: f64, edge: f64, width: f64) -> f64 {
     if width > 0.0 { ((depth - edge) / width + 0.5).clamp(0.0, 1.0) } else { f64::from(u8::from(depth >= edge)) }
 }
 
-/// Prevents a place that depends on how the samples fall on the edge, on its width, height or sign, or on the rough
-/// detector. An edge narrower than a step says nothing of its place between two samples: half a step there. (A
+/// Prevents a position that depends on how the samples fall on the edge, on its width, height or sign, or on the rough
+/// detector. An edge narrower than a step does not define its position between two samples: half a step there. (A
 /// parabola through an edge one step wide is 0.086 off at most, by its algebra; wider ones less.)
 #[test]
 fn a_step_wall_is_within_a_tenth_of_a_step_wherever_the_samples_fall() {
     let device = Device::new();
-    // Edges move by a voxel from column to column and their corners lie on voxels: the data is the formula.
+    // Edges move by a voxel from column to column and their corners are on voxels: the data equal the formula.
     let (voxel, offsets, widths) = (STEP / 20.0, 20, [0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0]);
     let edge = |x: usize| voxel * (680 + x) as f64;
     for sign in ["bright", "dark"] {
@@ -86,8 +86,8 @@ fn a_step_wall_is_within_a_tenth_of_a_step_wherever_the_samples_fall() {
     }
 }
 
-/// Prevents the thesis' own place from drifting: the newest sample is between (4 threshold / height - 0.5) and one
-/// more step past the edge. What is the default, the peak, does not depend on the height.
+/// Prevents the position of the thesis from drifting: the newest sample is between (4 threshold / height - 0.5) and one
+/// more step past the edge. The default, the peak, does not depend on the height.
 #[test]
 fn the_first_crossing_is_late_by_what_the_edges_height_makes_it() {
     let device = Device::new();
@@ -117,7 +117,7 @@ fn the_first_crossing_is_late_by_what_the_edges_height_makes_it() {
     }
 }
 
-/// Prevents errors on curved and slanting surfaces and off the axes: the rays come from any side.
+/// Prevents errors on curved and oblique surfaces and off the axes: the rays come from any side.
 #[test]
 fn a_sphere_is_within_a_tenth_of_a_step_from_any_side() {
     let device = Device::new();

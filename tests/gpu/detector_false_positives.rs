@@ -1,4 +1,4 @@
-//! What leads the surface detectors astray: noise, speckle, specks in the fluid; and the shader against its reference there.
+//! False positives of the surface detectors in noise, speckle, and specks in the fluid; and the shader against its reference there.
 
 use crate::common::gpu::*;
 use crate::detector::{STEP, columns, depths, ramp};
@@ -8,7 +8,7 @@ use echolume::passes::slots::Initializer;
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
 
-/// What noise does to a wall: the spread of the places, and shares of all rays.
+/// A wall in noise: the spread of the positions, and shares of all rays.
 #[derive(Debug)]
 struct Spread {
     steps: f64,
@@ -41,13 +41,13 @@ fn spread(device: &Device, deviation: f64, threshold: f64, rough: u32) -> Spread
     }
 }
 
-/// Prevents a detector that is led astray by less noise than it was, or places a noisy wall less well. Noise is
+/// Prevents a detector with more false positives in noise than measured, or a less exact position of a noisy wall. Noise is
 /// clamped to the window, as recordings are. The limits are what was measured (llvmpipe; the noise is the same
-/// everywhere), the spread times 1.15 and the shares and 0.02 (0.002 where there were next to none). A threshold of a
+/// everywhere), the spread times 1.15 and the shares plus 0.02 (0.002 where they were almost 0). A threshold of a
 /// tenth of the wall, the default, is crossed by noise of a tenth of it somewhere on a third of the rays; the rough
-/// detector asks for a second such crossing.
+/// detector requires a second such crossing.
 #[test]
-fn noise_spreads_a_wall_no_more_than_it_did() {
+fn noise_spreads_a_wall_within_the_measured_bounds() {
     let device = Device::new();
     // Threshold, rough; then for noise of 0, 0.05, 0.1 and 0.2 of the wall: spread in steps, share of wrong places.
     let measured = [
@@ -68,8 +68,8 @@ fn noise_spreads_a_wall_no_more_than_it_did() {
     }
 }
 
-/// Shares of the columns with a speck of one or two voxels in them: where a speck was found, and where the wall
-/// behind it was. The specks lie from `gap` steps before the wall on upwards.
+/// Shares of the columns with a speck of one or two voxels: where a speck was found, and where the wall
+/// behind it was. The specks are at least `gap` steps before the wall.
 fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
     // Two samples a voxel, as where specks are resolved.
     let (voxel, wall) = (2.0 * STEP, 60.0);
@@ -105,16 +105,16 @@ fn specks(device: &Device, surface: &str, gap: [f64; 2]) -> (f64, f64) {
     (f64::from(on_speck) / f64::from(crossed), f64::from(on_wall) / f64::from(crossed))
 }
 
-/// Prevents a rough detector that stops at what floats in the fluid. What it still finds at three fine steps are
-/// specks that lie one upon another. Shortly before the wall fewer are ridden over: the fine search begins half a rough ring
+/// Prevents a rough detector that stops at specks in the fluid. What it still finds at three fine steps are
+/// overlapping specks. Shortly before the wall fewer are passed over: the fine search begins half a rough ring
 /// and a fine one before where the rough one fires.
 #[test]
-fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
+fn only_long_steps_pass_over_specks_in_the_fluid() {
     let device = Device::new();
     let shares = [1, 2, 3, 4].map(|rough| specks(&device, &format!("threshold = 0.4\nrough = {rough}"), [34.0, 90.0]));
     println!("shares of specks and of walls found, by the rough step: {shares:.4?}");
     let [one, two, three, four] = shares;
-    // Measured: 1.0, 0.270, 0.0136, 0.0099; the rest are walls.
+    // Measured: 1.0, 0.270, 0.0136, 0.0099; the others are walls.
     assert!(one.0 > 0.97, "without a rough detector specks are surfaces: {one:?}");
     assert!(two.0 < 0.35, "{two:?}");
     assert!(three.0 < 0.03 && four.0 < 0.03, "{three:?}, {four:?}");
@@ -126,7 +126,7 @@ fn specks_in_the_fluid_are_ridden_over_by_long_steps_only() {
     assert!(near.iter().all(|(speck, wall)| speck + wall > 0.995), "walls were lost: {near:?}");
 }
 
-/// What became of the rays onto a wall, shares of all rays: a surface more than 3 steps before it, none or one more than 4
+/// Results of rays onto a wall, as shares of all rays: a surface more than 3 steps before it, none or one more than 4
 /// steps behind it; and the error of the others, RMS in steps.
 #[derive(Debug)]
 struct Found {
@@ -199,12 +199,12 @@ fn speckle(noise: &mut Noise, deviation: f64, looks: usize) -> (Vec<f64>, f64) {
     (values, edge)
 }
 
-/// Prevents an adaptive detector that is not worth its name. By the plain threshold of a tenth, noise and speckle are
-/// surfaces before the wall on most rays; by the adaptive one on few, for next to no wall lost and none placed worse.
-/// The limits are what was measured (llvmpipe; the noise is the same everywhere), times 1.2 and 0.003. What is lost are walls
+/// Prevents an adaptive detector without an advantage. With the plain threshold of a tenth, noise and speckle are
+/// surfaces before the wall on most rays; with the adaptive one on few, with hardly a wall lost and none placed worse.
+/// The limits are the measured values (llvmpipe; the noise is the same everywhere) times 1.2 plus 0.003. The lost walls are those
 /// whose height is three deviations of the noise or less.
 #[test]
-fn the_adaptive_detector_is_led_astray_less_than_the_plain_one_and_misses_no_more() {
+fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
     let device = Device::new();
     type Make<'a> = &'a dyn Fn(&mut Noise) -> (Vec<f64>, f64);
     // Shares of early surfaces and of lost walls, by rough step 1 and 2.
@@ -240,17 +240,17 @@ fn the_adaptive_detector_is_led_astray_less_than_the_plain_one_and_misses_no_mor
             if right(&plain) > 0.02 {
                 assert!(adaptive.steps <= 1.05 * plain.steps + 0.001, "placed worse, {what}");
             }
-            // The lasting one is the adaptive one where there is no speck.
+            // Without specks the lasting detector equals the adaptive one.
             assert!(lasting.early <= adaptive.early && lasting.missed <= adaptive.missed + 0.01, "{what}");
             assert!(lasting.steps <= 1.05 * adaptive.steps + 0.001, "{what}");
         }
     }
 }
 
-/// Prevents specks that are found by a detector that is told to pass over them, walls that are lost behind them, and thin
-/// shells that are lost where they are all there is.
+/// Prevents specks found by a detector that should ignore them, walls that are lost behind them, and thin
+/// shells that are lost where there is no other surface.
 #[test]
-fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
+fn the_lasting_detector_ignores_specks_but_not_a_thin_shell() {
     let device = Device::new();
     for rough in [1, 2, 3] {
         for gap in [[34.0, 90.0], [8.0, 16.0]] {
@@ -261,7 +261,7 @@ fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
             let (plain, lasting) = (by("threshold"), by("lasting"));
             println!("specks {gap:?} steps before the wall, rough {rough}: plain {plain:.4?}, lasting {lasting:.4?}");
             assert!(plain.0 > 0.2, "specks lead the plain detector astray, rough {rough}: {plain:?}");
-            // Specks that lie one upon another last.
+            // Overlapping specks are long enough to count.
             assert!(lasting.0 < 0.045 && lasting.1 > 0.95, "rough {rough}: {lasting:?}");
         }
     }
@@ -282,10 +282,10 @@ fn the_lasting_detector_passes_over_specks_but_not_over_a_shell_alone() {
     }
 }
 
-/// Prevents a shader that takes another way than its reference through noise, gaps, second looks and specks: on rays that
-/// are nothing but edges, in all combinations of settings. A difference within 1e-6 of its bar may go either way.
+/// Prevents a shader that branches differently from its reference in noise, gaps, repeated searches and specks: on rays that
+/// consist of edges, in all combinations of settings. A difference within 1e-6 of its limit may be decided either way.
 #[test]
-fn every_detector_follows_its_reference_through_noise() {
+fn every_detector_matches_its_reference_in_noise() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let pass = echolume::passes::by_name("raycast_surface").expect("pass");
@@ -313,7 +313,7 @@ fn every_detector_follows_its_reference_through_noise() {
             let args = DispatchArgs::default();
             let mut noise = Noise(n as u64);
             let [width, height, slices] = scene.volume_size().map(|n| n as usize);
-            // Layers along the rays, rough and smooth by turns.
+            // Layers along the rays, alternately rough and smooth.
             let columns: Vec<(Vec<f64>, f64)> = (0..width * slices).map(|_| speckle(&mut noise, 1.5, 1)).collect();
             let blob = |y: usize| 0.5 + 0.5 * (y as f64 * 0.35).sin();
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
@@ -344,7 +344,7 @@ fn every_detector_follows_its_reference_through_noise() {
                 pairs.filter(|(e, g)| (*e - *g).abs() > 2e-3 && (is_hit(**e) || is_hit(**g))).count()
             };
             let off = differ(expected);
-            // Told of a quarter more noise, the reference must go another way.
+            // With a quarter more noise, the reference must branch differently.
             let mut wrong = scene.clone();
             wrong.settings.surface.noise *= 1.25;
             (pass.reference)(&wrong, &args, &inputs, &mut mistaken);

@@ -79,7 +79,7 @@ fn aos_step(u: &Texels, tau: f64, conductance: impl Fn(f64) -> f64) -> Texels {
 }
 
 #[test]
-fn aos_is_what_dense_solves_give() {
+fn aos_equals_dense_solves() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let quotient = |k: f64| move |g: f64| 1.0 / (1.0 + (g / k).powi(2));
@@ -160,7 +160,7 @@ fn aos_converges_to_the_equation_with_first_order() {
     assert!(errors.windows(2).all(|e| e[1] < e[0]));
 }
 
-/// Stable at any step, though not accurate: a dial.
+/// Stable at any step, though not accurate: the step is a dial.
 #[test]
 fn errors_of_large_aos_steps_over_a_time_of_100() {
     let device = Device::new();
@@ -185,13 +185,13 @@ fn checkerboard(size: [usize; 2]) -> Texels {
     texels(size, |x, y| ((x + y) % 2) as f64)
 }
 
-/// The worst case of the explicit scheme, which noise hides.
+/// The worst case of the explicit scheme, which noise would hide.
 #[test]
 fn a_checkerboard_flips_at_a_quarter_and_would_grow_above() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let board = checkerboard([24, 20]);
-    // With no edges the border's pixels, of two or three neighbours, are all that damps; they reach a pixel inwards a step.
+    // Without edges only the border pixels, with two or three neighbours, damp; their effect moves inwards by a pixel a step.
     for steps in [1usize, 2, 5] {
         let scene = plane([24, 20], &format!("perona_malik = {{ edge = inf, step = 0.25, repeat = {steps} }}"));
         let got = on_device(&mut single, &scene, "perona_malik_slice", &board);
@@ -203,7 +203,7 @@ fn a_checkerboard_flips_at_a_quarter_and_would_grow_above() {
             }
         }
     }
-    // What the refusal is for: past the check, the formula overshoots at once and at every further step more.
+    // The reason of the refusal: beyond the limit the formula overshoots at once, and more at every further step.
     let mut scene = plane([24, 20], "perona_malik = { edge = inf, step = 0.25, repeat = 10 }");
     scene.settings.slices.perona_malik.as_mut().expect("settings").step = 0.26;
     let grown = by_reference(&scene, "perona_malik_slice", &board);

@@ -1,4 +1,4 @@
-//! Rays that leap over bricks make the same picture bit for bit as rays that take every sample; and do leap.
+//! Empty-space skipping: rays that skip bricks make the same picture, bit for bit, as rays that take every sample; and bricks are skipped.
 
 use crate::common::gpu::*;
 use echolume::gpu::Renderer;
@@ -88,7 +88,7 @@ const RAYS: [&str; 7] = [
 const CAMERAS: [&str; 3] =
     ["azimuth = 25, elevation = -15, field_of_view = 35", "elevation = 90", "azimuth = 170, elevation = 3, zoom = 2"];
 
-/// What stages 2 leave behind, whatever of it the scene has.
+/// The results of stage 2 that the scene has.
 const RESULTS: [Slot; 6] = [Slot::Distance, Slot::Surface, Slot::Veil, Slot::Rendered, Slot::Picture, Slot::Screen];
 
 fn results(renderer: &mut Renderer) -> Vec<(Slot, Vec<u64>)> {
@@ -98,7 +98,7 @@ fn results(renderer: &mut Renderer) -> Vec<(Slot, Vec<u64>)> {
     slots.into_iter().map(|s| (s, bits(renderer.read(s).expect("read").expect("image")))).collect()
 }
 
-/// Bricks that rays leap over, and over several at once: their share of all.
+/// Bricks that rays skip, singly or several at once: their share of all.
 fn leapt(renderer: &mut Renderer) -> [f64; 2] {
     let mut shares = [0.0f64; 2];
     for slot in [Slot::SurfaceLeaps, Slot::VolumeLeaps] {
@@ -113,12 +113,12 @@ fn leapt(renderer: &mut Renderer) -> [f64; 2] {
 }
 
 #[test]
-fn leaping_changes_no_bit_of_any_mode() {
+fn empty_space_skipping_changes_no_bit_in_any_mode() {
     let device = Device::new();
     let (mut tried, mut leapt_far) = (0, 0);
     for (g, (name, geometry)) in geometries().iter().enumerate() {
         for (m, mode) in MODES.iter().enumerate() {
-            // Every mode meets every second geometry, a fan and a Cartesian volume in any case; rays and cameras take turns.
+            // Every mode has every second geometry, with a fan and a Cartesian volume in any case; rays and cameras alternate.
             if (1..7).contains(&g) && (g + m) % 2 == 1 {
                 continue;
             }

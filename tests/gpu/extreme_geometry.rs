@@ -1,20 +1,17 @@
-//! Extreme geometries, cameras and pictures (a test a case): drawn as the f64 reference draws them, or refused in one line that
-//! names what is wrong.
+//! Extreme geometries, cameras and pictures, one test a case: drawn as by the f64 reference, or refused in one line that
+//! names the fault.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::plan::Plan;
 use echolume::probe::{Advance, Array, Axis, Geometry, Grid, Motion, Probe};
 use echolume::reference;
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 use std::f64::consts::PI;
 
-fn settings(toml: &str) -> Settings {
-    toml::from_str(toml).expect("settings")
-}
-
-/// What a speck of tissue in fluid gives, smooth over a few samples of any lattice: a function of the frame's own indices.
+/// A speck of tissue in fluid, smooth over a few samples of any lattice: a function of the indices of the frame.
 fn tissue(scene: &Scene) -> Vec<Texels> {
     let [samples, lines] = scene.frame_size().map(f64::from);
     frames(scene, |[i, j, k]| {
@@ -23,7 +20,7 @@ fn tissue(scene: &Scene) -> Vec<Texels> {
     })
 }
 
-/// Draws a scene in volume mode and compares it with the f64 reference; the share of the picture that shows something.
+/// Draws a scene in volume mode and compares it with the f64 reference. Returns the share of lit pixels.
 fn drawn_as_the_reference(device: &Device, name: &str, scene: Scene) -> f64 {
     let frames = tissue(&scene);
     let mut renderer = rendered(device, scene.clone(), &frames);
@@ -33,7 +30,7 @@ fn drawn_as_the_reference(device: &Device, name: &str, scene: Scene) -> f64 {
     let off = |i: usize| (picture.values[i] - expected.values[i]).abs() > 0.02;
     let wrong = (0..picture.values.len()).filter(|i| off(*i)).count() as f64 / picture.values.len() as f64;
     assert!(picture.values.iter().all(|v| (0.0..=1.0).contains(v)), "{name}: a pixel leaves 0..1");
-    // A ray along the very border of the insonified region may fall on either side.
+    // A ray along the border of the insonified region may count as inside or outside.
     assert!(wrong < 0.02, "{name}: {:.1} % of the picture are not the reference's", 100.0 * wrong);
     picture.values.chunks_exact(4).filter(|c| c[3] > 0.0).count() as f64 * 4.0 / picture.values.len() as f64
 }
@@ -84,7 +81,7 @@ const OBLIQUE: &str = "picture = { size = [28, 24] }
 
 /// Row: Ra = 0, Rw = 0, single frame, T and F near 180 deg, 1:1000 anisotropy.
 #[test]
-fn probes_at_the_ends_of_what_is_built_are_drawn() {
+fn probes_at_the_limits_of_what_is_built_are_drawn() {
     let device = Device::new();
     let still =
         |probe: Probe| Probe { motion: Motion::Still { thickness: 2.0 }, slices: Axis::centred(1.0, 1), ..probe };
@@ -133,7 +130,7 @@ fn probes_at_the_ends_of_what_is_built_are_drawn() {
     }
     for spacing in [[1.0, 1000.0, 1.0], [1000.0, 1.0, 1.0], [1.0, 1.0, 1000.0], [1e-3, 1.0, 1.0]] {
         let grid = Geometry::Cartesian(Grid { size: [12, 10, 9], spacing, origin: [0.0; 3] });
-        // Near enough that a pixel is less than the width of the needle.
+        // Near enough that a pixel is narrower than the needle.
         let near = OBLIQUE.replace("elevation = 35", "elevation = 35, zoom = 100");
         let scene = |mode: &str| scene(grid.clone(), BYTES, &format!("mode = '{mode}'\n{near}"));
         let seen = drawn_as_the_reference(&device, "anisotropic voxels", scene("vr"));
@@ -142,9 +139,9 @@ fn probes_at_the_ends_of_what_is_built_are_drawn() {
     }
 }
 
-/// Row: single line, F = 0, and what has no picture: a clear error at load.
+/// Row: single line, F = 0, and geometries without a picture: a clear error at load.
 #[test]
-fn probes_that_place_nothing_are_refused_by_name() {
+fn probes_without_a_valid_geometry_are_refused_by_name() {
     let plain = fan(20.0, 12.0, 2.0, 1.1, 0.6);
     let cases = [
         ("single line", Probe { lines: Axis::centred(0.1, 1), ..plain.clone() }, "scan lines", "at least 2"),
@@ -166,7 +163,7 @@ fn probes_that_place_nothing_are_refused_by_name() {
         assert!(refused.contains(field) && refused.contains(fault), "{name}: {refused}");
         assert_eq!(refused.lines().count(), 1, "{name}");
     }
-    // A thousandth of a thousandth: more steps than a ray may have, and which setting helps.
+    // A millionth: more steps than a ray may have; the message names the setting that helps.
     let grid = Grid { size: [64, 64, 64], spacing: [1e-4, 1.0, 1.0], origin: [0.0; 3] };
     let refused = Scene::new(Geometry::Cartesian(grid), BYTES, settings("")).expect_err("steps").to_string();
     assert!(refused.contains("ray.step") && refused.contains("65536"), "{refused}");
@@ -201,12 +198,12 @@ fn cameras_inside_and_rays_along_faces_see_what_the_reference_sees() {
     }
 }
 
-/// A ray within a face of the box, and one just beside it: Beer's law inside, nothing outside, no number that is none.
+/// A ray within a face of the box, and one next to it: Beer's law inside, nothing outside, no NaN.
 #[test]
-fn a_ray_within_a_face_is_no_number_that_is_none() {
+fn a_ray_within_a_face_gives_no_nan() {
     let device = Device::new();
     let block = Geometry::Cartesian(Grid { size: [20, 20, 20], spacing: [1.0; 3], origin: [0.5; 3] });
-    // 40 pixels of 0.5 mm over 20 mm, shifted by half a pixel: some rays run in the faces x = 0 and x = 20 to the last bit.
+    // 40 pixels of 0.5 mm over 20 mm, shifted by half a pixel: some rays run exactly in the faces x = 0 and x = 20.
     for shift in [0.0, 0.25, 0.5] {
         let toml = format!(
             "mode = 'vr'\npicture = {{ size = [80, 80] }}\ncamera = {{ zoom = 0.5, target = [{}, 10.0, {}] }}\n\
@@ -270,7 +267,7 @@ fn pictures_of_one_pixel_and_of_16384_by_one_are_drawn_and_larger_ones_refused()
             scene(Geometry::Sweep(wobbler()), BYTES, &toml.replace("'vr'", "'sr'")),
         );
     }
-    // As a plan: it is allocated only where there is room for it.
+    // As a plan only: it is not allocated.
     let largest = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\npicture = { size = [16384, 16384] }");
     let plan = Plan::new(&largest);
     assert_eq!(Slot::Picture.bytes(&largest), 16384 * 16384 * 8);

@@ -1,6 +1,6 @@
-//! Stiff and extreme cases of light, samples and distance maps, a test a case (those of time stamps are `echolume verify`'s); those of geometry and pictures are
-//! in `extreme_geometry`. Rows of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot pixels, windows wider
-//! than the picture) are in `filters` and, against every reference, in `passes`.
+//! Stiff and extreme cases of light, samples and distance maps, one test a case. Cases of time stamps are in `echolume verify`, those of
+//! geometry and pictures in `extreme_geometry`, those of filters (diffusion beyond its step limit, sigma of 0 and infinity, hot
+//! pixels, windows wider than the picture) in `filters` and, against every reference, in `passes`.
 
 use crate::common::gpu::*;
 use crate::common::program;
@@ -12,7 +12,7 @@ use echolume::scene::{Input, transfer};
 use echolume::source::Recording;
 use half::f16;
 
-/// One ray through `voxels` of constant opacity in steps of `step` voxels, and what it gathers, against 1 - exp(-y).
+/// One ray through `voxels` of constant opacity in steps of `step` voxels: its accumulated opacity against 1 - exp(-y).
 struct Medium {
     voxels: usize,
     step: f64,
@@ -20,7 +20,7 @@ struct Medium {
 }
 
 impl Medium {
-    /// Absorption of the whole path.
+    /// Absorption of the complete path.
     fn depth(&self) -> f64 {
         self.voxels as f64 * transfer::absorption(self.opacity)
     }
@@ -41,10 +41,10 @@ impl Medium {
         renderer.read(Slot::Picture).expect("read").expect("there").get([1, 1, 0]).to_vec()
     }
 
-    /// Whether the shader's own f32 result lies within `share` of `expected`. The picture is R16F, whose 11 bits cannot tell; but
-    /// which of two neighbouring R16F values a colour c times the result is stored as tells on which side of their border b it
-    /// lies, so with c = b / (expected (1 +- share)) the two colours must fall on different sides. Where the border lies is the
-    /// device's choice: `rounds` to the nearest, or cuts off.
+    /// True if the f32 result of the shader is within `share` of `expected`. The 11 bits of the R16F picture cannot show it; but
+    /// the choice between two neighbouring R16F values for a colour c times the result shows on which side of their border b it
+    /// is, so with c = b / (expected (1 +- share)) the two colours must fall on different sides. The border depends on the
+    /// device: it `rounds` to the nearest, or truncates.
     fn is_within(&self, device: &Device, rounds: bool, expected: f64, share: f64) -> bool {
         let low = f16::from_f64(0.9 * expected);
         let high = f16::from_bits(low.to_bits() + 1);
@@ -56,7 +56,7 @@ impl Medium {
     }
 }
 
-/// Whether what is stored as R16F is rounded to the nearest (Vulkan leaves it open): told by a colour beyond the middle of two
+/// True if storing as R16F rounds to the nearest (Vulkan leaves it open): found with a colour beyond the middle of two
 /// neighbours, behind an opaque step.
 fn rounds(device: &Device) -> bool {
     let (low, high) = (f16::from_f64(0.75), f16::from_bits(f16::from_f64(0.75).to_bits() + 1));
@@ -74,7 +74,7 @@ fn opacity_keeps_five_digits_from_absorptions_of_a_millionth_to_a_million() {
     let mut media: Vec<Medium> =
         single.map(|y| Medium { voxels: 1, step: 1.0, opacity: transfer::opacity(y) }).collect();
     media.push(Medium { voxels: 1, step: 1.0, opacity: 1.0 });
-    // 1e4 samples of a = 1e-4 each (0.0025 voxels long), and a thousand and one that leave a part of a step.
+    // 1e4 samples of a = 1e-4 each (0.0025 voxels long), and a thousand and one with a fraction of a step.
     media.push(Medium { voxels: 25, step: 0.0025, opacity: -(400.0 * (-1e-4f64).ln_1p()).exp_m1() });
     media.push(Medium { voxels: 25, step: 0.02497, opacity: 0.03 });
     // 1e4 samples of kappa ds = 1e-6.
@@ -85,7 +85,7 @@ fn opacity_keeps_five_digits_from_absorptions_of_a_millionth_to_a_million() {
         let said = format!("{} voxels of {} in steps of {}", medium.voxels, medium.opacity, medium.step);
         assert!(medium.is_within(&device, rounds, expected, 1e-5), "{said}: more than 1e-5 from {expected}");
     }
-    // The measure itself: three times the error allowed, either way, is seen.
+    // The measurement itself: three times the allowed error, in either direction, is detected.
     for medium in [&media[6], &media[21], &media[22]] {
         let expected = transfer::opacity(medium.depth());
         for wrong in [expected * (1.0 + 3e-5), expected * (1.0 - 3e-5)] {
@@ -113,9 +113,9 @@ fn more_absorption_is_never_less_opaque() {
     }
 }
 
-/// Row: NaN, Inf, denormal and negative samples. (What is counted and stored: `sources`.)
+/// Row: NaN, Inf, denormal and negative samples. (Counting and storing: tests/io/sources.)
 #[test]
-fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
+fn non_finite_samples_reach_no_pass() {
     let device = Device::new();
     let hostile = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-40, -1e-42, -3.0, f32::MIN_POSITIVE / 2.0];
     let folder = Folder::new("extremes");
@@ -155,13 +155,13 @@ fn samples_that_are_no_numbers_are_not_seen_by_any_pass() {
         ((recording.replaced(), recording.flushed()), pictures)
     };
     let ((replaced, flushed), dirty) = drawn("dirty.mha", values(&|v| v));
-    // 720 bad samples: three kinds not finite, three denormal, one negative, which is a number.
+    // 720 bad samples: three kinds not finite, three denormal, one negative, which is valid.
     let of = |kinds: &[usize]| (0..720).filter(|n| kinds.contains(&(n % 7))).count() as u64;
     assert_eq!((replaced, flushed), (of(&[0, 1, 2]), of(&[3, 4, 6])));
     let (counted, clean) = drawn("clean.mha", values(&|v| if v.is_normal() { v } else { 0.0 }));
     assert_eq!(counted, (0, 0));
     assert!(dirty == clean, "a replaced sample is not a sample of 0");
-    // Reported once, however many frames have them, and counted in what is said of the file.
+    // Reported once, however many frames have them, and counted in the facts of the file.
     let (_, said, warned) = program::run(&["info", &folder.path("dirty.mha")]);
     assert_eq!(warned.matches("read as 0").count(), 1, "{warned}");
     assert!(said.contains(&format!("{replaced} not finite, {flushed} denormal")), "{said}");
@@ -203,7 +203,7 @@ fn a_cliff_at_infinity_leaves_the_surface_before_it_alone() {
                 assert!(off.is_none(), "{pass} draws the surface to {off:?}");
             }
             for pass in ["shadow", "occlusion", "light"] {
-                // What light from behind or along the plane reaches of it adds nothing to the colour, and may go round its edge.
+                // Light from behind or along the plane adds nothing to the colour, and may pass its edge.
                 let unseen = pass == "shadow" && !is_lit;
                 let (whole, cut) = (run(&device, &scene, pass, &whole), run(&device, &scene, pass, &half));
                 for (i, (a, b)) in whole.values.iter().zip(&cut.values).enumerate() {
@@ -218,11 +218,11 @@ fn a_cliff_at_infinity_leaves_the_surface_before_it_alone() {
     }
 }
 
-/// Row: light on the surface: it stands on a point that was hit, and on the middle of a hollow.
+/// Row: light on the surface: at a point that was hit, and in the middle of a hollow.
 #[test]
 fn a_light_on_the_surface_itself_gives_finite_colours() {
     let device = Device::new();
-    // The plate's target lies 30 mm deep and its rays start in front of the box: the surface goes through the light.
+    // The target of the plate is 30 mm deep and its rays start in front of the box: the surface passes through the light.
     for light in ["position = [0.0, 0.0, 0.0]", "position = [0.125, 0.125, 0.0]", "position = [0.0, 0.0, 1e-6]"] {
         for shininess in ["0.0", "16.0", "1e6"] {
             let scene =
@@ -243,9 +243,9 @@ fn a_light_on_the_surface_itself_gives_finite_colours() {
     }
 }
 
-/// One hit among misses has no neighbour to make a normal from: it is lit, not black, by every light that shines on it.
+/// One hit among misses has no neighbour for a normal: every light that shines on it lights it, it is not black.
 #[test]
-fn one_hit_among_misses_is_lit() {
+fn a_single_hit_among_misses_is_lit() {
     let device = Device::new();
     let scene = plate("light = { direction = [0.2, 0.1, 0.9], shadow = {}, occlusion = {} }");
     let one = map(&scene, |x, y| if (x, y) == (120, 77) { 31.5 } else { MISS });

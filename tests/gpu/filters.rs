@@ -1,16 +1,17 @@
-//! The sigma filters: known answers, extremes, misses, what is refused; plans of every filter in a row.
+//! The sigma filters: known answers, extremes, misses, refusals; plans of every filter in a row.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::resources::shape_size;
 use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
 use echolume::plan::Plan;
-use echolume::scene::{Scene, Settings};
+use echolume::scene::Scene;
 use std::collections::BTreeMap;
 
 pub const CENTRES: [&str; 4] = ["median", "perona-malik", "gradient-inverse", "nagao-matsuyama"];
 
-/// One slice in f32, so that what a filter of slices does is seen before a volume's format rounds it.
+/// One slice in f32, so that the result of a filter is read before the volume's format rounds it.
 pub fn plane(size: [usize; 2], filters: &str) -> Scene {
     scene(cartesian([size[0], size[1], 1]), FLOATS, &format!("slices = {{ format = 'r32f', {filters} }}"))
 }
@@ -26,7 +27,7 @@ pub fn noise(size: [usize; 2], seed: u64) -> Texels {
     texels(size, |x, y| values[y * size[0] + x])
 }
 
-/// All iterations of one pass in a row, each on what the one before left.
+/// All iterations of one pass in a row, each on the result of the previous one.
 fn filtered(
     scene: &Scene,
     name: &str,
@@ -87,7 +88,7 @@ fn sigma_filters(window: u32, largest: u32, sigma: &str) -> Vec<(String, &'stati
 }
 
 #[test]
-fn a_constant_stays_and_a_hot_pixel_goes() {
+fn filters_keep_a_constant_and_remove_a_hot_pixel() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let size = [21, 15];
@@ -121,7 +122,7 @@ fn an_infinite_sigma_is_the_box_mean_and_a_sigma_of_0_is_no_pass() {
             sum / ((right - left + 1) * (high - low + 1)) as f64
         });
         for (filter, pass) in sigma_filters(window, 63, "inf") {
-            // Fewer pixels than K, which goes by the window, but all there are.
+            // Fewer pixels than K, which depends on the window, but all that exist.
             let got = on_device(&mut single, &plane(size, &filter), pass, &source);
             let error = largest_difference(&got, &mean);
             assert!(error < 1e-6, "{filter} on {size:?}: {error}");
@@ -159,7 +160,7 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
     let multiplicative = run(&mut single, "sigma = 0.1, noise = 'multiplicative'");
     let additive = run(&mut single, "sigma = 0.01");
     let (dark, bright) = (4..12, 20..29);
-    // The same share of noise is left in both halves by the one, and not by the other.
+    // The multiplicative filter leaves the same share of noise in both halves, the additive one does not.
     let even = spread(&multiplicative, bright.clone()) / spread(&multiplicative, dark.clone());
     assert!((0.8..1.25).contains(&even), "{even}");
     let uneven = spread(&additive, bright) / spread(&additive, dark);
@@ -167,12 +168,12 @@ fn noise_stays_in_range_and_multiplicative_noise_is_judged_by_the_centre() {
 }
 
 #[test]
-fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
+fn no_filter_of_distances_invents_a_surface() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let mut random = Noise(2);
     let rough: Vec<f64> = (0..80 * 80).map(|_| random.range(-0.3, 0.3)).collect();
-    // Two plates 15 mm apart, nothing below, a hole in one and a lone hit where nothing is.
+    // Two plates 15 mm apart, nothing below, a hole in one and a single hit elsewhere.
     let source = texels([80, 80], |x, y| match (x * 3 + y < 140, y > 55) {
         _ if (x, y) == (60, 70) => 38.0,
         (_, true) => MISS,
@@ -211,7 +212,7 @@ fn no_growing_or_flowing_filter_of_distances_invents_a_surface() {
 }
 
 #[test]
-fn what_no_filter_can_do_is_refused_by_name_and_limit() {
+fn filter_settings_beyond_a_limit_are_refused_by_name_and_limit() {
     for (toml, words) in [
         ("distance = { sigma = { noise = 'multiplicative' } }", ["distance.sigma", "additive"]),
         ("distance = { enhanced_sigma = { noise = 'multiplicative' } }", ["distance.enhanced_sigma", "additive"]),
@@ -230,13 +231,13 @@ fn what_no_filter_can_do_is_refused_by_name_and_limit() {
         ("slices = { smooth = { kernel = 4 } }", ["slices.smooth.kernel", "3 or 5"]),
         ("slices = { smooth = { kernel = 3, depth = 1.0 } }", ["slices.smooth.kernel", "instead"]),
     ] {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings = settings(toml);
         let error = Scene::new(cartesian([8, 8, 8]), BYTES, settings).expect_err(toml).to_string();
         assert!(words.iter().all(|w| error.contains(w)) && !error.contains('\n'), "{toml}: {error}");
     }
 }
 
-/// Every step of a plan that runs at `when`, by its references, from what the slots hold.
+/// Runs the references of every step of a plan with this frequency on the contents of the slots.
 pub fn run_by_references(scene: &Scene, frequency: Frequency, slots: &mut BTreeMap<Slot, Texels>) {
     for (_, step) in Plan::new(scene).steps_of(frequency) {
         let args = DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() };
@@ -277,7 +278,7 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
         let error = largest_difference(&read(Slot::Volume), &slots[&Slot::Volume]);
         // Rounding before a sigma filter may move a pixel across its range's edge: none does here.
         assert!(error < 5e-6, "{after}: slices are {error} off");
-        // From the picture that stage 2 made, through the filters of stage 4.
+        // From the picture of stage 2, through the filters of stage 4.
         let mut slots = BTreeMap::from([(Slot::Picture, read(Slot::Picture))]);
         let end = echolume::passes::chain::picture_end(&scene);
         for pass in ["sigma_picture", "perona_malik_picture", "aos_picture"].map(|n| by_name(n).expect("pass")) {

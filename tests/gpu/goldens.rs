@@ -1,4 +1,4 @@
-//! Few stored pictures, made by the f64 reference, so that no driver is the truth. `tools/goldens` makes them anew.
+//! A few stored pictures, made by the f64 reference, so that no driver is the truth. `tools/goldens` regenerates them.
 
 use crate::common::gpu::*;
 use echolume::passes::{Slot, Texels};
@@ -58,7 +58,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 #[test]
-fn pictures_match_the_stored_ones_that_the_reference_made() {
+fn pictures_match_the_goldens_of_the_reference() {
     let device = Device::new();
     for (name, scene, frames) in goldens() {
         let expected = as_picture(&reference::render(&scene, &frames)[&Slot::Screen]);
@@ -66,7 +66,7 @@ fn pictures_match_the_stored_ones_that_the_reference_made() {
             std::fs::create_dir_all(file(name).parent().expect("folder")).expect("folder");
             expected.save(&file(name)).expect("saved");
         }
-        // Missing is a failure.
+        // A missing file is a failure.
         let stored = Picture::load(&file(name)).expect("golden");
         let (_, largest) = difference(&expected, &stored);
         assert!(
@@ -76,7 +76,7 @@ fn pictures_match_the_stored_ones_that_the_reference_made() {
         let got = rendered(&device, scene, &frames).picture().expect("picture");
         let (mean, largest) = difference(&got, &stored);
         println!("{name}: mean difference {mean:.4}, largest {largest}");
-        // A level or so of rounding; a surface's edge may move by a pixel where a threshold is met.
+        // About a level of rounding; the edge of a surface may move by a pixel at the threshold.
         if mean > 0.25 {
             let failed = std::env::temp_dir().join(format!("echolume-{name}"));
             got.save(&failed.with_extension("actual.png")).expect("saved");

@@ -1,4 +1,4 @@
-//! The estimators of the enhanced sigma filter by hand, and the growth of its windows against a count by brute force.
+//! The estimators of the enhanced sigma filter against values by hand, and the growth of its windows against a brute-force count.
 
 use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
@@ -36,7 +36,7 @@ fn estimators_by_hand() {
     assert!((got - 0.2).abs() < 1e-7, "{got}");
     let got = run("estimator = 'median'", [3, 3], &star, [1, 1]);
     assert!((got - 0.4).abs() < 1e-7, "{got}");
-    // A dark stripe beside a bright slope: the mask that leans away from the stripe varies least, 24/49 of a squared step of
+    // A dark stripe next to a bright slope: the mask away from the stripe varies least, 24/49 of a squared step of
     // the slope against 28/49 towards its corners; it holds the pixel, three a step on, and three two steps on.
     let step = texels([7, 7], |x, _| if x < 3 { 0.1 } else { 0.8 + 0.01 * x as f64 });
     let got = run("estimator = 'nagao-matsuyama'", [7, 7], &step, [3, 3]);
@@ -55,7 +55,7 @@ fn planes_take_perona_malik_for_a_centre_and_renderings_the_median() {
     }
 }
 
-/// How far a window grows, counted by brute force, and whether a pixel lies so near the range's end that f32 may differ.
+/// How far a window grows, by a brute-force count, and whether a pixel is so near the end of the range that f32 may differ.
 fn grown(source: &Texels, centre: f64, at: [usize; 2], e: echolume::scene::EnhancedSigma) -> (u32, bool) {
     let range = 2.0 * e.sigma;
     let count = |radius: i64, close: &dyn Fn(f64) -> bool| {
@@ -88,7 +88,7 @@ fn growth_is_what_a_count_by_brute_force_finds() {
         );
         let scene = plane(size, &filter);
         let e = scene.settings.slices.enhanced_sigma.expect("enhanced");
-        // Through the renderer: the map is what the plan keeps.
+        // Through the renderer: the map that the plan keeps.
         let renderer = &mut rendered(&device, scene.clone(), std::slice::from_ref(&source));
         renderer.picture().expect("picture");
         let map = renderer.read(Slot::Growth).expect("read").expect("there");
@@ -133,7 +133,7 @@ fn growth_beyond_the_sector_does_not_count() {
         let (x, y) = scene.grid.place(column as f64, row as f64);
         let beyond = (x.atan2(y).abs() - 0.05 * 11.5) * x.hypot(y);
         let outside = beyond.max(22.0 - x.hypot(y)).max(x.hypot(y) - 22.0 - 63.0 * 0.8);
-        // Pixels of the rim, whichever side they are on, are like those inside.
+        // Pixels on both sides of the border are similar to those inside.
         if outside > 1.0 { 3.0 } else { 1.0 }
     });
     assert!(map.values.iter().filter(|v| **v == 3.0).count() > 500);
@@ -171,8 +171,8 @@ fn the_larger_a_window_starts_the_more_often_it_grows() {
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         whole.push(shares);
     }
-    // More pixels have to be alike at once.
+    // More pixels have to be similar at once.
     assert!(whole.windows(2).all(|w| w[1][0] < w[0][0]), "{whole:?}");
-    // And few are cut off where the tables end.
+    // Few are cut off where the tables end.
     assert!(whole.iter().all(|s| s.last().is_some_and(|last| *last < 0.05)), "{whole:?}");
 }

@@ -1,6 +1,7 @@
-//! Half the rays along each edge while a view moves: the same view, near enough, and back to all of it.
+//! Half the rays along each edge while a view moves: nearly the same view, and full resolution afterwards.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::Renderer;
 use echolume::passes::{PASSES, Stage};
 use echolume::plan::Rerun;
@@ -43,11 +44,9 @@ fn a_ray_of_four_pixels_goes_through_their_common_corner() {
 
 #[test]
 fn filters_span_as_much_of_the_picture_with_half_the_rays() {
-    let distance: Distance = toml::from_str(
-        "median = 15\nbilateral = { pixels = 4.0, distance = 1.0 }\nsigma = { window = 3 }
-         enhanced_sigma = { window = 5, largest = 19 }\nperona_malik = { step = 0.2, repeat = 5 }",
-    )
-    .expect("settings");
+    let toml = "median = 15, bilateral = { pixels = 4.0, distance = 1.0 }, sigma = { window = 3 }, \
+                enhanced_sigma = { window = 5, largest = 19 }, perona_malik = { step = 0.2, repeat = 5 }";
+    let distance = settings(&format!("distance = {{ {toml} }}")).distance;
     let half = distance.halved();
     assert_eq!(half.median, 7);
     assert_eq!(half.bilateral.map(|b| (b.pixels, b.distance, b.repeat)), Some((2.0, 1.0, 1)));
@@ -57,7 +56,7 @@ fn filters_span_as_much_of_the_picture_with_half_the_rays() {
     let diffused = half.perona_malik.expect("diffusion");
     assert!((diffused.step * f64::from(diffused.repeat) - 0.25).abs() < 1e-12 && diffused.step <= 0.2);
     assert_eq!(Distance::default().halved(), Distance::default());
-    let refused = toml::from_str("ray = { half = true, rays = 2 }").expect("settings");
+    let refused = settings("ray = { half = true, rays = 2 }");
     let error = Scene::new(Geometry::Sweep(wobbler()), BYTES, refused).unwrap_err().to_string();
     assert!(error.contains("ray.half"), "{error}");
 }

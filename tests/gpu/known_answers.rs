@@ -1,4 +1,4 @@
-//! Normals by formula. What a device draws of scenes whose answer is one is `verify`'s to say.
+//! Normals by formula. Pictures with analytic answers are checked by `verify`.
 
 use crate::common::gpu::*;
 use echolume::passes::shade::normal;

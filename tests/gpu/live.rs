@@ -1,6 +1,7 @@
-//! Frames that arrive while pictures are drawn: what is shown is what was sent, whole, on one, two and three queues.
+//! Frames that arrive while pictures are drawn: pictures show complete sent volumes, on one, two and three queues.
 
 use crate::common::gpu::*;
+use crate::common::scenes;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
 use echolume::passes::{Slot, Texels};
@@ -13,8 +14,8 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// A device whose one queue stands for so many: the layers of 1.3.239 know no timeline semaphores, so where one queue plays several
-/// they call everything between submissions a hazard. Anything else fails the test all the same.
+/// A device whose single queue acts as several: the layers of 1.3.239 ignore timeline semaphores, so they report every pair of
+/// submissions as a hazard then. Any other message fails the test.
 struct Playing {
     device: Device,
     queues: usize,
@@ -38,7 +39,7 @@ impl Drop for Playing {
     }
 }
 
-/// A source that says what it was told to, one thing after such a pause, and can wait or not.
+/// A source that yields prepared events with pauses, and can wait or not.
 pub struct Told(pub VecDeque<Event>, pub Duration, pub bool);
 
 impl Live for Told {
@@ -52,7 +53,7 @@ impl Live for Told {
     }
 }
 
-/// The wobbler, whose motor goes on during a frame.
+/// The wobbler with a motor that moves during a frame.
 fn moving(share: f64) -> Probe {
     let probe = wobbler();
     Probe { advance: Advance::Same(share * probe.slices.pitch()), ..probe }
@@ -69,14 +70,13 @@ pub fn header(share: f64) -> Header {
 
 pub fn settings(toml: &str) -> Settings {
     let small = "picture = { size = [24, 24] }\nslices = { pixels = 40, format = 'r8'";
-    toml::from_str(&match toml.split_once("slices.") {
+    scenes::settings(&match toml.split_once("slices.") {
         Some((before, after)) => format!("{before}\n{small}, {after} }}"),
         None => format!("{toml}\n{small} }}"),
     })
-    .expect("settings")
 }
 
-/// A volume of a sweep, its frames in order of acquisition: every second one backwards, each sample from its place.
+/// A volume of a sweep with its frames in order of acquisition: every second one backwards, each sample from its position.
 pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
     let (slices, bytes) = (9, 24 * 64);
     let frame = |n: u32| {
@@ -88,7 +88,7 @@ pub fn volume(number: u32, value: impl Fn(usize, usize) -> u8) -> Vec<Frame> {
     (0..slices).map(frame).collect()
 }
 
-/// Each slice carries the number of its sweep.
+/// The samples of each slice hold the number of its sweep.
 pub fn stamped(number: u32) -> Vec<Frame> {
     volume(number, |_, _| 10 * number as u8 + 5)
 }
@@ -98,7 +98,7 @@ pub fn speckled(number: u32) -> Vec<Frame> {
     volume(number, |slice, i| (hash(slice, i).wrapping_mul(2_654_435_761) >> 24) as u8)
 }
 
-/// Drives a stream to its end; `each` looks at it after each picture.
+/// Steps a stream to its end; `each` runs after each picture.
 pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::FinishedPicture)) -> Vec<String> {
     let (mut faults, begun) = (Vec::new(), Instant::now());
     loop {
@@ -114,7 +114,7 @@ pub fn run(stream: &mut Stream, mut each: impl FnMut(&mut Stream, live::Finished
 }
 
 pub fn stream(device: &Device, events: Vec<Event>, settings: Settings, options: live::StreamOptions) -> Stream {
-    // Where each frame is shown there is time for a picture between some of them.
+    // With rolling updates there is time for a picture between some frames.
     let pause = Duration::from_millis(if options.update == Update::Rolling { 20 } else { 0 });
     stream_of(device, Told(events.into(), pause, true), settings, options)
 }
@@ -132,9 +132,9 @@ pub fn volume_of(renderer: &mut Renderer) -> Texels {
     renderer.read(Slot::Volume).expect("read").expect("there")
 }
 
-/// Prevents a picture of two sweeps: each slice carries the number of its own, and the device draws slower than frames come.
+/// Prevents a picture of two sweeps: each slice holds the number of its sweep, and the device draws slower than frames arrive.
 #[test]
-fn a_whole_volume_is_never_mixed() {
+fn a_complete_volume_never_mixes_frames_of_two() {
     for (images, queues, waits) in [(2, 1, false), (3, 1, true), (2, 3, true), (3, 2, false), (3, 3, true)] {
         let playing = Playing::new(queues);
         let device = &playing.device;
@@ -169,10 +169,10 @@ fn a_whole_volume_is_never_mixed() {
     }
 }
 
-/// Prevents work that grows with time: once all ways of a sweep have been seen, frames and pictures take no memory of the device, no
-/// pipeline and no wait for all of it.
+/// Prevents work that grows with time: once all sweep directions have occurred, frames and pictures need no device memory, no
+/// pipeline and no wait for the device to be idle.
 #[test]
-fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
+fn a_running_stream_allocates_and_compiles_nothing_and_never_stalls() {
     let device = Device::new();
     for (update, toml) in [
         (Update::Whole, "mode = 'sr'\nslices.smooth = { elevation = 1.0 }"),
@@ -188,7 +188,7 @@ fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
         let (mut before, mut pictures) = (None, 0);
         run(&mut stream, |_, shown| {
             pictures += 1;
-            // Forwards, backwards, and rolling a mixture.
+            // Forward, backward, and mixed while rolling.
             if shown.volume >= 2 {
                 assert_eq!(*before.get_or_insert_with(count), count(), "{update:?}: {toml}");
             }
@@ -197,9 +197,9 @@ fn a_stream_that_runs_allocates_compiles_and_idles_no_more() {
     }
 }
 
-/// Prevents rolling volumes that end otherwise than whole ones, and slices that are made anew for no reason.
+/// Prevents rolling volumes that end differently from complete ones, and slices that are filtered again without a need.
 #[test]
-fn a_rolling_volume_shows_each_frame_and_ends_as_the_whole_one() {
+fn a_rolling_volume_shows_each_frame_and_ends_as_the_complete_one() {
     for queues in 1..=3 {
         let playing = Playing::new(queues);
         let device = &playing.device;

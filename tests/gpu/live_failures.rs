@@ -1,4 +1,4 @@
-//! Streams in which something goes wrong or changes half-way: what is shown stays whole, and the rest is said.
+//! Streams with faults and changes: pictures show complete volumes, and faults are reported.
 
 use crate::common::gpu::*;
 use crate::live::*;
@@ -10,9 +10,9 @@ use echolume::source::live::Event;
 use echolume::source::recorder::Header;
 use std::time::Duration;
 
-/// Prevents a stream that stops, or shows anything wrong, for what a source does wrong.
+/// Prevents a stream that stops or shows wrong pictures because of a faulty source.
 #[test]
-fn what_is_wrong_is_said_and_left_out() {
+fn faulty_frames_are_reported_and_left_out() {
     let device = Device::new();
     let mut events = events(header(0.0), stamped(1));
     events.insert(0, Event::Frame(stamped(0).remove(0)));
@@ -24,7 +24,7 @@ fn what_is_wrong_is_said_and_left_out() {
     events.push(of(&|f| f.bytes.truncate(1000)));
     events.push(of(&|f| f.bytes.extend([0; 64])));
     events.push(of(&|f| f.bytes.truncate(64 * 20)));
-    // A number that is not to be believed: frames of volume 3 come after it.
+    // An implausible number: frames of volume 3 follow it.
     events.push(of(&|f| (f.volume, f.bytes) = (1 << 31, vec![0; 7])));
     events.push(of(&|f| f.slice = 9));
     events.push(of(&|f| f.slice = usize::MAX));
@@ -59,9 +59,9 @@ fn what_is_wrong_is_said_and_left_out() {
     }
 }
 
-/// Prevents settings that reach pictures only with the next volume, or take the stream down.
+/// Prevents settings that reach pictures only with the next volume, or end the stream.
 #[test]
-fn other_settings_are_drawn_of_the_volume_that_is_there() {
+fn new_settings_are_drawn_from_the_present_volume() {
     let device = Device::new();
     let mut stream =
         stream(&device, events(header(0.0), speckled(0)), settings("mode = 'mip'"), live::StreamOptions::default());
@@ -79,7 +79,7 @@ fn other_settings_are_drawn_of_the_volume_that_is_there() {
     assert!(volume == 0 && Some(&second) != first.as_ref());
 }
 
-/// Prevents a stream that ends with a device that was lost: the volume at hand is, the next is shown.
+/// Prevents a stream that ends with a lost device: the present volume is lost, the next one is shown.
 #[test]
 fn a_lost_device_costs_a_volume_and_not_the_stream() {
     use echolume::gpu::faults::InjectionPoint;
@@ -110,9 +110,9 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
     assert!(counts.incomplete >= 1, "{counts:?}");
 }
 
-/// Prevents volumes that are never whole where some slices are not seen and frames come line by line.
+/// Prevents volumes that are never complete if some slices are outside the visible bounds and frames arrive line by line.
 #[test]
-fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
+fn missing_slices_outside_the_visible_bounds_do_not_make_a_volume_incomplete() {
     let device = Device::new();
     let toml = "mode = 'mip'\nregion = { elevation = [-1, 1], depth = [30, 50] }";
     let lines = |frame: Frame| {
@@ -129,9 +129,9 @@ fn lines_of_slices_that_are_not_seen_do_not_keep_a_volume_from_being_whole() {
     assert!(stream.renderer().expect("begun").skipped_frames() > 0, "all slices are seen");
 }
 
-/// Prevents slices that went through stage 1 as it was before from being shown beside those after, as one whole volume.
+/// Prevents slices of stage 1 from before and after a change from being shown together as one complete volume.
 #[test]
-fn settings_that_need_frames_again_show_whole_volumes_only() {
+fn settings_that_need_new_frames_show_complete_volumes_only() {
     let device = Device::new();
     for (at, toml) in [(0, "slices.median = true"), (1, "slices.median = true"), (1, "slices.sigma = {}")] {
         let (before, after) = (settings("mode = 'mip'"), settings(&format!("mode = 'mip'\n{toml}")));
@@ -157,7 +157,7 @@ fn settings_that_need_frames_again_show_whole_volumes_only() {
                 Step::End(_) => break,
                 _ => frames += 1,
             }
-            // In the middle of the first volume, and of one behind a picture.
+            // In the middle of the first volume, and of one after a picture.
             if (pictures, frames) == (0, 5) && at == 0 || pictures == 1 && at == 1 && checked == 0 {
                 stream.change(after.clone()).expect("change");
             }
@@ -166,7 +166,7 @@ fn settings_that_need_frames_again_show_whole_volumes_only() {
     }
 }
 
-/// Prevents a frame that arrives line by line from being torn by a picture, where slices are copied many at once.
+/// Prevents a picture from tearing a frame that arrives line by line, if many slices are copied at once.
 #[test]
 fn lines_that_wait_in_a_slab_outlive_a_picture() {
     let device = Device::new();

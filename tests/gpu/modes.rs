@@ -1,5 +1,5 @@
-//! For every mode which passes and slots it has, what a change makes run again (counted from recorded dispatches), and the
-//! volume kept up to date slice by slice.
+//! For every mode: its passes and slots, reruns after a change (counted from recorded dispatches), and the
+//! incremental update of the volume by slices.
 
 use crate::common::gpu::*;
 use echolume::passes::{Slot, in_runs};
@@ -12,7 +12,7 @@ fn of(toml: &str) -> Scene {
     scene(Geometry::Sweep(wobbler()), BYTES, &format!("{toml}\npicture = {{ size = [24, 24] }}\n{slices}"))
 }
 
-/// Mode (and what belongs to it), its passes, its slots.
+/// A mode with its settings, its passes, its slots.
 const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'vr'",
@@ -91,9 +91,9 @@ fn every_mode_has_its_passes_and_slots_and_no_others() {
 
 type Change = fn(&mut Scene);
 
-/// What a change may touch: the names of the passes from which on everything that reads runs again.
+/// The effect of a change: the passes from which on all readers run again.
 #[test]
-fn in_every_mode_a_change_runs_again_what_it_touches() {
+fn in_every_mode_a_change_reruns_only_the_affected_passes() {
     let device = Device::new();
     for (mode, passes, _) in MODES {
         let base = of(mode);
@@ -104,7 +104,7 @@ fn in_every_mode_a_change_runs_again_what_it_touches() {
         let from = |first: &[&str]| -> Vec<&str> {
             all.iter().position(|p| first.contains(p)).map_or(Vec::new(), |i| all[i..].to_vec())
         };
-        // Planes and bricks lie where they lie, wherever the camera stands.
+        // Planes and bricks do not depend on the camera.
         let aside = [
             "raycast_planes",
             "tile_ranges",
@@ -152,8 +152,8 @@ fn smoothed() -> Scene {
     of("mode = 'mip'\nslices = { pixels = 40, smooth = { lateral = 1.0, elevation = 0.3 } }")
 }
 
-/// The 3D filter is kept up to date slice by slice: a new frame makes only the slices near it anew, and what comes out is what
-/// filtering the whole volume gives.
+/// The 3D filter is updated by slices: a new frame refilters only the slices near it, and the result equals
+/// that of filtering the complete volume.
 #[test]
 fn a_new_frame_refilters_only_the_slices_near_it() {
     let device = Device::new();
@@ -184,7 +184,7 @@ fn a_new_frame_refilters_only_the_slices_near_it() {
         let mut fresh = rendered(&device, smoothed(), &frames);
         fresh.picture().expect("picture");
         assert!(fresh.read(Slot::Volume).expect("read").expect("there") == volume, "{slices:?}");
-        // Nothing new: nothing to filter.
+        // No new frame: nothing to filter.
         renderer.show(0).expect("show");
         let names = renderer.dispatched_passes(|r| r.picture()).expect("picture");
         assert!(!names.contains(&"gaussian_elevation"), "{names:?}");

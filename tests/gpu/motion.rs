@@ -1,4 +1,4 @@
-//! The motor moves while a frame is acquired: what stands still must not move between sweeps forth and back.
+//! The motor moves while a frame is acquired: a fixed object must not move between forward and backward sweeps.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
@@ -7,7 +7,7 @@ use echolume::probe::{Advance, Axis, Geometry, Indices, Probe};
 use echolume::scene::Scene;
 use glam::DVec3;
 
-/// Both directions at a share of the pitch, the same with an uneven table, and forth and back mixed as while rolling.
+/// Both directions at a share of the pitch, the same with a non-uniform table, and both mixed as in rolling updates.
 fn probes() -> Vec<(&'static str, Probe)> {
     let pitch = wobbler().slices.pitch();
     let with = |advance, probe: Probe| Probe { advance, ..probe };
@@ -23,7 +23,7 @@ fn probes() -> Vec<(&'static str, Probe)> {
     ]
 }
 
-/// A field linear in range, line angle and slice position, interpolated linearly in (sample, line, slice), is itself again.
+/// Linear interpolation in (sample, line, slice) reproduces a field linear in range, line angle and slice position.
 #[test]
 fn a_linear_field_is_reproduced_in_both_directions_to_1e_12() {
     for (name, probe) in probes() {
@@ -84,8 +84,8 @@ fn space_and_indices_are_each_other_s_inverse() {
     }
 }
 
-/// A field of the slice position alone through the whole GPU: frames, scan conversion, look-up tables, sampling. One opaque
-/// sample a ray brings its value out, in windows narrow enough for R16F to tell 1e-5.
+/// A field of only the slice position through all GPU stages: frames, scan conversion, lookup tables, sampling. One opaque
+/// sample a ray shows its value, in windows narrow enough for R16F to resolve 1e-5.
 #[test]
 fn the_gpu_reproduces_a_linear_field_in_both_directions() {
     let device = Device::new();
@@ -105,7 +105,7 @@ fn the_gpu_reproduces_a_linear_field_in_both_directions() {
     }
 }
 
-/// Largest difference over a picture between the field and what a probe that was swept as `real` shows when rendered as `told`.
+/// Largest difference over a picture between the field and a rendering of frames acquired as `real` with the geometry `told`.
 fn worst_of(device: &Device, real: &Probe, told: &Probe, value: &dyn Fn(f64) -> f64) -> f64 {
     const WINDOWS: usize = 64;
     let scene_in = |window: usize| {
@@ -144,7 +144,7 @@ fn worst_of(device: &Device, real: &Probe, told: &Probe, value: &dyn Fn(f64) -> 
     worst
 }
 
-/// The field at the one sample of a pixel's ray.
+/// The field at the only sample of a pixel's ray.
 fn seen(scene: &Scene, probe: &Probe, value: &dyn Fn(f64) -> f64, x: usize, y: usize) -> Option<f64> {
     let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     assert!((direction - DVec3::Y).length() < 1e-9, "the view is along the depth axis");
@@ -156,7 +156,7 @@ fn seen(scene: &Scene, probe: &Probe, value: &dyn Fn(f64) -> f64, x: usize, y: u
         .then(|| value(position))
 }
 
-/// A ball that stands still, swept forth and back: corrected, its surface moves at most a fifth of what it moves uncorrected.
+/// A fixed ball, swept in both directions: with the correction its surface moves at most a fifth as far as without.
 #[test]
 fn a_ball_swept_both_ways_does_not_move() {
     let device = Device::new();
@@ -179,7 +179,7 @@ fn a_ball_swept_both_ways_does_not_move() {
         renderer.picture().expect("picture");
         (told, renderer.read(Slot::Distance).expect("read").expect("there"))
     };
-    // By place in space: the boxes of the two sweeps, and so the pictures, differ by the motor's travel.
+    // Compared by position in space: the boxes of the two sweeps, and so the pictures, differ by the travel of the motor.
     let apart = |a: (Scene, Texels), b: (Scene, Texels)| {
         let off_sphere = |(scene, distances): &(Scene, Texels)| {
             let mut heights = Vec::new();
@@ -197,7 +197,7 @@ fn a_ball_swept_both_ways_does_not_move() {
             heights
         };
         let centre = |heights: &[(DVec3, f64)]| {
-            // The sphere's middle in elevation, by least squares of |p|^2 = r^2 + 2 p.c over the cap.
+            // The centre of the sphere in elevation, by least squares of |p|^2 = r^2 + 2 p.c over the cap.
             let n = heights.len() as f64;
             assert!(n > 100.0, "{n} rays hit");
             let mean = |f: &dyn Fn(&DVec3) -> f64| heights.iter().map(|(p, _)| f(p)).sum::<f64>() / n;
@@ -216,9 +216,9 @@ fn a_ball_swept_both_ways_does_not_move() {
     assert!(reversed > uncorrected);
 }
 
-/// The phantom's ball, swept forth and back with the motor moving: the two distance maps, in one view.
+/// The ball of the phantom, swept in both directions with a moving motor: the two distance maps, in one view.
 #[test]
-fn the_phantom_stands_still_between_sweeps_forth_and_back() {
+fn the_phantom_does_not_move_between_forward_and_backward_sweeps() {
     use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Truth};
     let device = Device::new();
     let made =

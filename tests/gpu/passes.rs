@@ -1,4 +1,4 @@
-//! Every pass alone against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
+//! Every pass separately against its f64 reference, looped over `PASSES`: on noise, on extremes, at awkward sizes, in every
 //! variant of the geometry. Each pass gets its own inputs, so that errors do not add up. A perturbed reference must fail.
 
 use crate::common::gpu::*;
@@ -9,19 +9,18 @@ use echolume::passes::slots::Shape;
 use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
 use echolume::probe::Geometry;
 use echolume::scene::{Sampling, Scene};
-use echolume::verify::inputs::{inputs_of, turn_of};
-use echolume::verify::passes::{POISON, beside};
+use echolume::verify::passes::{POISON, dispatch_args_of, inputs_of, run_with_reference};
 use echolume::verify::report::Level;
-use echolume::verify::{self, Bench, Slack};
+use echolume::verify::{self, DeviceUnderTest, ExtraTolerance};
 use std::collections::HashSet;
 
-/// What `echolume verify --full` does of passes: every input in every scene.
+/// The pass checks of `echolume verify --full`: every input in every scene.
 #[test]
 fn every_pass_matches_its_reference() {
     let device = Device::new();
     println!("device: {}", device.describe());
     let options = ContextOptions { device: chosen(), validation: true };
-    let mut bench = Bench::new(&options, Level::Full).expect("bench");
+    let mut bench = DeviceUnderTest::new(&options, Level::Full).expect("bench");
     let checks = verify::passes::checks(Level::Full);
     assert_eq!(checks.len(), PASSES.len());
     let run = verify::run(&mut bench, &checks, || None, |_| ());
@@ -33,26 +32,26 @@ fn every_pass_matches_its_reference() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// How texels are read may cost time, never a bit: every pass that reads some, in every format and variant that the scenes have.
+/// The method of reading texels may change the time, but no bit: every pass that reads some, in every format and variant of the scenes.
 #[test]
-fn texels_loaded_are_the_texels_fetched() {
+fn storage_loads_and_texture_fetches_give_the_same_texels() {
     let device = Device::new();
     let ways = [TexelAccess::Textures, TexelAccess::Storage];
     let mut singles = ways.map(|fetch| PassRunner::with_texel_access(&device, fetch).expect("single"));
     let (mut seen, mut loaded) = (HashSet::new(), 0);
     for (name, mut scene) in scenes() {
-        // Automatic sampling would be another for each way.
+        // Automatic sampling would differ between the two methods.
         if scene.settings.ray.sampling == Sampling::Auto {
             (scene.settings.ray.sampling, scene.sampling) = (Sampling::Exact, Sampling::Exact);
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             let reads: Vec<_> =
                 (pass.reads)(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
-            // Once with each shader and the formats of what it reads: that is what is rewritten.
+            // Once for each shader and formats of its inputs: these determine the rewritten shader.
             if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
-            let args = turn_of(&scene, 0);
+            let args = dispatch_args_of(&scene, 0);
             let inputs = inputs_of(&scene, pass, &args, "noise", 3);
             let [fetched, stored] =
                 singles.each_mut().map(|s| s.run(&scene, pass, &args, &inputs, POISON).expect("dispatch"));
@@ -92,13 +91,14 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
 }
 
 #[test]
-fn what_measures_the_device_computes_what_it_says() {
+fn device_measurements_compute_the_stated_result() {
     let device = Device::new();
     let scene = measure::scene(11, 19).expect("scene");
     for fetch in [TexelAccess::Textures, TexelAccess::Storage] {
         let mut single = PassRunner::with_texel_access(&device, fetch).expect("single");
         for pass in measure::MEASURES {
-            let worst = beside(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
+            let worst =
+                run_with_reference(&mut single, &scene, pass, 0, "noise", 7).expect("dispatch").comparison.worst;
             assert!(worst.is_none(), "{}: {worst:?}", pass.name);
         }
     }
@@ -110,7 +110,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let mut single = PassRunner::new(&device).expect("single");
     let base = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\n{ALL_FILTERS}"));
     let lit = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'sr'\n{ALL_FILTERS}"));
-    // What the reference is told differs from what the device is told, by one small thing.
+    // Reference and device differ by one small change.
     let mut half_pixel = base.clone();
     half_pixel.rays.origin += half_pixel.rays.right * 0.3;
     let mut half_slice_pixel = base.clone();
@@ -133,7 +133,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     ];
     for (fault, name, told, wrong) in cases {
         let pass = echolume::passes::by_name(name).expect("pass");
-        let right = beside(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
+        let right = run_with_reference(&mut single, told, pass, 0, "noise", 5).expect("dispatch");
         assert!(right.comparison.worst.is_none(), "{name}, unperturbed: {:?}", right.comparison);
         let args = DispatchArgs { layer: 2, slice: told.slices() / 2, slices: 1, iteration: 0, image: 0 };
         let mut expected = Arrays::default();
@@ -142,12 +142,20 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
             expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(told)), channels));
         }
         (pass.reference)(wrong, &args, &right.inputs, &mut expected);
-        let compared = verify::compare(pass, told, Slack::default(), POISON, &expected, &right.got, &right.writes);
+        let compared = verify::compare_outputs(
+            pass,
+            told,
+            ExtraTolerance::default(),
+            POISON,
+            &expected,
+            &right.got,
+            &right.writes,
+        );
         assert!(compared.worst.is_some(), "{fault} went unnoticed in {name}");
     }
     // One voxel.
     let pass = echolume::passes::by_name("median_slice").expect("pass");
-    let right = beside(&mut single, &base, pass, 0, "zero", 5).expect("dispatch");
+    let right = run_with_reference(&mut single, &base, pass, 0, "zero", 5).expect("dispatch");
     let mut inputs = right.inputs;
     let mut source = inputs.get("source").clone();
     let middle = source.size[0] * (source.size[1] / 2) + source.size[0] / 2;
@@ -156,17 +164,18 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(shape_size(right.writes[0].slot.shape(&base)), 1));
     (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
-    let compared = verify::compare(pass, &base, Slack::default(), POISON, &expected, &right.got, &right.writes);
+    let compared =
+        verify::compare_outputs(pass, &base, ExtraTolerance::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");
 }
 
 #[test]
-fn what_is_outside_the_sector_is_not_touched() {
+fn texels_outside_the_sector_are_not_written() {
     let device = Device::new();
     let mut single = PassRunner::new(&device).expect("single");
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'vr'\nslices = { pixels = 64 }");
     let pass = echolume::passes::by_name("scan_convert").expect("pass");
-    let result = beside(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
+    let result = run_with_reference(&mut single, &scene, pass, 0, "one", 1).expect("dispatch");
     let (expected, got) = (result.expected, result.got);
     let Shape::Three([width, height, _]) = Slot::Volume.shape(&scene) else { panic!("volume") };
     let outside = (width * height) as usize - expected.get("target").values.iter().filter(|v| !v.is_nan()).count();

@@ -1,4 +1,4 @@
-//! The presets' pictures of the recordings: not black, not holed, and what they show is where it is.
+//! Pictures of the recordings with their presets: not black, without holes, and objects in their true positions.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
@@ -33,7 +33,7 @@ fn lit(renderer: &mut Renderer) -> (f64, f64) {
     (levels.len() as f64 / (256.0 * 256.0), levels.iter().sum::<f64>() / levels.len().max(1) as f64)
 }
 
-/// Place of the surface at a pixel.
+/// Position of the surface at a pixel.
 fn place(scene: &Scene, distances: &Texels, x: usize, y: usize) -> Option<DVec3> {
     let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let distance = distances.one(x, y, 0);
@@ -54,7 +54,7 @@ fn the_presets_fill_their_pictures() {
     }
 }
 
-/// The head of sweep.json: an ellipsoid with a nose and two eye hollows, seen from the probe.
+/// The head of sweep.json: an ellipsoid with a nose and two eye sockets, viewed from the probe.
 #[test]
 fn the_wobblers_head_has_its_nose_and_eyes_where_the_truth_has_them() {
     let device = Device::new();
@@ -64,7 +64,7 @@ fn the_wobblers_head_has_its_nose_and_eyes_where_the_truth_has_them() {
     let axis = scene.probe().expect("a sweep").axis_depth();
     let centre = DVec3::new(4.0, 95.0 + axis, -3.0);
     let semi = DVec3::new(26.0, 26.0, 22.0);
-    // Height of the surface over the plain ellipsoid, as a share of its radius, about a direction (lateral, elevation).
+    // Height of the surface over the plain ellipsoid, as a share of its radius, around a direction (lateral, elevation).
     let height = |lateral: f64, elevation: f64| {
         let mut heights = Vec::new();
         for y in 0..256 {

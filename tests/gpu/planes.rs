@@ -1,14 +1,15 @@
-//! Planes and slabs: what they show is where it is.
+//! Planes and slabs show objects in their true positions.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Grid, Probe};
-use echolume::scene::{Input, Scene, Settings};
+use echolume::scene::{Input, Scene};
 use echolume::source::Recording;
 use glam::{DVec2, DVec3};
 
-/// Right, down and normal of plane A as the settings describe them, one turn after the other.
+/// Right, down and normal of plane A from the settings, one rotation after the other.
 fn turned(azimuth: f64, tilt: f64, roll: f64) -> [DVec3; 3] {
     let turn = |a: DVec3, b: DVec3, degrees: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -16,13 +17,13 @@ fn turned(azimuth: f64, tilt: f64, roll: f64) -> [DVec3; 3] {
     };
     let (right, normal) = turn(DVec3::X, DVec3::Z, azimuth);
     let (down, normal) = turn(DVec3::Y, normal, tilt);
-    // Clockwise on the screen: what was on the right goes down, so the right now shows what was above.
+    // Clockwise on the screen: the right part moves down, so the right now shows what was above.
     let (right, down) = turn(right, -down, roll);
     [right, -down, normal]
 }
 
-/// What the only tile of a picture shows, by the settings' own words: the region fits into the tile, and its middle,
-/// projected onto the plane, is the tile's.
+/// The expected view of the only tile of a picture: the region fits into the tile, and its middle,
+/// projected onto the plane, is the middle of the tile.
 fn shown(scene: &Scene, [right, down, normal]: [DVec3; 3], at: DVec3, x: usize, y: usize) -> DVec3 {
     let [width, height] = scene.picture_size().map(f64::from);
     let extent = |axis: DVec3| axis.abs().dot(scene.high - scene.low);
@@ -41,9 +42,9 @@ pub fn picture(renderer: &mut Renderer) -> Texels {
     renderer.read(Slot::Picture).expect("read").expect("there")
 }
 
-/// Prevents planes that are mirrored, shifted or turned the wrong way, in any geometry: a field that is linear in space is
-/// itself wherever a plane cuts it. Between lines and frames the sweep bends it by range angle^2 / 8: 0.02 mm between lines,
-/// 0.03 mm between even and 0.06 mm between uneven frames; R16F adds 0.02 mm.
+/// Prevents planes that are mirrored, shifted or rotated the wrong way, in any geometry: a field that is linear in space is
+/// reproduced on every plane. Between lines and frames the sweep deviates by range angle^2 / 8: 0.02 mm between lines,
+/// 0.03 mm between uniform and 0.06 mm between non-uniform frames; R16F adds 0.02 mm.
 #[test]
 fn a_linear_field_is_itself_on_every_plane() {
     let device = Device::new();
@@ -85,7 +86,7 @@ fn a_linear_field_is_itself_on_every_plane() {
     }
 }
 
-/// Further inside than a slice pixel reaches: beyond the border its neighbours hold the outermost samples.
+/// Further inside than the reach of a slice pixel: beyond the border its neighbours hold the outermost samples.
 fn is_well_inside(scene: &Scene, place: DVec3) -> bool {
     let within = |at: f64, margin: f64, count: usize| at >= margin && at <= (count - 1) as f64 - margin;
     match &scene.geometry {
@@ -113,7 +114,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
     let Geometry::Sweep(probe) = recording.geometry(0) else { panic!("a sweep") };
     let mut renderer: Option<Renderer> = None;
     let mut worst = 0.0f64;
-    // Lateral, elevation, depth from the wobble axis: as sweep.json has them.
+    // Lateral, elevation, depth from the wobble axis, as in sweep.json.
     for [x, z, y] in [[0.0, 0.0, 60.0], [20.0, 0.0, 60.0], [-20.0, 0.0, 60.0], [0.0, 12.0, 65.0], [0.0, -12.0, 65.0]] {
         let truth = DVec3::new(x, y + probe.axis_depth(), z);
         let depth = truth.y - probe.array_radius();
@@ -124,7 +125,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
                  region = {{ lateral = [{}, {}], depth = [{}, {}], elevation = [{}, {}] }}",
                 x - 5.0, x + 5.0, depth - 5.0, depth + 5.0, z - 5.0, z + 5.0
             );
-            let settings: Settings = toml::from_str(&toml.replace(",  }", " }")).expect("settings");
+            let settings = settings(&toml.replace(",  }", " }"));
             let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
             let renderer = match &mut renderer {
                 Some(renderer) => {
@@ -167,7 +168,7 @@ fn planes_through_the_wobblers_wires_show_them_where_they_are() {
     assert!(worst < 0.1, "off by {worst} mm");
 }
 
-/// A slab against a plain loop over the volume, and against what a field along its normal must give.
+/// A slab against a plain loop over the volume, and against the known result of a field along its normal.
 #[test]
 fn a_slab_is_the_mean_the_largest_or_the_smallest_of_what_it_holds() {
     let device = Device::new();
@@ -226,7 +227,7 @@ fn a_slab_is_the_mean_the_largest_or_the_smallest_of_what_it_holds() {
     }
 }
 
-/// The stored volume at a place; none outside the sector or the box.
+/// The stored volume at a point; none outside the sector or the box.
 fn echo(scene: &Scene, probe: &Probe, volume: &Texels, p: DVec3) -> Option<f64> {
     let at = probe.to_indices(p);
     let inside = |v: f64, n: usize| v >= 0.0 && v <= (n - 1) as f64;

@@ -1,4 +1,4 @@
-//! What is done along rays, against formulas: clip planes, growing steps, the sliding filter, pre-integration, hits, veils, and
+//! Operations along rays, against formulas: clip planes, growing steps, the sliding filter, pre-integration, hits, volume layers, and
 //! several rays a pixel.
 
 use crate::common::gpu::*;
@@ -7,7 +7,7 @@ use echolume::probe::{Axis, Geometry, Grid};
 use echolume::scene::Scene;
 use glam::DVec3;
 
-/// A block of n^3 voxels of 0.5 mm; half a voxel beyond the outer centres is part of it.
+/// A block of n^3 voxels of 0.5 mm, including half a voxel beyond the outer centres.
 fn block(n: usize) -> Geometry {
     Geometry::Cartesian(Grid { size: [n; 3], spacing: [0.5; 3], origin: [0.0; 3] })
 }
@@ -22,7 +22,7 @@ fn even(opacity: f64) -> String {
     format!("transfer = [{{ at = 0.0, colour = [1.0, 1.0, 1.0], opacity = {opacity} }}]")
 }
 
-/// Beer-Lambert over what a slanted plane leaves of each ray.
+/// Beer-Lambert over the part of each ray that an oblique plane leaves.
 #[test]
 fn a_clip_plane_cuts_each_ray_where_it_meets_it() {
     let device = Device::new();
@@ -63,7 +63,7 @@ fn sphere_scene(ray: &str) -> Scene {
 }
 
 /// The filter's deviation is one step, 0.2 mm grown to 0.4: towards the limb it rounds the edge off.
-/// A surface stays where it is whether its samples lie evenly, spread apart with the range, or are filtered on the way.
+/// A surface keeps its position with uniform samples, with steps that grow with the range, and with the sliding filter.
 #[test]
 fn a_sphere_stays_with_growing_steps_and_with_the_sliding_filter() {
     let device = Device::new();
@@ -77,12 +77,12 @@ fn a_sphere_stays_with_growing_steps_and_with_the_sliding_filter() {
     }
 }
 
-/// One sample a ray, on the lattice of voxels: the filter leaves a linear field alone and takes from noise what the sum of its
-/// squared weights says.
+/// One sample a ray, on the lattice of voxels: the filter keeps a linear field and reduces noise by the sum of its
+/// squared weights.
 #[test]
 fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say() {
     let device = Device::new();
-    // The ray's third sample of five, everything about it within the volume.
+    // The third of five samples of the ray, with all neighbours within the volume.
     let at = |sliding: u32| {
         let toml = format!(
             "mode = 'mean'\npicture = {{ size = [24, 24] }}\nregion = {{ depth = [5.75, 6.25] }}
@@ -91,7 +91,7 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
         scene(block(24), FLOATS, &toml)
     };
     let noise = |p: DVec3| {
-        // Splitmix64 of the voxel's number.
+        // SplitMix64 of the voxel's index.
         let n = (p * 2.0).round();
         let mut z = (n.x as u64 * 1_000_003 + n.y as u64 * 10_007 + n.z as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -123,9 +123,9 @@ fn the_sliding_filter_keeps_a_linear_field_and_quietens_noise_as_its_weights_say
     }
 }
 
-/// A thin opaque layer of the transfer function, which long steps jump over.
+/// A thin opaque layer of the transfer function, which long steps miss.
 #[test]
-fn pre_integration_sees_a_layer_that_long_steps_jump_over() {
+fn pre_integration_finds_a_layer_that_long_steps_miss() {
     let device = Device::new();
     let opacity = |step: f64, compositing: &str| {
         let toml = format!(
@@ -144,7 +144,7 @@ fn pre_integration_sees_a_layer_that_long_steps_jump_over() {
         assert!((integrated / fine - 1.0).abs() < 0.03, "step {step}: {integrated} for {fine}");
         assert!((corrected / fine - 1.0).abs() > 0.1, "step {step} should miss or exaggerate it: {corrected}");
     }
-    // Riemann's a = y is over one where the medium is thick: clamped, not more than opaque.
+    // Riemann's a = y exceeds one in a thick medium: it is clamped to opaque.
     assert_eq!(opacity_of_thick(&device), 1.0);
 }
 
@@ -157,9 +157,9 @@ fn opacity_of_thick(device: &Device) -> f64 {
     slot(device, &scene, |_| 0.5, Slot::Picture).get([1, 1, 0])[3]
 }
 
-/// Through an even medium, opacity h is reached after -ln(1 - h) / kappa, and a veil is what lies before the surface.
+/// In a uniform medium, opacity h is reached after -ln(1 - h) / kappa; the volume layer is the part before the surface.
 #[test]
-fn a_hit_lies_where_the_ray_is_opaque_enough_and_a_veil_ends_at_the_surface() {
+fn a_hit_is_where_opacity_reaches_the_threshold_and_the_volume_layer_ends_there() {
     let device = Device::new();
     for step in [0.07, 0.5, 1.5] {
         let toml = format!(
@@ -171,7 +171,7 @@ fn a_hit_lies_where_the_ray_is_opaque_enough_and_a_veil_ends_at_the_surface() {
         let distance = slot(&device, &scene, |_| 0.5, Slot::Distance).one(2, 2, 0);
         let (origin, _) = scene.rays.at(2.5, 2.5);
         let expected = -0.25 - origin.y + 0.5 * (1.0f64 - 0.4).ln() / (1.0f64 - 0.05).ln();
-        // Within a step it is put in proportion to the opacity, which bends by kappa h / 8.
+        // Within a step it is placed in proportion to the opacity, which deviates from a line by kappa h / 8.
         assert!((distance - expected).abs() < 0.02 * step + 1e-4, "step {step}: {distance} for {expected}");
     }
     let toml = format!(
@@ -190,7 +190,7 @@ fn a_hit_lies_where_the_ray_is_opaque_enough_and_a_veil_ends_at_the_surface() {
     assert!((veil - expected).abs() < 5e-4, "{veil} for {expected}");
 }
 
-/// The edge of an opaque block covers part of its pixels: with 4 x 4 rays to an eighth.
+/// The edge of an opaque block covers parts of pixels: to an eighth with 4 x 4 rays.
 #[test]
 fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
     let device = Device::new();
@@ -201,7 +201,7 @@ fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
     let scene = scene(block(20), BYTES, &toml);
     assert_eq!(scene.ray_size(), [84, 84]);
     let picture = slot(&device, &scene, |_| 0.5, Slot::Picture);
-    // mm of a pixel, and of its left edge: rays are those of the finer lattice.
+    // mm of a pixel, and of its left edge: rays belong to the finer lattice.
     let pixel = 4.0 * scene.rays.origin_dx.x;
     let mut partly = 0;
     for x in 0..21 {
@@ -214,9 +214,9 @@ fn several_rays_a_pixel_show_how_much_of_it_is_covered() {
     assert!(partly >= 2);
 }
 
-/// Start depths belong to what they are said of: the surface's leaves the veil and the planes beside it whole.
+/// Start depths apply to their own mode: that of the surface does not cut the volume layer and the planes next to it.
 #[test]
-fn a_start_depth_cuts_only_what_it_belongs_to() {
+fn a_start_depth_cuts_only_its_own_mode() {
     let device = Device::new();
     let body = |p: DVec3| if p.y < 3.0 { 0.8 } else { ((p.y - 7.0) / 0.8 + 0.5).clamp(0.1, 0.9) };
     let toml = |more: &str| {
@@ -238,7 +238,7 @@ fn a_start_depth_cuts_only_what_it_belongs_to() {
     let expected = -(7.25 / 0.5 * (-0.03f64).ln_1p()).exp_m1();
     assert!((veil - expected).abs() < 2e-3, "the veil begins at the region's top: {veil} for {expected}");
     let four = scene(block(20), FLOATS, &toml("mode = 'sr'\nlayout = '4up'"));
-    // Upper left: lateral and depth. Its topmost row of the block shows the wall.
+    // Upper left: lateral and depth. The topmost row of the block shows the wall.
     let planes = slot(&device, &four, body, Slot::Planes);
     assert!(planes.get([1, 0, 0])[0] > 0.7, "{:?}", planes.get([1, 0, 0]));
 }

@@ -1,20 +1,20 @@
-//! Real and simulated recordings against what is known of them.
+//! Real and simulated recordings against known facts.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::lookup_tables::scan_index;
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Geometry, Probe};
-use echolume::scene::{Input, Scene, Settings, SliceGrid};
+use echolume::scene::{Input, Scene, SliceGrid};
 use echolume::source::Recording;
 use glam::DVec3;
 
 /// The conversion that the PLUS toolkit stored beside the frames: 820 x 616 pixels of 0.15 mm, apex at (410, 87).
 fn plus_scene(recording: &Recording) -> Scene {
     let input = Input { stored: recording.stored_type(), range: recording.range() };
-    let settings: Settings =
-        toml::from_str("mode = 'vr'\nslices = { format = 'r32f', everything = true }\npicture = { size = [8, 8] }")
-            .unwrap();
+    let settings =
+        settings("mode = 'vr'\nslices = { format = 'r32f', everything = true }\npicture = { size = [8, 8] }");
     let mut scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
     scene.apron = 0.0;
     let origin = [-(410.0 - 0.5) * 0.15, 10.0 - 87.0 * 0.15];
@@ -38,7 +38,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
     assert_eq!((frames.len(), stored.len()), (5, 5));
     let scene = plus_scene(&recording);
     let probe = scene.probe().expect("polar");
-    // Where each pixel looks, once for the five.
+    // The source position of each pixel, once for all five frames.
     let lut: Vec<Option<(f64, f64)>> = (0..616 * 820)
         .map(|i| scene.grid.place(f64::from(i % 820), f64::from(i / 820)))
         .map(|(x, y)| scan_index(&scene, probe, x, y))
@@ -55,7 +55,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
                 let near = (1.0 - u) * value(i, j) + u * value(i + 1, j);
                 (1.0 - v) * near + v * ((1.0 - u) * value(i, j + 1) + u * value(i + 1, j + 1))
             });
-            // PLUS rounds by adding one half and cutting off.
+            // PLUS rounds by adding one half and truncating.
             assert_eq!((expected + 0.5).floor() as u8, stored, "the f64 reference equals the stored conversion");
         }
         renderer.frame(0, frame, 0).expect("frame");
@@ -69,7 +69,7 @@ fn five_real_frames_are_converted_as_the_plus_toolkit_did() {
     }
     let share = equal as f64 / (5.0 * 820.0 * 616.0);
     println!("equal to the PLUS toolkit: {:.4} % of pixels, largest difference {largest}", 100.0 * share);
-    // f32: an index near 3640 is rounded by 2.4e-4 of a sample, which tips a value that lies that close to a half.
+    // f32 rounds an index near 3640 by 2.4e-4 of a sample, which can change the rounding of values that close to a half.
     assert!(share >= 0.999 && largest <= 1, "{share}, {largest}");
 
     // The half pixel matters: without it most pixels differ.
@@ -87,8 +87,7 @@ pub fn wobbler_volume(device: &Device, file: &str, more: &str) -> (Probe, Scene,
     let mut recording = Recording::open(&data(file), None).expect("recording");
     let input = Input { stored: recording.stored_type(), range: recording.range() };
     let slices = "slices = { format = 'r32f', pixels = 700 }";
-    let settings: Settings =
-        toml::from_str(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}")).unwrap();
+    let settings = settings(&format!("mode = 'vr'\n{slices}\npicture = {{ size = [8, 8] }}\n{more}"));
     let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
     let mut renderer = Renderer::new(device, scene.clone(), &RendererOptions::default()).expect("renderer");
     while let Some(frame) = recording.next_frame().expect("frame") {
@@ -106,7 +105,7 @@ pub fn wobbler_volume(device: &Device, file: &str, more: &str) -> (Probe, Scene,
 fn the_wobblers_wires_lie_within_a_tenth_of_a_millimetre() {
     let device = Device::new();
     let (probe, scene, volume) = wobbler_volume(&device, "wobbler-4dc7/sweep.mha", "");
-    // Lateral, elevation, depth from the wobble axis: as sweep.json has them.
+    // Lateral, elevation, depth from the wobble axis, as in sweep.json.
     let wires = [[0.0, 0.0, 60.0], [20.0, 0.0, 60.0], [-20.0, 0.0, 60.0], [0.0, 12.0, 65.0], [0.0, -12.0, 65.0]];
     for mirrored in [false, true] {
         let mut worst = 0.0f64;

@@ -1,4 +1,4 @@
-//! What runs again after a change, counted from recorded dispatches; and barriers left out, seen by validation.
+//! Reruns after a change, counted from recorded dispatches; and omitted barriers, detected by validation.
 
 use crate::common::gpu::*;
 use echolume::gpu::Renderer;
@@ -26,7 +26,7 @@ fn drawn(device: &Device) -> Renderer {
 }
 
 #[test]
-fn a_change_runs_again_what_it_touches_and_nothing_else() {
+fn a_change_reruns_only_the_affected_passes() {
     let device = Device::new();
     let mut renderer = drawn(&device);
     let picture = renderer.picture().expect("picture");
@@ -131,8 +131,8 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     assert!(!slots.contains("slice_a"));
 }
 
-/// Filters of a chain take turns with two slots, so a filter that runs again may find its input overwritten by a later one.
-/// Whatever the change, the picture is that of a renderer made for the new scene.
+/// Filters of a chain alternate between two slots, so a filter that runs again may find its input overwritten by a later one.
+/// After any change the picture equals that of a new renderer for the new scene.
 #[test]
 fn any_change_gives_the_picture_of_a_fresh_renderer() {
     let device = Device::new();
@@ -191,9 +191,9 @@ fn any_change_gives_the_picture_of_a_fresh_renderer() {
     }
 }
 
-/// The layer sees a missing barrier between a writer and a reader (not between two writers: that is the oracle's).
+/// The layer detects a missing barrier between a writer and a reader; one between two writers is left to the oracle.
 #[test]
-fn a_dropped_barrier_is_seen_by_synchronization_validation() {
+fn synchronization_validation_reports_a_dropped_barrier() {
     let recorded = drawn(&Device::new()).barriers();
     assert!(recorded > 20, "{recorded}");
     let mut seen = 0;

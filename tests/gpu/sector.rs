@@ -1,21 +1,21 @@
-//! Filters of slices on a sweep's sector: its rim, and what the pixel lattice leaves on a tilted wall.
+//! Filters of slices on the sector of a sweep: its border, and the artefacts of the pixel lattice on a tilted wall.
 
 use crate::common::gpu::*;
 use echolume::passes::{Slot, is_hit};
 use echolume::probe::Geometry;
 
-/// Beyond the rim is nothing, and no filter may see it: pixels take the nearest sample as far out as the filters reach.
+/// Outside the border there are no data, and no filter may use it: pixels repeat the nearest sample as far as the filters reach.
 #[test]
-fn no_filter_draws_the_rim_of_the_sector_towards_nothing() {
+fn no_filter_blends_the_sector_border_with_the_outside() {
     let device = Device::new();
     for (filters, tolerance) in [
         ("median = true, sigma = { window = 9, sigma = inf }", 0.0),
         ("estimator = 'nagao-matsuyama', enhanced_sigma = { window = 5, largest = 19, sigma = inf }", 0.0),
         ("smooth = { kernel = 5 }", 0.0),
         ("blur = true", 0.0),
-        // Diffusion without edges has no end: three standard deviations out of it 0.13 % is drawn from beyond.
+        // Diffusion without edges has an unlimited reach: 0.13 % comes from more than three standard deviations away.
         ("perona_malik = { edge = inf, step = 0.25, repeat = 40 }", 0.6 * 0.0014),
-        // An implicit step spreads as a two-sided exponential does: the sum of eight has an excess kurtosis of 3/8, and 0.19 % there.
+        // An implicit step spreads as a two-sided exponential: the sum of eight has an excess kurtosis of 3/8, and 0.19 % there.
         ("perona_malik = { edge = inf, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.002),
         ("perona_malik = { edge = 0.1, scheme = 'aos', step = 5.0, repeat = 8 }", 0.6 * 0.002),
     ] {
@@ -44,7 +44,7 @@ fn no_filter_draws_the_rim_of_the_sector_towards_nothing() {
     }
 }
 
-/// A wall at a slant, seen in SR: its distances less the plane through them, root mean square, mm.
+/// An oblique wall in SR: the root mean square of its distances less the plane through them, mm.
 fn ripple(device: &Device, slices: &str) -> f64 {
     let mut probe = wobbler();
     probe.lines = echolume::probe::Axis::centred(1.1 / 127.0, 128);
@@ -56,7 +56,7 @@ fn ripple(device: &Device, slices: &str) -> f64 {
          camera = {{ zoom = 4.0, target = [0, 30, 0] }}\nslices = {{ pixels = 160, {slices} }}"
     );
     let scene = scene(Geometry::Sweep(probe), FLOATS, &toml);
-    // A sharp edge: what the lattice makes of it is all there is.
+    // A sharp edge: only the artefacts of the lattice remain.
     let frames = body_frames(&scene, |p| if p.y > 50.0 + 0.31 * p.x + 0.12 * p.z { 0.8 } else { 0.0 });
     let mut renderer = rendered(device, scene, &frames);
     renderer.picture().expect("picture");
@@ -76,7 +76,7 @@ fn ripple(device: &Device, slices: &str) -> f64 {
 
 /// Thesis Fig. 32, 33.
 #[test]
-fn a_slight_blur_takes_away_wood_grain() {
+fn a_slight_blur_removes_wood_grain_artefacts() {
     let device = Device::new();
     let [plain, blurred, three, five] =
         ["", "blur = true", "smooth = { kernel = 3 }", "smooth = { kernel = 5 }"].map(|slices| ripple(&device, slices));

@@ -1,23 +1,29 @@
-//! Whether the self-test of `echolume verify` can fail. That what it plants is caught is `cli`'s to say.
+//! The self-test of `echolume verify` can fail. The tests of `cli` check that its injected faults are caught.
 
 use crate::common::gpu::chosen;
 use echolume::gpu::ContextOptions;
 use echolume::passes::fault_injection::{Change, InjectedFault};
 use echolume::verify::report::Verdict;
-use echolume::verify::self_test::{self, Caught};
+use echolume::verify::self_test::{self, Detection};
 
 fn options() -> ContextOptions {
     ContextOptions { device: chosen(), validation: false }
 }
 
-/// Looked at with `--nocapture`: which check caught what.
-fn told(caught: &Caught) {
-    println!("{:5.2} s  {:36} {}: {}", caught.seconds, caught.fault, caught.by.as_deref().unwrap_or("-"), caught.found);
+/// For output with `--nocapture`: which check caught which fault.
+fn told(detection: &Detection) {
+    println!(
+        "{:5.2} s  {:36} {}: {}",
+        detection.seconds,
+        detection.fault,
+        detection.by.as_deref().unwrap_or("-"),
+        detection.message
+    );
 }
 
-/// Prevents that everything is called caught.
+/// Prevents a self-test that reports everything as caught.
 #[test]
-fn a_fault_without_effect_is_reported_as_uncaught() {
+fn an_injected_fault_without_effect_is_reported_as_uncaught() {
     let faults = [
         InjectedFault {
             name: "nowhere",
@@ -30,12 +36,12 @@ fn a_fault_without_effect_is_reported_as_uncaught() {
             change: Change::Constant { pass: "light", name: "SKIN", by: |skin| skin },
         },
     ];
-    let all = self_test::planted(&options(), faults.iter(), told).expect("a device");
+    let all = self_test::run_faults(&options(), faults.iter(), told).expect("a device");
     assert_eq!(all.len(), 3);
-    for caught in &all[..2] {
-        assert_eq!(caught.by, None, "{caught:?}");
-        assert!(caught.found.contains("nothing that a check runs is changed"), "{caught:?}");
-        let outcome = caught.outcome();
+    for detection in &all[..2] {
+        assert_eq!(detection.by, None, "{detection:?}");
+        assert!(detection.message.contains("nothing that a check runs is changed"), "{detection:?}");
+        let outcome = detection.outcome();
         assert_eq!((outcome.verdict, outcome.faults.len()), (Verdict::Failed, 1));
     }
     assert!(all[2].by.is_some(), "no check failed without a fault: {:?}", all[2]);

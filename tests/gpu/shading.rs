@@ -1,5 +1,5 @@
-//! Stage 3 on distance maps whose look is known: shadows where geometry puts them, one colour on a plane whatever its holes,
-//! filters that invent no edges; and which surface of several is taken.
+//! Stage 3 on distance maps with a known shading: shadows where geometry puts them, one colour on a plane whatever its holes,
+//! filters that invent no edges; and the choice among several surfaces.
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
@@ -7,7 +7,7 @@ use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit
 use echolume::probe::{Geometry, Grid};
 use echolume::scene::Scene;
 
-/// A block of 60 mm seen along its depth axis, 0.25 mm a pixel, parallel.
+/// A block of 60 mm viewed along its depth axis, 0.25 mm a pixel, parallel.
 pub fn plate(toml: &str) -> Scene {
     let block = Geometry::Cartesian(Grid { size: [61, 61, 61], spacing: [1.0; 3], origin: [0.0; 3] });
     scene(block, BYTES, &format!("picture = {{ size = [244, 244] }}\n{toml}"))
@@ -20,7 +20,7 @@ pub fn map(scene: &Scene, f: impl Fn(usize, usize) -> f64) -> Texels {
     Texels::decode(texels.size, format, &texels.encode(format))
 }
 
-/// One output of one pass on a distance map; everything else it reads says "found, bright, lit, open".
+/// One output of one pass on a distance map; its other inputs are neutral (found, bright, lit, open).
 pub fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Texels {
     let pass = by_name(pass).expect("pass");
     let args = DispatchArgs::default();
@@ -35,7 +35,7 @@ pub fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Te
     outputs.get((pass.writes)(scene, &args)[0].name).clone()
 }
 
-/// A step of 10 mm on a plane, light from the left at 45 deg: its shadow reaches as far as it is high, less the bias.
+/// A step of 10 mm on a plane, light from the left at 45 deg: its shadow is as long as its height, less the bias.
 #[test]
 fn a_shadow_ends_where_geometry_puts_it() {
     let device = Device::new();
@@ -50,7 +50,7 @@ fn a_shadow_ends_where_geometry_puts_it() {
         let expected = 80.0 + (10.0 - 0.5) / pixel;
         let row = |x: usize| shadow.one(x, 120, 0);
         let edge = (80..244).find(|x| row(*x) > 0.5).expect("the shadow ends") as f64;
-        // A step on the way to the light is 40 mm / 96; a pixel is a quarter of a mm.
+        // A step towards the light is 40 mm / 96; a pixel is a quarter of a mm.
         assert!((edge - expected).abs() * pixel < 0.6, "ends at {edge}, not at {expected}");
         assert_eq!(row(82), 0.0, "right behind the step");
         assert_eq!((row(40), row(200)), (1.0, 1.0), "on the step, and beyond its shadow");
@@ -58,11 +58,11 @@ fn a_shadow_ends_where_geometry_puts_it() {
         if softness == 0.0 {
             assert!(width == 0.0, "a hard edge is {width} mm wide");
         } else {
-            // The step that casts it is 13 mm away along the ray.
+            // The step that casts the shadow is 13 mm away along the ray.
             assert!(width > 1.0 && width < 5.0, "a soft edge is {width} mm wide");
         }
     }
-    // From the right nothing lies in the light's way.
+    // From the right nothing blocks the light.
     let scene = plate("light = { direction = [1.0, 0.0, 1.0], shadow = { softness = 0.0 } }");
     let distances = map(&scene, |x, _| if x < 80 { 40.0 } else { 50.0 });
     assert!(run(&device, &scene, "shadow", &distances).values.iter().all(|v| *v == 1.0));
@@ -142,7 +142,7 @@ fn a_corner_is_darker_than_a_plane_and_an_edge_is_not() {
     assert!(ridge.one(122, 120, 0) > 0.99);
 }
 
-/// Nothing that a light can be told makes a number that is not one.
+/// No setting of a light gives a non-finite number.
 #[test]
 fn no_light_and_no_map_gives_anything_but_finite_colours() {
     let device = Device::new();
@@ -177,7 +177,7 @@ fn no_light_and_no_map_gives_anything_but_finite_colours() {
 }
 
 #[test]
-fn of_several_surfaces_the_one_that_was_asked_for_is_taken() {
+fn the_requested_surface_of_several_is_taken() {
     let device = Device::new();
     let block = Geometry::Cartesian(Grid { size: [12, 160, 12], spacing: [0.25; 3], origin: [0.0; 3] });
     let walls = [8.0, 17.0, 29.0];

@@ -1,5 +1,5 @@
-//! The filter that slides along the ray keeps sums of slices from sample to sample. Rays side by side on one unit enter the
-//! sector one after the other, and each sums anew what it lacks while the others wait.
+//! The filter that slides along the ray keeps sums of slices from sample to sample. Neighbouring rays of a subgroup enter the
+//! sector one after the other, and each computes its missing sums while the others wait.
 
 use crate::common::gpu::*;
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name, is_hit};
@@ -13,8 +13,8 @@ fn body(p: DVec3) -> f64 {
     if shell { 0.5 + 0.5 * speckle } else { 0.1 * speckle }
 }
 
-/// llvmpipe once left wrong sums with rays that waited: distances were off by 0.1 mm and more on one ray in a hundred, which
-/// the tolerance of the pass for edges that go either way let by.
+/// llvmpipe once gave wrong sums to waiting rays: distances were off by 0.1 mm and more on one ray in a hundred, which
+/// the tolerance of the pass for undecided edges did not detect.
 #[test]
 fn surfaces_are_where_the_reference_has_them_on_every_ray() {
     let device = Device::new();
@@ -41,7 +41,7 @@ fn surfaces_are_where_the_reference_has_them_on_every_ray() {
             let hits = expected.iter().filter(|d| is_hit(**d)).count();
             let off = got.values.iter().zip(expected).filter(|(a, b)| (*a - *b).abs() > 5e-3).count();
             println!("sliding {sliding}, rough {rough}: {hits} hits, {off} off by 5 um or more");
-            // A difference within rounding of the threshold may still go either way.
+            // A difference within rounding of the threshold may be decided either way.
             assert!(hits > 500 && off < 3, "sliding {sliding}, rough {rough}: {off} of {hits} are off");
         }
     }

@@ -1,13 +1,14 @@
-//! Pictures of several planes: lines, tiles, what runs for them and runs again, and what is refused.
+//! Pictures of several planes: lines, tiles, passes that run for them and run again, and refused settings.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use crate::planes::picture;
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
-use echolume::scene::{PlaneName, Scene, SceneError, Settings};
+use echolume::scene::{PlaneName, Scene, SceneError};
 use glam::DVec3;
 
-/// Over a black volume only lines are left: along a row or a column their centre of light is the other plane's place.
+/// A black volume shows only lines: their centre of light along a row or column is the position of the other plane.
 #[test]
 fn cross_lines_run_through_the_place_where_the_planes_meet() {
     let device = Device::new();
@@ -23,11 +24,11 @@ fn cross_lines_run_through_the_place_where_the_planes_meet() {
         let sheet = scene.sheet();
         assert_eq!(sheet.tiles.len(), 3);
         for (n, tile) in sheet.tiles.iter().enumerate() {
-            // Where the three planes meet, in pixels from the tile's corner.
+            // The intersection of the three planes, in pixels from the corner of the tile.
             let away = position - tile.plane.at;
             let meet: [f64; 2] = [tile.plane.right, tile.plane.down].map(|axis| away.dot(axis) / sheet.pixel);
             let meet = [meet[0] + f64::from(tile.size[0]) / 2.0, meet[1] + f64::from(tile.size[1]) / 2.0];
-            // Far from the crossing, where one line alone is met.
+            // Far from the crossing, where there is only one line.
             for axis in 0..2 {
                 let across =
                     if meet[1 - axis] > f64::from(tile.size[1 - axis]) / 2.0 { 4 } else { tile.size[1 - axis] - 5 };
@@ -53,7 +54,7 @@ fn cross_lines_run_through_the_place_where_the_planes_meet() {
     }
 }
 
-/// Every tile of a tomography is the picture of a plane at its place, to the bit.
+/// Every tile of a tomography equals the picture of a plane at its offset, bit for bit.
 #[test]
 fn a_tile_of_tomography_is_the_single_plane_at_its_offset() {
     let device = Device::new();
@@ -120,7 +121,7 @@ fn flat_modes_have_no_ray_no_transfer_and_no_distance_map() {
 }
 
 #[test]
-fn a_plane_that_moves_runs_again_alone() {
+fn only_a_moved_plane_runs_again() {
     let device = Device::new();
     let with = |toml: &str| {
         scene(
@@ -157,9 +158,9 @@ fn a_plane_that_moves_runs_again_alone() {
     }
 }
 
-/// Prevents planes that look otherwise for being toned at once: by more than the rounding of floats of 16 bits, one level.
+/// Prevents planes that differ when they are toned together by more than the rounding of 16-bit floats, one level.
 #[test]
-fn planes_that_are_toned_at_once_are_those_that_are_toned_after() {
+fn planes_toned_together_equal_planes_toned_afterwards() {
     let device = Device::new();
     let tone = "gamma = 1.4, contrast = 1.3, brightness = 0.05";
     for toml in [
@@ -207,7 +208,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         ("mode = 'cube'\ncube = { tilt = { top = [85, 0] } }", "cube.tilt.top"),
         ("mode = 'cube'\ncube = { shading = 1.5 }", "cube.shading"),
     ] {
-        let settings: Settings = toml::from_str(toml).expect("settings");
+        let settings = settings(toml);
         let Err(SceneError { field: named, fault }) = Scene::new(Geometry::Sweep(wobbler()), BYTES, settings) else {
             panic!("{toml} was not refused")
         };

@@ -1,15 +1,15 @@
-//! Passes that are timed alone. Time stamps of whole pictures are looked at by `echolume verify`.
+//! Passes that are timed separately. Time stamps of complete pictures are checked by `echolume verify`.
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::{PassRunner, PassTimer};
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name};
 use echolume::probe::Geometry;
 
-/// What is timed is the work that was meant: every iteration, on the contents given, the same each time.
+/// The timed work is the intended work: every iteration, on the given contents, the same each time.
 #[test]
 fn a_timed_pass_works_on_the_contents_given() {
-    // A device for each: synchronization validation does not see that the host waits for a timeline, so memory that one has
-    // read back from and another then takes anew would look like a hazard.
+    // A device for each: synchronization validation ignores that the host waits for a timeline, so memory that one has
+    // read back and another one then reuses would look like a hazard.
     let devices: [Device; 5] = std::array::from_fn(|_| Device::new());
     let mut single = PassRunner::new(&devices[0]).expect("single");
     let toml = "mode = 'mip'\npicture = { size = [37, 29] }\nslices = { pixels = 24 }\n\
@@ -27,7 +27,7 @@ fn a_timed_pass_works_on_the_contents_given() {
         assert!(timed.run().expect("run").expect("time stamps") > 0.0, "{name}");
         let got = timed.read(to.slot).expect("read").expect("an image");
 
-        // One dispatch after the other, each fed what those before it wrote.
+        // One dispatch after the other, each on the results of those before it.
         let mut slots: Vec<(Slot, Texels)> = vec![(from.slot, picture.clone())];
         for iteration in 0..=last.iteration {
             let args = DispatchArgs { iteration, ..first };

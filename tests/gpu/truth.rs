@@ -1,17 +1,18 @@
 //! The surface detector on the simulated sweep, against the head that was simulated.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::chain::distance_end;
 use echolume::passes::{Slot, Texels, is_hit};
-use echolume::scene::{Input, Scene, Settings};
+use echolume::scene::{Input, Scene};
 use echolume::source::Recording;
 use glam::{DVec2, DVec3};
 
-/// Seen from the probe along parallel rays, below the uterine wall (3 .. 15 mm). The same holds with any one of these
+/// Viewed from the probe along parallel rays, below the uterine wall (3 .. 15 mm). The same holds with any one of these
 /// varied: window from 0.57 .. 0.66, lateral 1.0 .. 1.8 mm, depth 0.3 .. 1.0 mm, elevation 0.5 .. 1.0 slices,
 /// threshold 0.05 .. 0.18, rough 1 .. 3, step 0.25 .. 0.5 mm, start 15 .. 24 mm, median 5 .. 19, bilateral 4 .. 8
-/// pixels: hits 99.7 .. 100 %, 0.1 .. 0.95 % over 3 mm off, RMS 0.32 .. 0.40 mm. The window has the least room: 0.70,
+/// pixels: hits 99.7 .. 100 %, 0.1 .. 0.95 % over 3 mm off, RMS 0.32 .. 0.40 mm. The window has the smallest margin: 0.70,
 /// with a slightly wider Gaussian, missed a sixth of the head.
 const SETTINGS: &str = "
     mode = 'sr'
@@ -23,7 +24,7 @@ const SETTINGS: &str = "
     distance = { median = 11, bilateral = { pixels = 8, distance = 2 } }
 ";
 
-/// A head as sweep.json has it, its places (lateral, depth, elevation) in mm from the motor's axis.
+/// A head from sweep.json; positions (lateral, depth, elevation) in mm from the motor axis.
 struct Head {
     centre: DVec3,
     semi_axes: DVec3,
@@ -34,7 +35,7 @@ impl Head {
     fn load() -> Head {
         let text = std::fs::read_to_string(data("wobbler-4dc7/sweep.json")).expect("truth");
         let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        // The file's order is lateral, elevation, depth.
+        // The order in the file is lateral, elevation, depth.
         let place = |v: &serde_json::Value| {
             let [x, z, y] = std::array::from_fn(|i| v[i].as_f64().expect("a number"));
             DVec3::new(x, y, z)
@@ -56,7 +57,7 @@ impl Head {
         scaled.length() - bump
     }
 
-    /// Depth at which a ray along +Y meets the head, where it meets it within 45 degrees of the surface's normal.
+    /// Depth at which a ray along +Y meets the head, if it does within 45 degrees of the surface normal.
     fn depth(&self, lateral: f64, elevation: f64) -> Option<f64> {
         let inside = |y: f64| self.level(DVec3::new(lateral, y, elevation)) < 0.0;
         let mut far = 55.0;
@@ -78,7 +79,7 @@ impl Head {
     }
 }
 
-/// How a distance map differs from the head, over the rays that can be judged.
+/// How a distance map differs from the head, over the rays with a known answer.
 #[derive(Debug)]
 struct Fit {
     rays: usize,
@@ -93,7 +94,7 @@ struct Fit {
 fn fit(scene: &Scene, distances: &Texels, head: &Head, mirror: DVec2) -> Fit {
     let axis = scene.probe().expect("a sweep").axis_depth();
     let (mut rays, mut errors) = (0, Vec::new());
-    // Every third pixel each way: neighbours share their filters' windows.
+    // Every third pixel in each direction: neighbours share filter windows.
     for y in (0..distances.size[1]).step_by(3) {
         for x in (0..distances.size[0]).step_by(3) {
             let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
@@ -119,7 +120,7 @@ fn fit(scene: &Scene, distances: &Texels, head: &Head, mirror: DVec2) -> Fit {
     Fit { rays, hits: count / rays as f64, off, median, rms }
 }
 
-/// Prevents a detector, a sweep map or a filter that finds a plausible surface in the wrong place. The surface lies
+/// Prevents a detector, a sweep map or a filter that finds a plausible surface in the wrong place. The surface is
 /// about 1 mm before the truth: the pulse and the Gaussian are that long, and 45 dB of compression make their fronts
 /// bright.
 #[test]
@@ -129,7 +130,7 @@ fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
     for detector in ["threshold", "adaptive", "lasting"] {
         let mut recording = Recording::open(&data("wobbler-4dc7/sweep.mha"), None).expect("recording");
         let input = Input { stored: recording.stored_type(), range: recording.range() };
-        let mut settings: Settings = toml::from_str(SETTINGS).expect("settings");
+        let mut settings = settings(SETTINGS);
         settings.surface.detector = toml::Value::from(detector).try_into().expect("a detector");
         let scene = Scene::new(recording.geometry(0), input, settings).expect("scene");
         let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");

@@ -1,5 +1,5 @@
-//! The groups of `echolume verify` that look at the whole program: each notices what it is there to notice. That all of
-//! them pass is `cli`'s to say.
+//! The groups of `echolume verify` that check the complete program: each detects its faults. The tests of `cli` check that all of
+//! them pass.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
@@ -7,22 +7,22 @@ use echolume::passes::Span;
 use echolume::picture::Picture;
 use echolume::probe::Geometry;
 use echolume::verify::report::{Level, Outcome, Verdict};
-use echolume::verify::{self, Bench, Check, Found, built_in};
+use echolume::verify::{self, Check, DeviceUnderTest, Findings, built_in};
 use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-fn bench() -> Bench {
+fn bench() -> DeviceUnderTest {
     prepared(None)
 }
 
-/// A bench with something wrong in every context.
-fn prepared(wrong: Option<fn(&Context)>) -> Bench {
+/// A bench with a fault in every context.
+fn prepared(wrong: Option<fn(&Context)>) -> DeviceUnderTest {
     let options = ContextOptions { device: chosen(), validation: true };
-    Bench::prepared(&options, Level::Quick, wrong).expect("bench")
+    DeviceUnderTest::prepared(&options, Level::Quick, wrong).expect("bench")
 }
 
-/// The one check of that name.
+/// The only check of that name.
 fn named(checks: Vec<Check>, name: &str) -> Vec<Check> {
     let mut checks = checks;
     checks.retain(|check| check.name == name);
@@ -30,8 +30,8 @@ fn named(checks: Vec<Check>, name: &str) -> Vec<Check> {
     checks
 }
 
-/// Runs checks; what failed, in words.
-fn failures(bench: &mut Bench, checks: &[Check]) -> Vec<String> {
+/// Runs checks. Returns the failures as text.
+fn failures(bench: &mut DeviceUnderTest, checks: &[Check]) -> Vec<String> {
     let tell = |outcome: &Outcome| {
         println!("{}: {} {:.2} s {:?}", outcome.group, outcome.name, outcome.seconds, outcome.verdict);
         outcome.figures.iter().for_each(|f| println!("    {} {}", f.what, f.value));
@@ -53,14 +53,14 @@ fn spans(first: [f64; 2], second: [f64; 2]) -> Vec<Span> {
     ]
 }
 
-/// A program that says something else than this one, or nothing, or is not there.
+/// A program with another output than this one, or with none, or that does not exist.
 #[test]
-fn other_bits_of_another_number_of_threads_are_seen() {
+fn a_result_that_depends_on_the_number_of_threads_is_detected() {
     let mut bench = bench();
     if !bench.context.candidate.name.contains("llvmpipe") {
         return;
     }
-    let check = || named(verify::repeats::checks(Level::Quick), "any number of threads");
+    let check = || named(verify::determinism::checks(Level::Quick), "any number of threads");
     let folder = Folder::new("threads");
     let program = |name: &str, text: &str| -> PathBuf {
         let file = folder.join(name);
@@ -68,7 +68,7 @@ fn other_bits_of_another_number_of_threads_are_seen() {
         std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o755)).expect("a program");
         file
     };
-    let digest = verify::repeats::digest(&bench.context).expect("digest");
+    let digest = verify::determinism::digest(&bench.context).expect("digest");
     bench.program = Some(program("same", &format!("cat <<'end'\n{digest}end")));
     assert_eq!(failures(&mut bench, &check()), [""; 0]);
     let other = digest.replacen(&digest[..16], "0123456789abcdef", 1);
@@ -85,44 +85,45 @@ fn other_bits_of_another_number_of_threads_are_seen() {
 }
 
 #[test]
-fn a_picture_that_differs_by_one_bit_is_seen() {
+fn a_picture_that_differs_by_one_bit_is_detected() {
     let mut bench = bench();
     let modes = bench.modes().expect("pictures");
     let mut other = modes[3].picture.clone();
     other.rgba[77] ^= 1;
-    let mut found = Found::default();
-    assert!(verify::repeats::same(&mut found, "itself", &modes[3].picture, &modes[3].picture));
+    let mut found = Findings::default();
+    assert!(verify::expect_same_picture(&mut found, "itself", &modes[3].picture, &modes[3].picture));
     assert!(found.faults.is_empty());
-    assert!(!verify::repeats::same(&mut found, "other", &modes[3].picture, &other));
+    assert!(!verify::expect_same_picture(&mut found, "other", &modes[3].picture, &other));
     assert!(found.faults[0].what.contains("1 of") && found.pictures.len() == 1, "{:?}", found.faults);
 }
 
-/// A pass that is left out leaves its output as it was: zeros, that look like a dark picture.
+/// A skipped pass does not change its output: zeros, which look like a dark picture.
 #[test]
-fn an_output_that_is_not_written_is_seen() {
+fn an_output_that_is_not_written_is_detected() {
     let mut bench = prepared(Some(|context| context.faults.slow_down("light", 0)));
-    let seen = failures(&mut bench, &named(verify::poison::checks(Level::Quick), "every mode on poisoned memory"));
+    let seen = failures(&mut bench, &named(verify::memory::checks(Level::Quick), "every mode on poisoned memory"));
     assert!(seen.iter().any(|fault| fault.contains("'picture' are never written")), "{seen:?}");
 }
 
 #[test]
-fn memory_that_is_not_given_back_is_seen() {
+fn leaked_memory_is_detected() {
     let context: Arc<Context> = bench().context.clone();
     let before = context.allocated();
     let scene = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [16, 16] }");
     let renderer: Result<Renderer, GpuError> = Renderer::new(&context, scene, &RendererOptions::default());
-    let mut found = Found::default();
-    verify::failing::returned(&mut found, &context, before, "while it is there");
+    let mut found = Findings::default();
+    verify::failures::expect_memory_returned(&mut found, &context, before, "while it is there");
     assert!(found.faults[0].what.contains("are still held"), "{:?}", found.faults);
     drop(renderer.expect("renderer"));
-    verify::failing::returned(&mut found, &context, before, "when it is gone");
+    verify::failures::expect_memory_returned(&mut found, &context, before, "when it is gone");
     assert_eq!(found.faults.len(), 1);
 }
 
-/// A volume that lies half a voxel aside.
+/// A volume that is shifted by half a voxel.
 #[test]
-fn a_picture_that_is_not_the_reference_s_is_seen() {
-    use verify::formats::{Largest, reference};
+fn a_picture_unlike_the_reference_is_detected() {
+    use verify::formats::LargestDifference;
+    use verify::render::stored_reference_picture;
     let bench = bench();
     let scene = scene(
         Geometry::Sweep(wobbler()),
@@ -131,32 +132,32 @@ fn a_picture_that_is_not_the_reference_s_is_seen() {
     );
     let frames = built_in::wall(&scene, 0);
     let aside = body_frames(&scene, |p| if p.y + 0.4 > 42.0 { 0.8 } else { 0.15 });
-    let (expected, allowed) = (reference(&scene, &frames), [0.6, 3.0]);
-    let (mut largest, mut found) = (Largest::default(), Found::default());
-    let picture = |frames| verify::drawn::picture(&bench.context, &scene, frames).expect("picture");
+    let (expected, allowed) = (stored_reference_picture(&scene, &frames), [0.6, 3.0]);
+    let (mut largest, mut found) = (LargestDifference::default(), Findings::default());
+    let picture = |frames| verify::render::picture(&bench.context, &scene, frames).expect("picture");
     largest.add(&mut found, "itself", &expected, &picture(&frames), allowed);
     assert!(found.faults.is_empty(), "{:?}", found.faults);
     largest.add(&mut found, "aside", &expected, &picture(&aside), allowed);
     assert!(found.faults.len() == 1 && found.pictures.len() == 1, "{:?}", found.faults);
 }
 
-/// Each volume is sent into the image that is drawn, and not into the other.
+/// Each volume is sent into the image that is drawn, instead of the other one.
 #[test]
-fn two_volumes_in_one_image_are_seen() {
+fn two_volumes_in_one_image_are_detected() {
     let bench = bench();
-    let mut found = Found::default();
+    let mut found = Findings::default();
     let into_the_same = |round: usize| round as u32 % 2;
     let [compared, wrong] =
-        verify::hazards::taking_turns(&mut found, &bench.context, 1, 4, into_the_same).expect("pictures");
+        verify::hazards::alternating_images(&mut found, &bench.context, 1, 4, into_the_same).expect("pictures");
     assert!(compared == 4 && wrong >= 2 && found.faults.len() == wrong, "{wrong} of {compared}: {:?}", found.faults);
 }
 
-/// What is planted here is seen by the known answers; each that fails has pictures of one size that differ.
+/// The known answers detect the injected faults; each failure has two different pictures of the same size.
 #[test]
-fn a_known_answer_that_is_another_is_shown() {
+fn a_wrong_known_answer_is_shown() {
     let sound = bench();
     for planted in verify::self_test::faults().filter(|p| ["stale slice", "shifted half pixel"].contains(&p.name)) {
-        let mut bench = sound.planted(planted.change).expect("bench");
+        let mut bench = sound.with_fault(planted.change).expect("bench");
         let checks = verify::checks(Level::Quick).into_iter().filter(|check| check.group == "known answers");
         let outcomes: Vec<Outcome> = checks.map(|check| check.run(&mut bench)).collect();
         let failed: Vec<_> = outcomes.iter().filter(|o| o.verdict == Verdict::Failed).collect();
@@ -167,7 +168,7 @@ fn a_known_answer_that_is_another_is_shown() {
             assert_eq!(size, (shown.expected.width, shown.expected.height));
             let fault = &outcome.faults[shown.fault.expect("its fault")];
             assert!(fault.worst.is_some() || fault.what.contains("miss a surface"), "{fault:?}");
-            // A millionth is in the numbers, and in no picture of 8 bits.
+            // A millionth is visible in the numbers, but in no picture of 8 bits.
             let is_large = fault.worst.as_ref().is_none_or(|w| (w.expected - w.got).abs() > 1e-3);
             let is_shown = shown.difference.rgba.chunks_exact(4).any(|texel| texel[0] > 0);
             assert!(is_shown || !is_large, "{}: {fault:?}", outcome.name);
@@ -175,18 +176,18 @@ fn a_known_answer_that_is_another_is_shown() {
     }
 }
 
-/// A tile of a picture is less than one in a hundred of its values: of all of them 2 may be far off, of a tile's half.
+/// A tile is less than one hundredth of a picture: 2 of all values may be far off, but half of a tile.
 #[test]
-fn one_lost_workgroup_of_a_picture_is_seen() {
+fn one_lost_workgroup_is_detected() {
     let grey = Picture { width: 80, height: 64, rgba: vec![128; 4 * 80 * 64] };
     let judged = |first: u32, size: [u32; 2]| {
-        let (mut found, mut got) = (Found::default(), grey.clone());
+        let (mut found, mut got) = (Findings::default(), grey.clone());
         let place = |i: usize| [i as u32 % 80, i as u32 / 80];
         let texels = got.rgba.chunks_exact_mut(4).enumerate();
         let within = |at: u32, size: u32| (first..first + size).contains(&at);
         let lost = texels.filter(|(i, _)| place(*i).iter().zip(size).all(|(at, size)| within(*at, size)));
         lost.for_each(|(_, texel)| texel.fill(0));
-        verify::modes::judge(&mut found, "grey", &grey, &got);
+        verify::compare_picture(&mut found, "grey", &grey, &got);
         found.faults.len()
     };
     assert_eq!(judged(16, [8, 8]), 1, "a workgroup");
@@ -196,23 +197,23 @@ fn one_lost_workgroup_of_a_picture_is_seen() {
 
 #[test]
 fn stamps_that_run_backwards_leave_gaps_or_are_longer_than_the_wait_are_seen() {
-    use verify::stamps::looked_at;
-    let [share, outside] = looked_at(&spans([2000.0, 8000.0], [8000.0, 10_000.0])).expect("sane");
+    use verify::time_stamps::check_spans;
+    let [share, outside] = check_spans(&spans([2000.0, 8000.0], [8000.0, 10_000.0])).expect("sane");
     assert!((share - 0.8).abs() < 1e-9 && outside == 0.0);
-    let of = |first, second| looked_at(&spans(first, second)).expect_err("seen");
+    let of = |first, second| check_spans(&spans(first, second)).expect_err("seen");
     assert!(of([2000.0, 1500.0], [1500.0, 9000.0]).contains("'raycast_volume' took -500"));
     assert!(of([2000.0, 8000.0], [5000.0, 9000.0]).contains("lie between"));
     assert!(of([2000.0, 6.8e10], [6.8e10, 6.9e10]).contains("took"));
     assert!(of([2000.0, 9000.0], [9000.0, 13_500.0]).contains("all passes"));
     assert!(of([2000.0, 2000.0], [2000.0, 2000.0]).contains("all passes"));
-    assert!(looked_at(&spans([2000.0, 8000.0], [8000.0, 9000.0])[..1]).is_err());
-    let [_, outside] = looked_at(&spans([20_000.0, 26_000.0], [26_000.0, 27_000.0])).expect("sane in themselves");
+    assert!(check_spans(&spans([2000.0, 8000.0], [8000.0, 9000.0])[..1]).is_err());
+    let [_, outside] = check_spans(&spans([20_000.0, 26_000.0], [26_000.0, 27_000.0])).expect("sane in themselves");
     assert!(outside > 0.5, "the device's clock is another");
 }
 
-/// A frame of something else arrives before each picture.
+/// A frame of another body arrives before each picture.
 #[test]
-fn a_renderer_that_draws_otherwise_than_a_fresh_one_is_seen_by_the_stress() {
+fn a_renderer_unlike_a_fresh_one_is_detected_by_the_stress_check() {
     let spoil = |renderer: &mut Renderer, image: u32| {
         let frame = vec![200; renderer.frame_bytes()];
         renderer.frame(4, &frame, image)

@@ -1,7 +1,8 @@
-//! Only what can be seen is converted and filtered: no sample of stage 2 lies outside of it, the picture is the same bit for
-//! bit, and frames are asked for anew only when more is to be seen.
+//! Only the visible part is converted and filtered: no sample of stage 2 is outside of it, the picture is the same bit for
+//! bit, and frames are requested again only if more becomes visible.
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::chain::rectangle;
 use echolume::passes::{DispatchArgs, Slot, Texels};
@@ -27,7 +28,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-/// Texel indices of a place, by the exact inverse of the probe's maps; none where it is not insonified.
+/// Texel indices of a point, by the exact inverse of the probe's maps; none if it is not insonified.
 fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let column = |v: f64, axis: usize| (v - scene.grid.origin[axis]) / scene.grid.pitch[axis];
     match &scene.geometry {
@@ -85,13 +86,13 @@ fn random_scene(geometry: &Geometry, noise: &mut Noise) -> Scene {
         "mode = '{mode}'\nslices.pixels = 120\nsurface.rough = {rough}\n{ray}\n{start}\n{clip}\nregion = {{ {} }}",
         sides.join(", ")
     );
-    let settings = toml::from_str(&toml).expect("settings");
-    // A start depth below the region, or a face that leaves nothing, is refused: the region alone is left then.
+    let settings = settings(&toml);
+    // A start depth below the region, or a face that leaves nothing, is refused: then only the region is set.
     Scene::new(geometry.clone(), BYTES, settings)
         .unwrap_or_else(|_| scene(geometry.clone(), BYTES, &format!("mode = '{mode}'\nslices.pixels = 120")))
 }
 
-/// A place that some pass may sample: one of what is kept, or at most as far from it as its samples reach.
+/// A point that a pass may sample: inside the kept part, or at most as far from it as its samples reach.
 fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
     let sr = scene.settings.mode == Mode::Surface || (scene.settings.mode == Mode::Mixed && noise.next() < 0.5);
     let low = if sr { scene.surface_view().low } else { scene.low };
@@ -113,7 +114,7 @@ fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
 }
 
 #[test]
-fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
+fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
     let mut noise = Noise(17);
     for (name, geometry) in geometries() {
         let (mut shares, mut cases) = (0.0, 0);
@@ -123,12 +124,7 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
             for _ in 0..4000 {
                 let Some(at) = sampled(&scene, &mut noise).and_then(|place| texel(&scene, place)) else { continue };
                 let mixed = mixed(&scene, at);
-                assert!(
-                    scene.seen.holds(&mixed),
-                    "{name}: {at:?} is not of {:?}\n{}",
-                    scene.seen,
-                    toml::to_string(&scene.settings).unwrap()
-                );
+                assert!(scene.seen.holds(&mixed), "{name}: {at:?} is not of {:?}\n{:?}", scene.seen, scene.settings);
                 let old = found.unwrap_or(mixed);
                 found = Some(VisibleBounds {
                     low: std::array::from_fn(|a| old.low[a].min(mixed.low[a])),
@@ -136,7 +132,7 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
                 });
             }
             let Some(found) = found else { continue };
-            // Two texels of slack on each side, and what random places have missed.
+            // Two texels of slack on each side, and those that random points have missed.
             let (size, count) = (scene.volume_size(), |low: [u32; 3], high: [u32; 3]| {
                 (0..3).map(|a| f64::from(high[a] - low[a])).product::<f64>()
             });
@@ -148,7 +144,7 @@ fn no_sample_lies_outside_of_what_is_seen_and_little_else_is() {
             cases += 1;
         }
         println!("{name}: {:.2} of the least box on average over {cases} scenes", shares / f64::from(cases));
-        // Of nine slices, the way of the motor within a frame may be one on each side: the box reaches as far as a sweep either way.
+        // The advance of the motor within a frame may be one of nine slices on each side: the box covers sweeps in both directions.
         assert!(cases > 20 && shares / f64::from(cases) < 3.0, "{name}");
     }
 }
@@ -218,7 +214,7 @@ fn speckle(scene: &Scene) -> Vec<Texels> {
 }
 
 #[test]
-fn the_picture_is_that_of_a_volume_filtered_whole() {
+fn the_picture_equals_that_of_the_completely_filtered_volume() {
     let device = Device::new();
     let mut smallest = 1.0f64;
     for (g, (name, geometry)) in geometries().iter().enumerate() {
@@ -239,7 +235,7 @@ fn the_picture_is_that_of_a_volume_filtered_whole() {
                 let drawn = renderer.read(Slot::Picture).expect("read").expect("there");
                 (renderer.scene().share_seen(), picture, distance, drawn)
             };
-            // First what is seen, so that nothing of the whole volume is there yet.
+            // The visible part first, so that nothing of the complete volume exists yet.
             let mut renderer = rendered(&device, made(false), &frames);
             let (share, b, b_distance, b_drawn) = draw(&mut renderer);
             let rerun = renderer.change(made(true)).expect("change");
@@ -262,7 +258,7 @@ fn with(window: &str, slices: &str) -> Scene {
 }
 
 #[test]
-fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
+fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
     let device = Device::new();
     let smooth = ", median = true, smooth = { lateral = 1.0, elevation = 0.3 }";
     let scene = with("region = { lateral = [-4, 6], depth = [20, 30], elevation = [4, 9] }", smooth);
@@ -280,7 +276,7 @@ fn what_is_not_seen_is_neither_dispatched_nor_uploaded_nor_written() {
     for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
         let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
-        // Some passes make four texels an invocation.
+        // Some passes write four texels an invocation.
         let run = |axis: usize| {
             if (name, axis) == ("median_slice", 1) || (name, axis) == ("gaussian_lateral", 0) { 4 } else { 1 }
         };
@@ -330,7 +326,7 @@ fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
     send(&mut renderer, &frames, 0);
     assert_eq!(renderer.picture().expect("picture"), fresh(&large));
 
-    // A frame that came meanwhile was filtered over the smaller region, and so were slices smoothed meanwhile.
+    // A frame received meanwhile was filtered over the smaller region, and so were slices smoothed meanwhile.
     assert!(without_frames(&renderer.change(small.clone()).expect("change")));
     renderer.frame(4, &frames[4].encode(frame_format(&small)), 0).expect("frame");
     assert_eq!(renderer.change(large.clone()).expect("change"), Rerun::Frames);
@@ -341,7 +337,7 @@ fn a_region_that_shrinks_needs_no_frames_and_one_that_grows_does() {
     send(&mut renderer, &frames, 0);
     assert_eq!(renderer.picture().expect("picture"), fresh(&large));
 
-    // While a region is dragged everything is kept, and afterwards new frames are cut again.
+    // While a region is dragged the complete volume is kept; afterwards new frames are cut again.
     let dragged = with("region = { lateral = [-3, 4] }", &format!("{smooth}, everything = true"));
     assert_eq!(renderer.change(dragged).expect("change"), Rerun::Frames);
     send(&mut renderer, &frames, 0);

@@ -1,4 +1,4 @@
-//! How the volume is stored for the rays: frames that are slices already are copied, and quads of neighbours are what eight texels are.
+//! The storage of the volume for the rays: frames in the volume's format are copied, and packed neighbours equal eight texels.
 
 use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
@@ -22,7 +22,7 @@ fn blob(p: DVec3) -> f64 {
 }
 
 #[test]
-fn a_frame_that_is_a_slice_already_is_copied_and_nothing_runs_on_it() {
+fn frames_in_the_volume_format_are_copied_without_a_pass() {
     let device = Device::new();
     for (stored, full, format) in [(StoredType::U8, 255.0, "r8"), (StoredType::U16, 65535.0, "r16")] {
         for smooth in ["", ", smooth = { elevation = 1.0 }"] {
@@ -40,7 +40,7 @@ fn a_frame_that_is_a_slice_already_is_copied_and_nothing_runs_on_it() {
                 let format = Slot::Frames.format(&scene);
                 assert_eq!(slice.encode(format), frame.encode(format), "{format:?}, slice {z}");
             }
-            // The same through a pass, into a format that is finer than either.
+            // The same through a pass, into a finer format.
             let passed = scene.settings.clone();
             let mut passed = Scene::new(scene.geometry.clone(), scene.input, passed).expect("scene");
             passed.settings.slices.format = echolume::scene::VolumeFormat::R32f;
@@ -53,7 +53,7 @@ fn a_frame_that_is_a_slice_already_is_copied_and_nothing_runs_on_it() {
 }
 
 #[test]
-fn what_has_to_be_scaled_clamped_or_filtered_is_not_copied() {
+fn scaled_clamped_or_filtered_frames_are_not_copied() {
     let copied = |stored, full, toml: &str| chain::copied(&volume(stored, full, toml));
     assert!(copied(StoredType::U8, 255.0, "slices.format = 'r8'").is_some());
     assert_eq!(copied(StoredType::U8, 200.0, "slices.format = 'r8'"), None, "another range");
@@ -65,7 +65,7 @@ fn what_has_to_be_scaled_clamped_or_filtered_is_not_copied() {
 }
 
 #[test]
-fn taking_a_filter_up_and_leaving_it_asks_for_the_frames_again() {
+fn switching_a_filter_on_or_off_asks_for_the_frames_again() {
     let device = Device::new();
     let plain = volume(StoredType::U8, 255.0, "mode = 'mip'\nslices.format = 'r8'");
     let filtered = volume(StoredType::U8, 255.0, "mode = 'mip'\nslices = { format = 'r8', median = true }");
@@ -90,7 +90,7 @@ const MODES: [&str; 5] = [
 ];
 
 #[test]
-fn quads_are_the_samples_of_eight_texels() {
+fn packed_neighbours_give_the_samples_of_eight_texels() {
     let device = Device::new();
     let geometries = [Geometry::Sweep(wobbler()), Geometry::Sweep(uneven(linear())), cartesian([24, 33, 11])];
     for (g, geometry) in geometries.into_iter().enumerate() {
@@ -124,7 +124,7 @@ fn quads_are_the_samples_of_eight_texels() {
 }
 
 #[test]
-fn a_view_that_moves_keeps_its_quads() {
+fn a_moving_view_keeps_its_packed_neighbours() {
     for size in [8, 24, 48, 96, 192] {
         let set = format!("mode = 'mip'\npicture.size = [{size}, {size}]\nslices = {{ pixels = 60, format = 'r8' }}");
         let still = scene(Geometry::Sweep(wobbler()), BYTES, &set);
@@ -148,7 +148,7 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));
     assert_eq!(packs(&renderer), software, "a GPU filters by itself");
     assert!(difference(&renderer.picture().expect("picture"), &first).1 <= 1.0);
-    // A single slice that is new is packed alone.
+    // Only the new slice is packed.
     renderer.frame(7, &frames[3].encode(Format::R8), 0).expect("frame");
     renderer.show(0).expect("show");
     let changed = renderer.picture().expect("picture");

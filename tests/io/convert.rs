@@ -1,4 +1,4 @@
-//! Sweeps as Cartesian volumes: right where the sector is, nothing where it is not, and read back as they were written.
+//! Sweeps converted to Cartesian volumes: correct inside the sector, empty outside, and read back without a change.
 
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
@@ -20,7 +20,7 @@ fn probe() -> Probe {
     }
 }
 
-/// Straight in every coordinate, so that only the bend of the polar lattice between samples is left as an error.
+/// Linear in every coordinate, so that only the curvature of the polar lattice between samples remains as an error.
 fn field(p: DVec3) -> f64 {
     20_000.0 + 150.0 * p.x + 90.0 * p.y - 120.0 * p.z
 }
@@ -39,7 +39,7 @@ fn filled(probe: &Probe) -> Volume {
 }
 
 #[test]
-fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
+fn converted_voxels_have_the_fields_value_and_none_outside_the_sector() {
     let probe = probe();
     let volume = filled(&probe);
     let (mut inside, mut outside, mut worst) = (0, 0, 0.0f64);
@@ -71,7 +71,7 @@ fn a_place_has_the_value_of_the_field_there_and_none_outside_of_the_sector() {
 }
 
 #[test]
-fn what_is_written_is_read_back_voxel_by_voxel() {
+fn a_written_volume_is_read_back_voxel_by_voxel() {
     let folder = Folder::new("round");
     let volume = filled(&probe());
     let grid = lattice(&Geometry::Sweep(probe()), 1.7).expect("a lattice");

@@ -28,7 +28,7 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
     let motor = BackgroundSweep::start(drive, sweep, false).expect("a sweep that it can do");
     let options = phantom::PhantomOptions { volumes: 2, lines: 16, samples: 16, ..phantom::PhantomOptions::default() };
     let phantom = FreeRunning::phantom(options, motor.speed()).expect("a phantom");
-    let source = FreeRunning::new(phantom, motor.watch().clone());
+    let source = FreeRunning::new(phantom, motor.positions().clone());
     let options = motor_tracking::MotorTrackingOptions { clock: Clock::Arrival { delay: 0.0 }, holds: false };
     let feed = Feed::new(Box::new(MotorTracked::new(Box::new(source), motor, options)), Some(&file)).expect("a thread");
 
@@ -38,7 +38,7 @@ fn a_signal_stops_the_motor_and_ends_the_stream_with_a_finished_recording() {
             Some(Event::Frame(_)) => {
                 frames += 1;
                 if frames == 20 {
-                    // Not SIGINT: what a shell starts in the background has that ignored.
+                    // Not SIGINT: a shell ignores it for background processes.
                     kill_process(getpid(), Signal::TERM).expect("a signal");
                 }
             }

@@ -1,4 +1,4 @@
-//! Raw frames through a pipe: each with its place, time and bytes, whatever the pieces; and any bytes come to an end. Needs no GPU.
+//! Raw frames through a pipe: each keeps its slice, time and bytes however the data are split; and any bytes terminate. Needs no GPU.
 
 use crate::common::files::{data, repository};
 use echolume::probe::{Advance, Geometry};
@@ -46,7 +46,7 @@ fn piped(bytes: Vec<u8>) -> Piped {
     Piped::new(Cursor::new(bytes), None).unwrap()
 }
 
-/// All events but the end, and why it came.
+/// All events but the end, and the reason of the end.
 fn all(mut piped: Piped) -> (Vec<Event>, Option<String>) {
     let mut events = Vec::new();
     loop {
@@ -172,7 +172,7 @@ fn the_probe_file_that_is_given_goes_before_the_stream() {
 }
 
 #[test]
-fn no_first_line_is_taken_for_what_it_is_not() {
+fn wrong_first_lines_are_refused_by_name() {
     let huge = 1u64 << 60;
     let mut unknown = probe();
     unknown["array"]["radus_mm"] = json!(1);
@@ -247,7 +247,7 @@ fn patience_is_kept_and_dropping_does_not_hang() {
     let started = Instant::now();
     drop(piped);
     assert!(started.elapsed() < SOON);
-    // The other end hears of it with the next byte, or the one after.
+    // The other end notices it with one of the next two bytes.
     while writer.write_all(&[1; 8]).is_ok() {
         assert!(started.elapsed() < SOON);
         std::thread::sleep(Duration::from_millis(1));
@@ -267,7 +267,7 @@ impl Read for Endless {
 }
 
 #[test]
-fn what_is_not_taken_does_not_pile_up() {
+fn unread_frames_do_not_accumulate() {
     for changes in [json!({"samples": 512, "lines": 256}), json!({"samples": 512, "lines": 256, "lines_at_once": 1})] {
         let came = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let start = Cursor::new(stream(&changed(changes), &[]));

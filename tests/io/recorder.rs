@@ -1,4 +1,4 @@
-//! Frames in a file: every byte back, whatever interrupted the writing and whatever happened to the file since.
+//! Files of frames: every byte is read back, after an interrupted write and in a damaged file.
 
 use crate::common::files::{Folder, SWEEP};
 use crate::common::probes::wobbler;
@@ -29,7 +29,7 @@ fn header() -> Header {
     }
 }
 
-/// Three volumes, there and back; not every frame is stamped.
+/// Three volumes, forward and backward; not every frame has a time stamp.
 fn frames() -> Vec<(Frame, f64)> {
     let frame = |n: u32| {
         let (volume, number) = (n / 5 + 7, n % 5);
@@ -84,7 +84,7 @@ fn every_frame_comes_back_byte_for_byte_with_an_index_and_without() {
     }
 }
 
-/// A recording goes into a file of frames and is rendered from there, bit for bit.
+/// A recording converted to a file of frames renders to the same picture, bit for bit.
 #[test]
 fn a_recording_and_its_frames_give_the_same_picture() {
     let folder = Folder::new("program");
@@ -149,7 +149,7 @@ fn a_damaged_frame_hides_no_other() {
 }
 
 #[test]
-fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
+fn foreign_frames_are_refused_and_nothing_is_overwritten() {
     let folder = Folder::new("refused");
     let path = folder.join("sweep.frames");
     let mut writer = Writer::create(&path, header()).expect("made");
@@ -186,7 +186,7 @@ fn what_does_not_belong_is_refused_and_nothing_is_written_over() {
         assert!(!path.exists());
     }
     if Path::new("/dev/full").exists() {
-        // A disk that is full, as far as one can be had.
+        // As on a full disk.
         assert!(Writer::create(Path::new("/dev/full"), header()).is_err());
     }
 }
@@ -195,7 +195,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
-    fn no_bytes_are_met_with_a_panic(changes in prop::collection::vec((0usize..5000, any::<u8>()), 0..12), cut in 0usize..5000) {
+    fn no_bytes_cause_a_panic(changes in prop::collection::vec((0usize..5000, any::<u8>()), 0..12), cut in 0usize..5000) {
         let folder = Folder::new(&format!("any-{:?}", std::thread::current().id()));
         let path = folder.join("any.frames");
         let _ = std::fs::remove_file(&path);

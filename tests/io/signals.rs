@@ -1,4 +1,4 @@
-//! Who holds the signals of the process: each case in a process of its own, which sends them to itself.
+//! Signal handlers: each case runs in its own process, which sends the signals to itself.
 #![cfg(target_os = "linux")]
 
 use crate::common::files::Folder;
@@ -18,7 +18,7 @@ fn send(signal: Signal) {
     kill_process(getpid(), signal).expect("a signal");
 }
 
-/// Any thread of the process may be given a signal: a moment passes.
+/// Any thread may receive the signal: it takes a moment.
 fn eventually(signal: impl Fn() -> Option<&'static str>) -> Option<&'static str> {
     for _ in 0..5000 {
         if let Some(signal) = signal() {
@@ -33,7 +33,7 @@ fn file() -> PathBuf {
     PathBuf::from(std::env::var_os("SIGNALS_FILE").expect("a name"))
 }
 
-/// What is done in the process of its own, and the signal that ends it; it must not come back then.
+/// A name, what runs in the child process, and the signal that must end it.
 type Case = (&'static str, fn(), Option<Signal>);
 
 const CASES: &[Case] = &[
@@ -63,7 +63,7 @@ const CASES: &[Case] = &[
             let (first, patient) = (Held::first(), Held::take());
             (0..3).for_each(|_| send(Signal::HUP));
             assert_eq!(eventually(|| first.signal()), Some("SIGHUP"));
-            // The other two may still be on their way.
+            // The other two may not have arrived yet.
             std::thread::sleep(Duration::from_millis(300));
             drop(patient);
             assert_eq!(first.signal(), Some("SIGHUP"));
@@ -141,7 +141,7 @@ fn run(name: &str, file: &Path) -> ExitStatus {
 }
 
 #[test]
-fn whoever_holds_a_signal_is_told_and_nobody_else_stops_it() {
+fn a_signal_reaches_its_holder_and_otherwise_ends_the_process() {
     let folder = Folder::new("signals");
     for (name, _, ends) in CASES {
         let file = folder.join("file");

@@ -1,4 +1,4 @@
-//! `echolume profile` and `echolume report error` as a user meets them.
+//! `echolume profile` and `echolume report error` as a user sees them.
 
 use crate::common::program::*;
 use crate::scenes::alone;
@@ -33,7 +33,7 @@ fn a_profile_is_written_compared_with_itself_and_refused_where_it_cannot_be() {
     let traced: serde_json::Value = serde_json::from_str(&fs::read_to_string(&trace).expect("trace")).expect("json");
     assert!(traced["traceEvents"].as_array().is_some_and(|e| e.len() > 50));
 
-    // Another scene is other work; a slower copy is a regression.
+    // Another scene is different work; a slower copy is a regression.
     let other = folder.path("b.json");
     let ask = ["--repeat", "8", "--no-ceilings", "--set=distance.median=5", "--json", &other];
     done(&[&["profile"], &SMALL[..], &ask[..]].concat());

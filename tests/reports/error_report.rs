@@ -1,4 +1,4 @@
-//! `echolume report error` on a device: what it measures is what it says, and what it advises holds where it has not looked.
+//! `echolume report error` on a device: its measurements are right, and its advice holds for other scenes.
 
 use crate::scenes::*;
 use echolume::error_report::dials::dial;
@@ -53,13 +53,13 @@ fn errors_fall_with_the_step_down_to_the_devices_floor() {
     let floor = dial.floor.expect("a floor");
     println!("{points:?}, floor {floor:.2e}, order {:?}", dial.order.as_ref().map(|o| o.order));
     assert!(floor < 1.5e-3, "{floor}");
-    // The sector's border, which a sample meets or misses, makes it first order there: eight times the step, eight times that.
+    // At the border of the sector, which a sample hits or misses, the order is 1: eight times the step, eight times the error.
     assert!(points[0].1 > 8.0 * points[points.len() - 1].1, "{points:?}");
     assert!(points.windows(2).all(|p| p[1].1 < 1.05 * p[0].1), "{points:?}");
     assert_eq!(dial.points.iter().filter(|p| p.is_default).count(), 1);
 }
 
-/// Every way to take a sample, each against the f64 of the same scene.
+/// Every sampling method against the f64 reference of the same scene.
 #[test]
 fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
     let _alone = alone();
@@ -67,13 +67,13 @@ fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {
     let places: Vec<_> = report.dials[0].points.iter().map(|p| (p.label.as_str(), p.errors.rmse)).collect();
     println!("{places:?}");
     assert_eq!(places.iter().map(|p| p.0).collect::<Vec<_>>(), ["exact", "hardware", "quads"]);
-    // An 8-bit weight is off by 1/512 of what two texels differ by.
+    // An 8-bit weight is off by 1/512 of the difference of two texels.
     assert!(places[0].1 < 1e-3 && places[1].1 < 2e-3 && places[2].1 < 1e-3, "{places:?}");
 }
 
-/// A picture of the device's own as reference says how far it is from where it would go.
+/// A converged picture of the device as reference states its own remaining error.
 #[test]
-fn a_converged_reference_tells_its_own_error() {
+fn a_converged_reference_states_its_own_error() {
     let _alone = alone();
     let report = report(&[], &["rays", "lut", "adaptive"], ReferenceChoice::Converged);
     for dial in &report.dials {
@@ -89,17 +89,17 @@ fn a_converged_reference_tells_its_own_error() {
     assert!(of(3.0) > 3.0 * of(1025.0), "three entries must show: {} and {}", of(3.0), of(1025.0));
 }
 
-/// Settings chosen from the sweep of one scene, tried on another camera and transfer function, against f64.
+/// Settings chosen for one scene, tried with another camera and transfer function, against f64.
 #[test]
 fn the_chosen_settings_hold_on_a_scene_that_the_sweep_did_not_contain() {
     let _alone = alone();
     let swept = report(&[], &["step", "format", "termination"], ReferenceChoice::F64);
     let limit = 0.01;
     let choice = choose::cheapest_under(&swept, Measure::Rmse, limit, 0.25).expect("a choice");
-    println!("{}", choice.say(Measure::Rmse));
+    println!("{}", choice.describe(Measure::Rmse));
     let elsewhere = ["camera.azimuth=25", "camera.elevation=-15", "volume.transfer=warm"];
     let chosen: Vec<&str> = elsewhere.into_iter().chain(choice.set.iter().map(String::as_str)).collect();
-    // The first place of a dial is the scene as it is; the reference of `step` there is f64 with tiny steps.
+    // The first point of a dial is the unchanged scene; the reference of `step` there is f64 with tiny steps.
     let tried = report(&chosen, &["step"], ReferenceChoice::F64);
     let error = tried.dials[0].points[0].errors.rmse;
     println!("predicted {:.2e}, elsewhere {error:.2e}", choice.error);

@@ -1,4 +1,4 @@
-//! What `echolume profile` and `echolume report` measure, on a device. A binary of its own: cargo runs it when nothing else runs.
+//! Measurements of `echolume profile` and `echolume report` on a device. A separate binary: cargo runs it when no other test runs.
 
 mod commands;
 #[path = "../common/mod.rs"]

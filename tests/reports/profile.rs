@@ -1,4 +1,4 @@
-//! The profile's numbers on a device: an injected slow pass is found, and runs that are alike are not called different.
+//! Profiles on a device: an injected slow pass is found, and identical runs are not called different.
 
 use crate::scenes::*;
 use echolume::passes::{DispatchArgs, by_name};
@@ -17,7 +17,7 @@ fn asked(repeats: usize) -> ProfileOptions {
 }
 
 #[test]
-fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
+fn an_injected_slow_pass_is_found_and_no_other_pass_blamed_as_much() {
     let _alone = alone();
     let (quick, slow, frames, scene) = (device(), device(), frames(), scene(SETTINGS));
     slow.faults.slow_down("median_distance", 6);
@@ -32,7 +32,7 @@ fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
     for line in &compared.lines {
         println!("{:20} {:?} {:?}", line.name, line.verdict, line.ratio.as_ref().map(|r| r.estimate));
     }
-    // On a software device a longer pass leaves colder caches to those that run next: they may be slower, but not nearly as much.
+    // On a software device a longer pass leaves colder caches to the following passes: they may be slower, but not nearly as much.
     let ratio = |name: &str| compared.lines.iter().find(|l| l.name == name)?.ratio.as_ref().map(|r| r.estimate);
     assert!(compared.regressions().any(|l| l.name == "median_distance"), "not found");
     let slow = ratio("median_distance").expect("a ratio");
@@ -45,7 +45,7 @@ fn a_slow_pass_is_found_and_no_other_blamed_as_much() {
     assert_eq!(line.verdict, Verdict::Faster);
 }
 
-/// 40 pairs of runs of the same, in turns: at most 5 % of them may be called different in any line.
+/// 40 pairs of identical interleaved runs: at most 5 % of them may be called different in any line.
 #[test]
 fn identical_runs_are_hardly_ever_called_different() {
     let _alone = alone();
@@ -68,14 +68,14 @@ fn identical_runs_are_hardly_ever_called_different() {
     assert!(pairs.len() <= 2, "{} of 40 pairs: {different:?}", pairs.len());
 }
 
-/// What is written down is what was measured, whole and on one clock.
+/// A written profile holds all measurements on one clock.
 #[test]
-fn a_profile_adds_up_and_survives_being_written() {
+fn a_profile_is_consistent_and_round_trips() {
     let _alone = alone();
     let context = device();
     let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
     profile.check().expect("consistent");
-    // Quads are made where the device is a CPU.
+    // Neighbours are packed where the device is a CPU.
     let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "quads");
     assert_eq!(
         names.collect::<Vec<_>>(),
@@ -116,9 +116,9 @@ fn a_profile_adds_up_and_survives_being_written() {
     assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), 6 * 15);
 }
 
-/// The picture alone, from another angle each time: what the camera changes runs again and nothing before it.
+/// Only the picture, from another angle each time: what depends on the camera runs again and nothing before it.
 #[test]
-fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
+fn a_rotating_view_reruns_the_picture_and_not_the_frames() {
     let _alone = alone();
     let context = device();
     let turning = ProfileOptions { still: true, angle_step: 170.0, ..asked(3) };
@@ -132,7 +132,7 @@ fn a_view_that_turns_runs_the_picture_again_and_not_the_frames() {
         assert!(of(ray).expect("cast again").samples_ns.iter().all(|ns| *ns > 0.0), "{mode}: {profile:?}");
         assert!(of("scan_convert").is_none_or(|p| p.runs_per_picture == 0), "{mode}");
         assert_eq!(profile.turn, 170.0);
-        // What was asked for, not where the view has turned to.
+        // The requested camera, not the rotated one.
         assert_eq!(profile.scene, toml::to_string(&scene.settings).expect("settings"));
         if cfg!(target_os = "linux") {
             assert_eq!(profile.cpu_ns.len(), 3);

@@ -1,14 +1,14 @@
-//! A small sweep of a wall, as a recording would give it.
+//! A small sweep of a wall, as from a recording.
 
 use crate::common::gpu::Device;
 use crate::common::probes::wobbler;
-use crate::common::scenes::FLOATS;
+use crate::common::scenes::{self, FLOATS};
 use echolume::probe::{Axis, Geometry, Indices, Probe};
 use echolume::scene::{Scene, Settings};
 use echolume::source::Frame;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What is timed here shares the machine with nothing else of this binary: every test holds this while it runs.
+/// Serialises the tests of this binary, because they measure time: every test holds this while it runs.
 pub fn alone() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
@@ -29,7 +29,7 @@ pub fn probe() -> Probe {
 }
 
 pub fn scene(toml: &str) -> Scene {
-    scene_of(toml::from_str(toml).expect("settings"))
+    scenes::scene(Geometry::Sweep(probe()), FLOATS, toml)
 }
 
 pub fn scene_of(settings: Settings) -> Scene {

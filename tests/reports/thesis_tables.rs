@@ -1,4 +1,4 @@
-//! The thesis' tables: scenes of exactly the stated sizes and passes, a surface where the body has one, and all rows run.
+//! The tables of the thesis: scenes of exactly the stated sizes and passes, a surface where the body has one, and all rows run.
 
 use crate::scenes::alone;
 use crate::scenes::device;
@@ -18,7 +18,7 @@ fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
     steps.map(|s| s.pass.name).collect()
 }
 
-/// What a pass of the plan was specialized by.
+/// A specialization constant of a pass of the plan.
 fn constant(plan: &Plan, scene: &Scene, pass: &str, name: &str) -> i32 {
     let step = plan.steps.iter().find(|s| s.pass.name == pass).expect("pass");
     let constants = (step.pass.constants)(scene, &DispatchArgs::default());
@@ -39,7 +39,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
             assert_eq!((scene.picture_size(), scene.ray_size()), ([n, n], [n, n]), "{}", row.label);
             assert!((scene.high.y - scene.low.y - f64::from(n) * scene.step).abs() < 1e-9, "{} samples", row.label);
             assert!((scene.high.y - scene.low.y - 160.0).abs() < 1e-9 && !scene.rays.is_perspective);
-            // Pixels reach exactly to the sector's ends.
+            // Pixels reach exactly to the ends of the sector.
             let (low, high) = scene.probe().expect("a sweep").plane_bounds();
             let (right, lower) = scene.grid.place(f64::from(n - 1), f64::from(n - 1));
             assert!((right - high[0]).abs() + (lower - high[1]).abs() < 1e-9 && scene.grid.origin == low);
@@ -48,7 +48,7 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
             let (sliding, taps) = match c.filter_3d {
                 Filter3d::None => (0, 0),
                 Filter3d::Sliding(n) => (n, 0),
-                Filter3d::Kept(n) => (0, n),
+                Filter3d::Stored(n) => (0, n),
             };
             let expected = [&["scan_convert"][..], if taps > 0 { &gaussian } else { &[] }].concat();
             assert_eq!(pass_names(&plan, true), expected, "{}", row.label);
@@ -68,12 +68,12 @@ fn scenes_have_exactly_the_stated_sizes_and_passes() {
     }
 }
 
-/// Slices of n x n pixels that are not square put the body where it is. The first crossing lies within a ring of eight samples
+/// Slices of n x n non-square pixels show the body in the right place. The first crossing is within a ring of eight samples
 /// of the edge.
 #[test]
 fn rays_meet_the_surface_where_the_body_has_it() {
     let _alone = alone();
-    for filter_3d in [Filter3d::None, Filter3d::Sliding(3), Filter3d::Kept(3)] {
+    for filter_3d in [Filter3d::None, Filter3d::Sliding(3), Filter3d::Stored(3)] {
         let conditions = Conditions { filter_3d, ..Conditions::usual(true) };
         let scene = scene(&conditions).expect("scene");
         let (step, rays) = (scene.step, scene.rays);
@@ -143,7 +143,7 @@ fn growth_is_the_reference_s() {
             echolume::thesis_tables::growth::scene_of(&grey, growth_settings(row.sigma, row.windows)).expect("scene");
         let slots = reference::render(&scene, std::slice::from_ref(&frame));
         let reference = Growth::new(row.sigma, row.windows, &slots[&Slot::Growth].values);
-        // A pixel whose count is decided by rounding may stop a ring earlier or later.
+        // A pixel whose count depends on rounding may stop a ring earlier or later.
         let moved: u64 = row.counts.iter().zip(&reference.counts).map(|(a, b)| a.abs_diff(*b)).sum();
         assert!(moved <= 2 * 40 * 32 / 200, "{row:?} {reference:?}");
     }

@@ -1,5 +1,5 @@
-//! Bricks in space against the geometry itself: what a place looks at of the texture lies within its brick's reach, and a brick
-//! is inside or outside of the sector only where all of its places are.
+//! Bricks against the geometry itself: the texels sampled at a point are within the reach of its brick, and a brick
+//! is inside or outside of the sector only if all of its points are.
 
 use crate::common::probes::wobbler;
 use crate::common::scenes::{self, BYTES};
@@ -48,7 +48,7 @@ fn probes() -> impl Strategy<Value = Probe> {
     })
 }
 
-/// Texture indices of a place, and whether it lies in the insonified region.
+/// Texture indices of a point, and whether it is in the insonified region.
 fn texel(scene: &Scene, p: DVec3) -> ([f64; 3], bool) {
     let grid = &scene.grid;
     let place = |x: f64, y: f64| [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
@@ -98,7 +98,7 @@ fn check(scene: &Scene, shares: &[[f64; 3]]) {
             assert!(first <= from && to <= last, "axis {axis} at {p}: {from}..={to} of {first}..={last}");
         }
     }
-    // A bound that knows nothing would pass, too.
+    // A trivial bound would pass, too.
     if let (Geometry::Sweep(_), true) = (&scene.geometry, shares.len() > 1000) {
         assert!(inside + outside > shares.len() as u32 / 3, "{inside} inside, {outside} outside of {}", shares.len());
     }
@@ -107,7 +107,7 @@ fn check(scene: &Scene, shares: &[[f64; 3]]) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
     #[test]
-    fn every_place_looks_at_what_its_brick_reaches(
+    fn every_point_samples_only_within_its_bricks_reach(
         probe in probes(),
         brick in prop_oneof![Just(4u32), Just(7), Just(16)],
         pixels in 24..90u32,
@@ -136,7 +136,7 @@ fn bricks_of_a_wobbler_and_of_a_cartesian_volume_are_tight() {
     let grid = Grid { size: [64, 48, 40], spacing: [0.5, 0.4, 0.9], origin: [-4.0, 1.0, -3.0] };
     let volume = scene(Geometry::Cartesian(grid), 8, 64);
     check(&volume, &shares);
-    // A brick of eight texels lies between nine more: three tiles, ten slices.
+    // A brick of eight texels touches ten: three tiles, ten slices.
     let bricks = volume.bricks();
     let reach = volume.reach(&bricks, [3, 3, 3]);
     assert_eq!(reach.tiles.map(|[a, b]| b - a + 1), [3, 3]);
@@ -145,7 +145,7 @@ fn bricks_of_a_wobbler_and_of_a_cartesian_volume_are_tight() {
 }
 
 #[test]
-fn a_scene_whose_places_f32_cannot_tell_apart_takes_every_sample() {
+fn empty_space_skipping_is_off_where_f32_cannot_resolve_positions() {
     let grid = Grid { size: [64, 64, 64], spacing: [1e-3; 3], origin: [900.0, 0.0, 0.0] };
     assert!(!scene(Geometry::Cartesian(grid), 8, 64).skips());
     let grid = Grid { size: [64, 64, 64], spacing: [1.0, 1.0, 1e-3], origin: [0.0; 3] };

@@ -1,11 +1,11 @@
-//! Orders of the compositing rules in f64, and what spoils them.
+//! Convergence orders of the compositing rules in f64, and what degrades them.
 
 use echolume::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps};
 use echolume::passes::raycast::composite::Rule;
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];
 const RAYS: usize = 256;
-/// How far an order may lie from what theory says.
+/// How far an order may deviate from theory.
 const WITHIN: f64 = 0.2;
 
 struct Found {
@@ -16,7 +16,7 @@ struct Found {
 
 fn found(rule: Rule, field: Field, flaw: Flaw) -> Found {
     let (pairs, own) = errors(rule, field, flaw, &steps(STEPS[0], STEPS[1], 10), RAYS);
-    // The truth has to be better than what it judges.
+    // The reference must be more accurate than what it is compared with.
     assert!(own < 1e-3 * pairs[0][1], "the truth is only good to {own:.1e}, the finest step to {:.1e}", pairs[0][1]);
     let fit = fit(&pairs, Range { step: STEPS, floor: own }).expect("ten steps");
     assert_eq!(fit.points, 10);
@@ -43,7 +43,7 @@ fn every_rule_has_its_order() {
     }
 }
 
-/// Why the field of the orders must not end softly: a rule of order 1 would pass for one of order 2.
+/// Why the test field must not vanish smoothly at its ends: a rule of order 1 would seem to be of order 2.
 #[test]
 fn left_samples_look_second_order_where_the_field_vanishes_at_both_ends() {
     assert!(is_order(&found(Rule::CorrectedLeft, Field::Vanishing, NONE).fit, 2.0));
@@ -58,8 +58,8 @@ fn a_dropped_last_step_spoils_order_2() {
     }
 }
 
-/// Places that are rounded to 1/256 voxel leave a floor near 2e-6; above it, which is what a fit has to keep to, the order
-/// is what it was.
+/// Filter weights rounded to 1/256 voxel give an error floor near 2e-6; above it, where a fit must stay, the order
+/// does not change.
 #[test]
 fn filter_weights_of_8_bits_spoil_order_2_down_at_their_floor() {
     for rule in [Rule::Corrected, Rule::PreIntegrated] {
@@ -73,7 +73,7 @@ fn filter_weights_of_8_bits_spoil_order_2_down_at_their_floor() {
     }
 }
 
-/// The experiment can fail: absorption that is 1 % off leaves no order of 2, and an error a thousand times the step's.
+/// The experiment can fail: an absorption that is wrong by 1 % removes the order of 2 and makes the error a thousand times larger.
 #[test]
 fn a_rule_that_is_one_percent_off_is_noticed() {
     for rule in [Rule::Riemann, Rule::CorrectedLeft, Rule::Corrected, Rule::PreIntegrated] {

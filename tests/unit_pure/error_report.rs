@@ -1,4 +1,4 @@
-//! Error against run time without a device: the measures, the front, the choice, the file, the plot.
+//! Error against run time without a device: the metrics, the Pareto front, the choice, the file, the plot.
 
 use crate::common::files::data;
 use echolume::error_report::choose::{cheapest_under, most_accurate_under};
@@ -106,7 +106,7 @@ fn what_cannot_be_compared_is_refused_by_name() {
 }
 
 #[test]
-fn distances_are_compared_where_both_hit_and_the_rest_is_counted() {
+fn distances_are_compared_where_both_hit_and_misses_are_counted() {
     let a = texels(5, 1, &[10.0, 12.0, MISS, 7.0, MISS]);
     let b = texels(5, 1, &[10.5, 11.0, 3.0, MISS, MISS]);
     let e = distances(&a, &b).expect("comparable");
@@ -191,9 +191,9 @@ proptest! {
 fn dials_are_combined_by_squares_and_factors() {
     let cheap = cheapest_under(&small(), Measure::Rmse, 0.04, 0.0).expect("the default is good enough");
     assert_eq!(cheap.set, ["volume_format=r8"]);
-    assert_eq!(cheap.turned, [("format".to_string(), "r8".to_string())]);
+    assert_eq!(cheap.changed, [("format".to_string(), "r8".to_string())]);
     assert!((cheap.error - 0.03f64.hypot(0.02)).abs() < 1e-12 && (cheap.time - 8e6).abs() < 1e-3, "{cheap:?}");
-    // A margin of 15 % leaves no room for that.
+    // A margin of 15 % excludes that.
     let safe = cheapest_under(&small(), Measure::Rmse, 0.04, 0.15).expect("the default is");
     assert!(safe.set.is_empty() && (safe.error - 0.03f64.hypot(0.004)).abs() < 1e-12, "{safe:?}");
     let both = most_accurate_under(&small(), Measure::Rmse, 40e6, 0.0).expect("all fits");
@@ -219,7 +219,7 @@ fn what_cannot_be_reached_names_the_nearest() {
 }
 
 #[test]
-fn dials_of_one_setting_are_not_turned_together() {
+fn dials_of_one_setting_are_not_combined() {
     let sigma = vec![point("none", &[], 0.0, 0.05, 10.0), point("7", &["filter.sigma.window=7"], 7.0, 0.01, 12.0)];
     let median = vec![point("none", &[], 0.0, 0.04, 10.0), point("on", &["filter.sigma=off"], 1.0, 0.01, 11.0)];
     let other = vec![point("none", &[], 0.0, 0.03, 10.0), point("on", &["filter.sigmas=1"], 1.0, 0.0, 11.0)];
@@ -290,7 +290,7 @@ fn times_are_a_median_and_a_range() {
     assert_eq!(Time::of(&[]), None);
 }
 
-/// Eleven dials as a measurement has them, crowded about one default.
+/// Eleven dials as in a real measurement, all close to one default.
 fn crowded() -> Report {
     let names = ["step", "compositing", "format", "filter3d", "termination", "sigma", "perona-malik", "adaptive"];
     let names = names.into_iter().chain(["resolution", "rays", "lut"]);
@@ -313,7 +313,7 @@ fn crowded() -> Report {
 }
 
 #[test]
-fn plots_show_every_dial_and_the_letters_are_drawn() {
+fn plots_show_every_dial_with_its_text() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     for (name, shown) in [("small", small()), ("crowded", crowded())] {
         let svg = plot::svg(&shown, Measure::Rmse, [1200, 800]).expect("a plot");

@@ -1,4 +1,4 @@
-//! Freehand compounding: known answers, an f64 reference written from the formula, holes, and poses that are none. Needs no GPU.
+//! Freehand compounding: known answers, an f64 reference written from the formula, holes, and invalid poses. Needs no GPU.
 
 use echolume::probe::Grid;
 use echolume::source::StoredType;
@@ -10,7 +10,7 @@ fn grid(size: [usize; 3], spacing: f64) -> Grid {
     Grid { size, spacing: [spacing; 3], origin: [-1.0, 2.0, 0.5] }
 }
 
-/// Lateral of the first voxel, its row's depth, and elevation, of a pose without a turn.
+/// A pose without a rotation, at the first voxel of a slice.
 fn straight(grid: &Grid, slice: f64) -> DAffine3 {
     let scale = DMat3::from_diagonal(DVec3::from(grid.spacing));
     let first = DVec3::from(grid.origin) + DVec3::Z * slice * grid.spacing[2];
@@ -79,7 +79,7 @@ fn a_turned_frame_lies_where_its_pose_says() {
     assert_eq!(volume.iter().filter(|v| **v > 0.0).count(), 12);
 }
 
-/// Smooth poses of a hand: turned about every axis, frame after frame a little further.
+/// Smooth freehand poses: rotated about every axis, each frame a little further.
 fn poses(count: usize) -> Vec<DAffine3> {
     let pose = |n: usize| {
         let t = n as f64 / count as f64;
@@ -131,7 +131,7 @@ fn the_weighted_mean_is_that_of_the_formula_in_any_order() {
     let (mut filled, mut worst) = (0, 0.0f64);
     for (n, (sum, weight)) in expected.iter().enumerate() {
         for result in &results {
-            // A weight below what counts as rounding may be in one and not in the other.
+            // A weight below the rounding limit may be counted in one and not in the other.
             if *weight > 0.01 {
                 worst = worst.max((f64::from(result[n]) - sum / weight).abs());
             } else if *weight == 0.0 {
@@ -192,7 +192,7 @@ fn holes_up_to_the_width_are_bridged_and_wider_ones_stay_empty() {
                 let expected = match z {
                     2 => low,
                     z if z == 3 + gap => high,
-                    // Sticks at any angle have their ends in the two frames, in the same shares: the straight line between them.
+                    // Sticks at any angle end in the two frames, in the same shares: the result is the straight line between them.
                     z if z > 2 && z < 3 + gap && gap <= 3 => low + (high - low) * (z - 2) as f32 / (gap + 1) as f32,
                     _ => 0.0,
                 };
@@ -218,7 +218,7 @@ fn only_slices_near_a_frame_are_given_out_again() {
     assert!(compounder.changed_slices().is_empty());
     push(&mut compounder, 12.5, 100);
     assert_eq!(compounder.changed_slices(), [10, 11, 12, 13, 14, 15]);
-    // Slice 11 lies between the frame of before and half of the new one.
+    // Slice 11 is between the previous frame and half of the new one.
     let middle: Vec<u8> = [10, 11, 12, 13].map(|k| compounder.slice(k).unwrap()[5]).into();
     assert_eq!(middle, [50, 75, 100, 100]);
     push(&mut compounder, 0.0, 9);
@@ -237,7 +237,7 @@ fn the_latest_and_the_largest_are_not_the_mean() {
         }
         assert_eq!(volume(&mut compounder)[..4], [expected; 4], "{overlap:?}");
     }
-    // Half way between two slices: within a frame it is still the mean.
+    // Halfway between two slices: within a frame it is still the mean.
     let mut compounder = compounder(grid, StoredType::U8, CompoundingOptions { overlap: Overlap::Latest, ..options() });
     for value in [80, 10] {
         compounder.push(&frame(straight(&grid, 0.5), [2, 2], StoredType::U8, &[value; 4])).unwrap();
@@ -290,20 +290,20 @@ fn no_unusable_frame_changes_the_volume_or_goes_uncounted() {
     let counts = CompoundingCounts { refused: 13, ..CompoundingCounts::default() };
     assert_eq!(compounder.counts(), counts);
     assert!(volume(&mut compounder).iter().all(|v| *v == 0.0));
-    // AsyncPipelineCompiler the volume, and back in it with pixels that are no numbers.
+    // Outside the volume, and inside it again with non-finite pixels.
     let away = with(&|p| p.translation.z += 100.0);
     assert_eq!(compounder.push(&frame(away, [4, 4], StoredType::U8, &[9; 16])), Ok(0));
     let bytes = floats(&[1.0, f32::NAN, f32::INFINITY, -1e31]);
     assert_eq!(compounder.push(&frame(good, [2, 2], StoredType::F32, &bytes)), Ok(1));
     assert_eq!(compounder.counts(), CompoundingCounts { frames: 2, outside: 1, pixels: 3, ..counts });
     assert_eq!(volume(&mut compounder).iter().sum::<f32>(), 1.0);
-    // A pixel alone.
+    // A single pixel.
     let one = with(&|p| p.translation += 0.5);
     assert_eq!(compounder.push(&frame(one, [1, 1], StoredType::U8, &[8])), Ok(1));
 }
 
 #[test]
-fn what_is_clipped_off_is_not_compounded() {
+fn clipped_pixels_are_not_compounded() {
     let grid = grid([4, 4, 1], 1.0);
     for (clip, expected) in [
         ([1, 2, 2, 1], Some(vec![9, 10])),
@@ -340,7 +340,7 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     let moved = lattice.to_volume.transform_vector3(turn * DVec3::new(1.0, 2.0, 3.0));
     assert!((moved - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-9, "{moved}");
     assert!((lattice.to_volume.matrix3.determinant() - 1.0).abs() < 1e-9, "turned over");
-    // Everything is inside, to the last pixel.
+    // Every pixel is inside.
     let mut all = Compounder::new(lattice, StoredType::U8, options.clone()).unwrap();
     for pose in &poses {
         let frame = TrackedFrame { pose: *pose, stored: StoredType::U8, bytes: &vec![200; 101 * 201] };
@@ -359,7 +359,7 @@ fn a_lattice_lies_around_its_frames_along_their_axes() {
     assert!(Lattice::around(&[none], &options).unwrap_err().contains("none of 1 poses"));
     assert!(Lattice::around(&[], &options).is_err());
     assert_eq!(Lattice::around(&[none, poses[0]], &options), Lattice::around(&poses[..1], &options));
-    // Poses that point every way have no mean: the first one's.
+    // Poses in all directions have no mean: the first one is used.
     let back = Pose { to_space: poses[0].to_space * DAffine3::from_rotation_z(std::f64::consts::PI), ..poses[0] };
     let (both, first) = (Lattice::around(&[poses[0], back], &options), Lattice::around(&poses[..1], &options));
     assert!((both.unwrap().to_volume.matrix3 - first.unwrap().to_volume.matrix3).abs_diff_eq(DMat3::ZERO, 1e-9));
@@ -400,7 +400,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_pose_is_met_with_a_panic(
+    fn no_pose_causes_a_panic(
         numbers in prop::collection::vec(prop_oneof![-20.0..20.0f64, any::<f64>()], 24),
         size in prop::array::uniform2(0usize..9),
         clip in prop::option::of(prop::array::uniform4(0usize..9)),
@@ -428,7 +428,7 @@ proptest! {
                 for pose in &poses {
                     let _ = compounder.push(&TrackedFrame { pose: *pose, stored: StoredType::U8, bytes: &bytes });
                 }
-                // What the lattice was laid around lies in it.
+                // The lattice contains the frames that it was made for.
                 prop_assert_eq!(compounder.counts().outside, 0);
             }
         }

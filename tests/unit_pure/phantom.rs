@@ -43,7 +43,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
-fn the_number_of_threads_does_not_show() {
+fn the_number_of_threads_changes_no_byte() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| bytes(small(Body::Head)))
@@ -76,7 +76,7 @@ fn mean_and_sd(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, (values.map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
 }
 
-/// Half a grey for rounding, and the f32 in which levels are kept.
+/// Half a grey level for rounding, plus the rounding of levels in f32.
 const ROUNDING: f64 = 0.501;
 
 #[test]
@@ -119,7 +119,7 @@ fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
     }
 }
 
-/// With speckle too: bright where bright, dark where dark, in the mean.
+/// With speckle the means of bright and dark regions are kept.
 #[test]
 fn speckle_leaves_the_body_where_it_is() {
     let phantom = phantom(PhantomOptions { body: Body::Sphere, ..PhantomOptions::default() });
@@ -139,7 +139,7 @@ fn speckle_leaves_the_body_where_it_is() {
     assert!((sums[1].0 / sums[1].1 - outside).abs() < lower, "{sums:?}");
 }
 
-/// The head moves: between volumes by more than its speckle's seed alone would show, and without speckle too.
+/// The head moves: volumes differ by more than their speckle seeds, and differ without speckle too.
 #[test]
 fn the_head_is_bright_in_dark_fluid_and_moves() {
     let phantom = phantom(PhantomOptions { speckle: false, volumes: 6, ..small(Body::Head) });
@@ -184,14 +184,14 @@ fn a_written_sweep_reads_back_as_it_was_made() {
     }
 }
 
-/// One volume of a motor that stops needs no probe file: the keys of a pre-scan sweep say it all.
+/// One volume of a stepped motor needs no probe file: the keys of a pre-scan sweep are enough.
 #[test]
 fn a_single_volume_stands_alone() {
     let folder = Folder::new("alone");
     let path = folder.join("sweep.mha");
     let made = phantom(small(Body::Sphere));
     made.write(&path).unwrap();
-    // Over itself, as a second run would.
+    // Overwritten, as by a second run.
     made.write(&path).unwrap();
     fs::remove_file(folder.join("sweep.probe.toml")).unwrap();
     let mut recording = Recording::open(&path, None).unwrap();
@@ -222,7 +222,7 @@ fn every_second_volume_goes_backwards() {
 }
 
 #[test]
-fn what_cannot_be_swept_or_written_is_refused_in_one_line() {
+fn impossible_sweeps_and_files_are_refused_in_one_line() {
     let ok = small(Body::Sphere);
     let wrong = [
         (PhantomOptions { volumes: 0, ..ok.clone() }, "volumes"),

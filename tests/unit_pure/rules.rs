@@ -1,4 +1,4 @@
-//! What keeps the walls where they are: layers, shaders that are what their sources say, and passes that agree with both.
+//! The rules of the source tree: layers, embedded shaders that match their sources, and passes that match their shaders.
 //! Needs no GPU.
 
 use crate::common::files::repository;
@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Not as it stands: this file is looked at, too.
+/// Split, because this file is searched too.
 const UNSAFE: &str = concat!("unsafe", " {");
 
 /// Every Rust file below a folder, with its path from the top.
@@ -40,8 +40,8 @@ fn code(text: &str) -> String {
 }
 
 #[test]
-fn layers_hold() {
-    // A folder or file, and what it must not name.
+fn no_layer_uses_a_layer_above_it() {
+    // A folder or file, and the names that it must not contain.
     let rules: &[(&str, &[&str])] = &[
         ("src/scene", &["crate::gpu", "crate::passes", "crate::plan", "crate::barriers", "ash::vk"]),
         ("src/probe", &["crate::gpu", "crate::passes", "crate::plan", "crate::scene", "ash::vk"]),
@@ -74,13 +74,13 @@ fn layers_hold() {
             }
         }
     }
-    // A crate, and where alone it is known.
+    // A crate, and the only places that may use it.
     let motor = "src/probe/motor/";
     let crates: &[(&str, &[&str])] = &[
         ("serialport::", &[motor]),
         ("signal_hook::", &["src/files/signals.rs"]),
         ("tempfile::", &["src/files/"]),
-        // Both wait for what the kernel says of several files at once, which the standard library cannot.
+        // Both wait for several files at once, which the standard library cannot do.
         ("rustix::", &[motor, "src/ui/devices/"]),
         ("evdev::", &["src/ui/devices/"]),
         ("winit::", &["src/ui/window.rs"]),
@@ -102,7 +102,7 @@ fn layers_hold() {
     }
 }
 
-/// The compiler holds what these two lines of walls say; here is that they stay: a module without its `forbid`, a lint that is allowed.
+/// The compiler enforces these attributes. This test fails if one is removed: a module without its `forbid`, an allowed lint.
 #[test]
 fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() {
     let read = |name: &str| std::fs::read_to_string(repository(name)).expect(name);
@@ -128,9 +128,9 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
     }
 }
 
-/// What `tools/mutants` makes a crate of is a crate: nothing in it names a module that it leaves behind.
+/// The crate that `tools/mutants` makes is complete: no file in it names a module that is not copied.
 #[test]
-fn what_mutants_are_planted_in_stands_alone() {
+fn the_crate_of_tools_mutants_is_complete() {
     let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");
     let list = tool.split("\npure=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("its list");
     let copied: Vec<String> = list.split_whitespace().map(|path| format!("src/{path}")).collect();
@@ -238,7 +238,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
                 let shader = (pass.shader)(&scene, &args);
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
-                // As it is compiled, and with its textures as storage images.
+                // As compiled, and with its textures as storage images.
                 let words = interface_check::for_scene(pass, &scene, &args, &spirv::words(bytes)).expect("the scene's");
                 let stored = interface_check::for_cpu(pass, &scene, &args, &words, |_| true);
                 let stored = stored.unwrap_or_else(|e| panic!("{} with {shader}: {e}", pass.name));
@@ -267,7 +267,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
 }
 
 #[test]
-fn a_disagreement_names_both_sides() {
+fn an_interface_mismatch_names_both_sides() {
     let scene = scenes().swap_remove(1);
     let module = spirv::reflect(&spirv::words(spirv::embedded("postprocess/tone.plain").unwrap())).unwrap();
     let tone = echolume::passes::by_name("tone").unwrap();

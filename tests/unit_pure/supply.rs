@@ -1,5 +1,5 @@
-//! Where the crates that are built in come from, and under which licences: what deny.toml says, held without cargo-deny. Known faults
-//! are looked for by tools/deny, where there is a network.
+//! The sources and licences of the crates, by the rules of deny.toml and without cargo-deny, and the Rust version that they need. Known
+//! vulnerabilities are looked up by tools/deny, which needs a network.
 
 use crate::common::files::repository;
 use serde::Deserialize;
@@ -31,6 +31,7 @@ struct Package {
     name: String,
     source: Option<String>,
     license: Option<String>,
+    rust_version: Option<String>,
 }
 
 fn toml<T: for<'de> Deserialize<'de>>(name: &str) -> T {
@@ -41,7 +42,7 @@ fn words(value: &toml::Value) -> Vec<String> {
     value.as_array().expect("a list").iter().map(|word| word.as_str().expect("a word").to_string()).collect()
 }
 
-/// Of the crates that this machine builds: of others nothing is here.
+/// The crates that are built on this machine: the others are not downloaded.
 fn packages() -> Vec<Package> {
     let asked = |program: &str, arguments: &[&str]| {
         let output = Command::new(program).args(arguments).current_dir(repository("")).output();
@@ -95,4 +96,25 @@ fn every_crate_has_a_licence_that_is_allowed() {
         assert!(parsed.evaluate(is_allowed), "{name}: {license} is none of deny.toml's licences");
     }
     assert!(also.is_empty(), "exceptions for crates that are not there: {also:?}");
+}
+
+/// Major, minor and patch of a version such as 1.95.
+fn version(text: &str) -> [u32; 3] {
+    let mut numbers = text.split('.').map(|number| number.parse().expect("a number"));
+    std::array::from_fn(|_| numbers.next().unwrap_or(0))
+}
+
+#[test]
+fn rust_version_is_what_the_crates_need() {
+    let packages = packages();
+    let ours = packages.iter().find(|package| package.name == "echolume").and_then(|p| p.rust_version.as_deref());
+    let ours = ours.expect("Cargo.toml has a rust-version");
+    let mut count = 0;
+    for Package { name, rust_version, .. } in &packages {
+        let Some(needed) = rust_version else { continue };
+        assert!(version(ours) >= version(needed), "{name} needs Rust {needed}: Cargo.toml's rust-version is {ours}");
+        count += 1;
+    }
+    assert!(count > 100, "only {count} crates say which Rust they need");
+    assert!(version("1.88") < version("1.88.1") && version("1.100") > version("1.95") && version("1.95") == [1, 95, 0]);
 }

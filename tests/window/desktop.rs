@@ -1,4 +1,4 @@
-//! A server, a program on it, and what can be seen and done there.
+//! An X server, the program on it, its input and its pictures.
 
 pub use crate::common::files::*;
 pub use crate::common::program::PROGRAM;
@@ -23,7 +23,7 @@ pub const F1: u32 = 0xffbe;
 pub const CONTROL: u32 = 0xffe3;
 pub const ALT: u32 = 0xffe9;
 
-/// A server of its own, so that tests run side by side, with a window manager where shapes of windows matter.
+/// A server for one test, so that tests run in parallel, with a window manager where window shapes matter.
 pub struct Desk {
     server: Child,
     manager: Option<Child>,
@@ -60,8 +60,8 @@ impl Desk {
         desk
     }
 
-    /// Whether the window manager shows a window that asks for it. openbox says that it is there before it is, and what asks in
-    /// between is never shown.
+    /// True if the window manager maps a new window. openbox announces itself before it is ready, and never maps windows created in
+    /// between.
     fn is_managed(&self) -> bool {
         let (connection, setup) = (&self.connection, self.connection.setup());
         let window = connection.generate_id().expect("a name for a window");
@@ -84,7 +84,7 @@ impl Desk {
         framed
     }
 
-    /// `echolume view` with these arguments, its window there.
+    /// Starts `echolume view` with these arguments and waits for its window.
     pub fn view(&self, arguments: &[&str]) -> View<'_> {
         let mut command = Command::new(PROGRAM);
         command.args(["view", "--validate"]).args(arguments).env("DISPLAY", &self.display);
@@ -95,14 +95,14 @@ impl Desk {
             assert!(ended.is_none(), "{arguments:?}: it ended without a window: {}", rest(&mut program));
             self.window(self.root)
         });
-        // Without a window manager nobody gives it the keys.
+        // Without a window manager nothing else gives it the keyboard focus.
         self.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).expect("focus");
         let view = View { desk: self, program: Some(program), window };
         view.hover(20, 20);
         view
     }
 
-    /// The first that can be seen and is called Echolume, under any frames.
+    /// The first visible window named Echolume, inside any frames.
     pub fn window(&self, at: Window) -> Option<Window> {
         let tree = self.connection.query_tree(at).ok()?.reply().ok()?;
         tree.children.into_iter().find_map(|child| {
@@ -145,7 +145,7 @@ impl Drop for Desk {
     }
 }
 
-/// What a program that ended had to say.
+/// The output of a program that has ended.
 fn rest(program: &mut Child) -> String {
     let mut said = String::new();
     for mut pipe in program
@@ -168,7 +168,7 @@ pub struct View<'a> {
 }
 
 impl View<'_> {
-    /// Where its upper left corner lies, and its width and height, pixels.
+    /// Position of its upper left corner, and its width and height, pixels.
     pub fn place(&self) -> ([i16; 2], [u16; 2]) {
         let connection = &self.desk.connection;
         let size = connection.get_geometry(self.window).expect("ask").reply().expect("the window is there");
@@ -177,7 +177,7 @@ impl View<'_> {
         ([at.dst_x, at.dst_y], [size.width, size.height])
     }
 
-    /// What is seen of it now; none while it has another size than it had, or is not there.
+    /// Its present picture; none while its size changes, or if it does not exist.
     pub fn look(&self) -> Option<Picture> {
         let (_, [w, h]) = self.place();
         let image = self.desk.connection.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, w, h, !0).ok()?;
@@ -187,12 +187,12 @@ impl View<'_> {
         Some(Picture { width: w.into(), height: h.into(), rgba })
     }
 
-    /// Waits until it shows exactly this.
+    /// Waits until it shows exactly this picture.
     pub fn shows(&self, wanted: &Picture, what: &str) {
         self.shows_part(wanted, [0, 0], [wanted.width, wanted.height], what);
     }
 
-    /// Waits until the part of the window that begins `corner` shows exactly what the wanted picture has from `from` on.
+    /// Waits until a part of the window shows exactly the same part, from `from` on, of the expected picture.
     pub fn shows_part(&self, wanted: &Picture, from: [u32; 2], size: [u32; 2], what: &str) {
         self.shows_at(wanted, from, from, size, what);
     }
@@ -215,7 +215,7 @@ impl View<'_> {
         panic!("{what}: the window never showed it; see window-expected.png and window-actual.png in {folder:?}");
     }
 
-    /// The pointer over a pixel of the window.
+    /// Moves the pointer over a pixel of the window.
     pub fn hover(&self, x: i16, y: i16) {
         let ([left, top], _) = self.place();
         self.desk.fake(6, 0, [left + x, top + y]);
@@ -252,7 +252,7 @@ impl View<'_> {
         self.program.as_mut().is_some_and(|program| program.try_wait().expect("look").is_none())
     }
 
-    /// Waits for its end: what it said, which it must have ended well with.
+    /// Waits for its end, which must be a success. Returns its output.
     pub fn ended(mut self) -> String {
         let mut program = self.program.take().expect("it ends once");
         let code = until("the end", || program.try_wait().expect("look after the program"));
@@ -261,7 +261,7 @@ impl View<'_> {
         said
     }
 
-    /// Leaves by its key.
+    /// Ends it by its key.
     pub fn leave(self) -> String {
         self.desk.tap('q');
         self.ended()
@@ -280,7 +280,7 @@ impl Drop for View<'_> {
     }
 }
 
-/// A part of a picture; none beyond its edges.
+/// A part of a picture; none if it is not inside.
 pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture> {
     if from[0] + size[0] > picture.width || from[1] + size[1] > picture.height {
         return None;
@@ -293,7 +293,7 @@ pub fn crop(picture: &Picture, from: [u32; 2], size: [u32; 2]) -> Option<Picture
     Some(Picture { width: size[0], height: size[1], rgba })
 }
 
-/// What `echolume render` makes of a recording.
+/// The picture of the sweep that `echolume render` makes.
 pub fn headless(size: [u32; 2], more: &[&str]) -> Picture {
     let folder = Folder::new(&format!("headless-{}x{}-{}", size[0], size[1], more.concat().replace('/', "")));
     let file = folder.path("picture.png");

@@ -1,9 +1,9 @@
-//! A kiosk that something is missing from says what, goes on trying, and needs nobody when it is there.
+//! A kiosk reports what is missing, retries, and continues by itself once it is there.
 
 use crate::desktop::*;
 use std::fs;
 
-/// Whether there is a banner of a fault: its red frame.
+/// True if a banner of a fault is shown: its red frame.
 fn is_amiss(view: &View) -> bool {
     let Some(seen) = view.look() else { return false };
     seen.rgba.chunks(4).filter(|p| p[0] == 240 && p[1] == 96 && p[2] == 84).count() > 300
@@ -17,7 +17,7 @@ fn leave(view: View) {
 }
 
 #[test]
-fn a_configuration_that_is_wrong_is_shown_and_taken_when_it_is_mended() {
+fn a_wrong_configuration_is_reported_and_loaded_once_it_is_corrected() {
     let (desk, folder) = (Desk::new(true), Folder::new("configuration"));
     let file = folder.path("cart.toml");
     fs::write(&file, "source = 'phantom'\nrate = -1\n").expect("write");
@@ -32,7 +32,7 @@ fn a_configuration_that_is_wrong_is_shown_and_taken_when_it_is_mended() {
 }
 
 #[test]
-fn a_source_that_is_missing_is_said_and_shown_when_it_comes() {
+fn a_missing_source_is_reported_and_shown_when_it_appears() {
     let (desk, folder) = (Desk::new(true), Folder::new("source"));
     let (file, later) = (folder.path("cart.toml"), folder.path("sweep.mha"));
     let text = format!("source = '{later}'\n[live]\nretry = '200ms'\n[display]\npanels = false\n");

@@ -1,4 +1,4 @@
-//! The program in a window of a server without a monitor (Xvfb): driven by keys and hands as a person would, and looked at. Every view
+//! The program in a window of a server without a monitor (Xvfb), driven by keys and pointer as by a user. Every view
 //! runs with validation, and any message fails its test. No server is a failure, never a skip.
 
 #[path = "../common/mod.rs"]

@@ -1,16 +1,16 @@
-//! Panels and hands: what is pressed acts on the picture, which stays the headless one where nothing is drawn over it.
+//! Panels: buttons and drags act on the picture, which equals the headless one where nothing is drawn over it.
 
 use crate::desktop::*;
 use echolume::picture::Picture;
 
-/// The window of these tests, and the picture that the panels leave room for: what `ui::panels::picture_area` says.
+/// The window of these tests, and the size of the picture between the panels, from `ui::panels::place`.
 const WINDOW: [u32; 2] = [1000, 700];
 
 fn picture() -> ([u32; 2], [u32; 2]) {
     echolume::ui::panels::picture_area(WINDOW, 1.0, true)
 }
 
-/// Waits until the middle of the picture, which no mark lies on, is that of a headless one.
+/// Waits until the middle of the picture, which has no marks, equals that of a headless one.
 fn shows(view: &View, wanted: &Picture, what: &str) {
     let (corner, size) = picture();
     assert_eq!([wanted.width, wanted.height], size);
@@ -46,7 +46,7 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
     let (corner, size) = picture();
     let start = headless(size, &[]);
     shows(&view, &start, "the start");
-    // Over the sliders' headings, where nothing is.
+    // Over the headings of the sliders, where nothing reacts.
     view.drag([(WINDOW[0] - 200) as i16, 8], [(WINDOW[0] - 120) as i16, 8]);
     shows(&view, &start, "as before");
     let middle = [corner[0] + size[0] / 2, corner[1] + size[1] / 2].map(|n| n as i16);
@@ -60,7 +60,7 @@ fn a_drag_on_the_picture_turns_it_and_one_on_a_panel_does_not() {
 }
 
 #[test]
-fn help_and_times_come_over_the_picture_and_go() {
+fn help_and_times_overlay_the_picture_and_disappear() {
     let desk = Desk::new(false);
     let view = open(&desk);
     let (_, size) = picture();
@@ -70,7 +70,7 @@ fn help_and_times_come_over_the_picture_and_go() {
         desk.tap(key);
         let (corner, size) = picture();
         let middle = [corner[0] + size[0] / 2, corner[1] + size[1] / 2];
-        // Nearly black, whatever the picture is there.
+        // Nearly black, whatever the picture shows there.
         until("the help", || {
             let seen = crop(&view.look()?, middle, [40, 4])?;
             let dark = seen.rgba.chunks(4).filter(|p| p[..3].iter().all(|c| *c < 60)).count();
@@ -83,7 +83,7 @@ fn help_and_times_come_over_the_picture_and_go() {
 }
 
 #[test]
-fn a_picture_and_a_loop_are_saved_under_names_that_say_nothing_of_anybody() {
+fn saved_pictures_and_loops_have_names_without_patient_data() {
     let desk = Desk::new(false);
     let folder = Folder::new("saved");
     let view = desk.view(&["--size", "1000x700", "--source", SWEEP, "--save-to", &folder.path("kept")]);

@@ -1,4 +1,4 @@
-//! What a window shows is what `echolume render` writes, byte for byte.
+//! A window shows what `echolume render` writes, byte for byte.
 
 use crate::desktop::*;
 
@@ -37,7 +37,7 @@ fn a_window_that_is_resized_shows_a_picture_of_its_size() {
         view.resize(size[0], size[1]);
         view.shows(&headless(size, &[]), &format!("{size:?}"));
     }
-    // Smaller than any picture: nothing breaks, and it comes back.
+    // Smaller than any picture: nothing breaks, and the picture returns.
     view.resize(1, 1);
     until("the tiny window", || (view.place().1 == [1, 1]).then_some(()));
     view.resize(200, 160);
@@ -46,7 +46,7 @@ fn a_window_that_is_resized_shows_a_picture_of_its_size() {
 }
 
 #[test]
-fn a_window_at_rest_dispatches_nothing() {
+fn an_idle_window_dispatches_nothing() {
     let desk = Desk::new(false);
     let view = desk.view(&["--no-ui", "--size", "200x160", "--source", SWEEP]);
     view.shows(&headless([200, 160], &[]), "the picture");

@@ -1,4 +1,4 @@
-//! What a window manager does to a window.
+//! Actions of a window manager on a window.
 
 use crate::desktop::*;
 use x11rb::connection::Connection;
@@ -21,7 +21,7 @@ fn close(view: &View) {
 }
 
 #[test]
-fn full_screen_and_back_and_minimised_and_back() {
+fn full_screen_and_minimised_windows_return_to_the_same_picture() {
     let desk = Desk::new(true);
     let view = desk.view(&["--no-ui", "--size", "300x220", "--source", SWEEP]);
     let small = headless([300, 220], &[]);
@@ -46,7 +46,7 @@ fn full_screen_and_back_and_minimised_and_back() {
 }
 
 #[test]
-fn a_window_that_somebody_destroys_ends_the_view_well() {
+fn a_destroyed_window_ends_the_view_without_an_error() {
     let desk = Desk::new(false);
     let view = desk.view(&["--no-ui", "--size", "300x220", "--source", SWEEP]);
     view.shows(&headless([300, 220], &[]), "the window");

@@ -1,5 +1,5 @@
-//! Presentation: [`target`] is a window or a monitor, [`swapchain`] the images of its surface, [`screen`] copies the picture into
-//! one of them and draws the panels over it, [`overlay`] draws the panels. A build without the feature `view` has only a target
+//! Presentation: `target` is a window or a monitor, `swapchain` the images of its surface, `screen` copies the picture into
+//! one of them and draws the panels over it, `overlay` draws the panels. A build without the feature `view` has only a target
 //! that cannot exist.
 
 #[cfg(feature = "view")]

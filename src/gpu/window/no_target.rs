@@ -1,10 +1,11 @@
-//! Takes the place of `window` in a build without the feature `view`: there is no target, so nothing of this is ever called.
+//! The target of presentation in a build without the feature `view`. No value of it exists, so nothing here is ever called.
 
 use crate::gpu::device_selection::Candidate;
 use crate::gpu::error::GpuError;
 use ash::{Entry, Instance};
 use std::ffi::CStr;
 
+/// See the module with the feature `view`.
 pub enum Target {}
 
 impl Target {

@@ -1,4 +1,4 @@
-//! Panels over a picture: what egui laid out, drawn with dynamic rendering.
+//! Draws the panels that egui laid out over the picture, with dynamic rendering.
 
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
@@ -7,31 +7,33 @@ use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 use std::sync::Arc;
 
-/// What there is to draw, as egui lays it out.
+/// The panels to draw, as egui lays them out.
 #[derive(Default)]
 pub struct Panels {
     pub shapes: Vec<egui::ClippedPrimitive>,
-    /// Images, letters among them, that came, changed or went since the last time. They must all be drawn with: each is told once.
+    /// Textures (also of glyphs) that were added, changed or freed since the last frame. egui reports each only once, so none may be
+    /// skipped.
     pub textures: egui::TexturesDelta,
-    /// Pixels of the screen for one of its points.
+    /// Pixels per point.
     pub scale: f32,
 }
 
 impl Drop for Panels {
     fn drop(&mut self) {
-        // Undrawn: whoever has a screen again lays them out anew, and is told of every image. egui panics where some are left.
+        // egui panics if undrawn changes are left. Whoever has a screen again lays the panels out again with all textures.
         self.textures.clear();
     }
 }
 
+/// The renderer of the panels.
 pub struct Overlay {
     context: Arc<Context>,
-    // Taken in `drop`, before the pool goes.
+    // Taken in `drop`, before the pool is destroyed.
     renderer: Option<Renderer<DefaultAllocator>>,
-    /// Of the copies that bring images in.
+    /// For uploads of textures.
     pool: vk::CommandPool,
-    /// Images that what is being drawn may still use for the last time.
-    going: Vec<egui::TextureId>,
+    /// Freed textures that the drawing in flight may still use.
+    freed: Vec<egui::TextureId>,
 }
 
 fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
@@ -44,14 +46,14 @@ fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
 }
 
 impl Overlay {
-    /// `format`: of the images that it draws on.
+    /// `format`: the format of the images that it draws on.
     pub fn new(context: &Arc<Context>, format: vk::Format) -> Result<Overlay, GpuError> {
         let create = vk::CommandPoolCreateInfo::default()
             .queue_family_index(context.queue(0).family)
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
-        let mut overlay = Overlay { context: context.clone(), renderer: None, pool, going: Vec::new() };
+        let mut overlay = Overlay { context: context.clone(), renderer: None, pool, freed: Vec::new() };
         let mode = RenderMode::DynamicRendering(DynamicRendering {
             color_attachment_format: format,
             depth_attachment_format: None,
@@ -64,21 +66,21 @@ impl Overlay {
         Ok(overlay)
     }
 
-    /// Takes the images that came or changed, and forgets those that went the last time. Nothing drawn with it may be in flight.
+    /// Uploads added and changed textures, and frees those that the last call listed as freed. Nothing drawn with it may be in flight.
     pub fn take_textures(&mut self, mut textures: egui::TexturesDelta) -> Result<(), GpuError> {
         let (Some(renderer), pool) = (&mut self.renderer, self.pool) else { return Ok(()) };
-        self.going.drain(..).try_for_each(|id| renderer.free_texture(id)).map_err(failed)?;
+        self.freed.drain(..).try_for_each(|id| renderer.free_texture(id)).map_err(failed)?;
         for (id, deltas) in textures.set.drain() {
             for delta in deltas {
-                // It waits for the copy on the queue itself.
+                // This waits on the queue for the upload.
                 self.context.on_queue(|queue| renderer.set_texture(queue, pool, id, &delta)).map_err(failed)?;
             }
         }
-        self.going.extend(textures.free.drain());
+        self.freed.extend(textures.free.drain());
         Ok(())
     }
 
-    /// Records the drawing, inside dynamic rendering onto an image of this size.
+    /// Records the drawing, inside dynamic rendering to an image of this size, pixels.
     pub fn record(&mut self, commands: vk::CommandBuffer, size: [u32; 2], panels: &Panels) -> Result<(), GpuError> {
         let extent = vk::Extent2D { width: size[0], height: size[1] };
         match &mut self.renderer {

@@ -1,5 +1,5 @@
-//! The picture and the panels, onto the next image of the window. One such drawing is on its way at a time: it is a copy and a few
-//! triangles, and takes no time beside a picture.
+//! Presents a picture and panels: copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
+//! and a few triangles take little time compared with a picture.
 
 use super::overlay::Overlay;
 pub use super::overlay::Panels;
@@ -15,55 +15,55 @@ use crate::passes::Slot;
 use ash::vk;
 use std::sync::Arc;
 
-/// How long an image of the window is waited for, ns: what is covered or unplugged may give none.
+/// Time-out for acquiring an image of the window, ns. A window that is covered or unplugged may never provide one.
 const ACQUIRE_TIMEOUT_NS: u64 = 100_000_000;
-/// What surrounds the picture: the panels' background.
+/// The colour around the picture, which is the background of the panels.
 const BACKGROUND: [f32; 4] = [0.035, 0.04, 0.05, 1.0];
 
-/// What became of showing something.
+/// The result of presenting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PresentOutcome {
     Presented,
-    /// There is nothing to show it on now: the window is minimised, covered, or its monitor is gone.
+    /// Nothing can be presented now: the window is minimised or covered, or its monitor is gone.
     NotPresentable,
 }
 
-/// The picture that a renderer holds, and what orders it before and after what that renderer does.
+/// The picture of a renderer, and what orders its use among the renderer's work.
 pub(in crate::gpu) struct Drawn<'a> {
     pub image: &'a Image,
     pub barriers: &'a mut BarrierRecorder,
     pub timelines: &'a mut Timelines,
-    /// Its upper left corner on the window, pixels.
+    /// The upper left corner of the picture in the window, pixels.
     pub at: [u32; 2],
 }
 
-/// A window or monitor that is drawn on.
+/// A window or monitor on which pictures are presented.
 pub struct Screen {
-    // Dropped in this barriers, after `drop` has waited for the device.
+    // Fields are dropped in this order, after `drop` has waited for the device.
     overlay: Option<Overlay>,
     chain: Swapchain,
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
-    /// Signalled when the image that was acquired may be written.
+    /// Signalled when the acquired image may be written.
     free: vk::Semaphore,
     /// Signalled when the last drawing is done.
     done: vk::Fence,
     context: Arc<Context>,
-    /// The swapchain does not fit the surface any more.
+    /// The swapchain no longer matches the surface.
     stale: bool,
-    /// The surface itself is gone.
+    /// The surface was lost.
     lost: bool,
-    /// An image was acquired and never shown: its semaphore is of no use any more.
+    /// An image was acquired but not presented, so its semaphore cannot be used again.
     unused_acquire: bool,
     wanted: [u32; 2],
     shown: u64,
 }
 
 impl Screen {
-    /// `size`: of the window, pixels; a monitor has its own.
+    /// `size`: the size of the window, pixels; ignored for a monitor.
     ///
     /// # Errors
-    /// A target that the device cannot show anything on.
+    /// A target on which the device cannot present.
     pub fn new(
         context: &Arc<Context>,
         target: Target,
@@ -100,26 +100,26 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Pixels; of the last image that was shown.
+    /// Size of the last presented image, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.chain.size
     }
 
-    /// The window has this size from here on, pixels.
+    /// Sets the size of the window, pixels.
     pub fn resize(&mut self, size: [u32; 2]) {
         self.stale |= size != self.wanted || size != self.chain.size;
         self.wanted = size;
     }
 
-    /// How often something was shown.
+    /// Number of presented images.
     pub fn shown(&self) -> u64 {
         self.shown
     }
 
-    /// Presentation panels alone: there is no picture yet.
+    /// Presents panels without a picture.
     ///
     /// # Errors
-    /// A device that fails; a surface that is lost and cannot be had anew.
+    /// A device that fails; a lost surface that cannot be recreated.
     pub fn show(&mut self, panels: Option<Panels>) -> Result<PresentOutcome, GpuError> {
         self.show_with(None, panels)
     }
@@ -134,12 +134,12 @@ impl Screen {
             if self.overlay.is_none() {
                 self.overlay = Some(Overlay::new(&self.context, self.chain.format)?);
             }
-            // Also where nothing will be shown: they are told once.
+            // Also if nothing can be presented: each change is reported only once.
             if let Some(overlay) = &mut self.overlay {
                 overlay.take_textures(std::mem::take(&mut panels.textures))?;
             }
         }
-        // Once more where the first image says that it does not fit.
+        // Tries again if the swapchain turns out to be out of date.
         for _ in 0..2 {
             if !self.fit()? {
                 return Ok(PresentOutcome::NotPresentable);
@@ -158,7 +158,7 @@ impl Screen {
         Ok(PresentOutcome::NotPresentable)
     }
 
-    /// What a call about the surface said: what can be mended is mended before the next one.
+    /// Notes an error of the surface. What can be recreated is recreated at the next call.
     fn note(&mut self, result: vk::Result) -> Result<(), GpuError> {
         match result {
             vk::Result::ERROR_OUT_OF_DATE_KHR => self.stale = true,
@@ -184,16 +184,16 @@ impl Screen {
 
     /// Waits for the last drawing.
     fn wait(&self) -> Result<(), GpuError> {
-        // SAFETY: the fence is alive; it is signalled or a submission that signals it is on its way.
+        // SAFETY: the fence is alive; it is signalled, or a submission in flight will signal it.
         unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
             .context(|| "draw on the window".into())
     }
 
-    /// Images that fit the surface; false where there is nothing to show on.
+    /// Recreates what no longer matches the surface; false if nothing can be presented.
     fn fit(&mut self) -> Result<bool, GpuError> {
         if self.lost {
             self.chain.renew_surface()?;
-            // Another surface may take another format.
+            // Another surface may need another format.
             self.overlay = None;
             self.lost = false;
             return Ok(false);
@@ -259,8 +259,8 @@ impl Screen {
             let read = Access::of_slot(Slot::Screen, 0, 0..drawn.image.shape.parts(), false, PipelineStage::Copy);
             drawn.barriers.before(&self.context, 0, commands, &[read]);
             if w > 0 && h > 0 {
-                // Of the same size: no value changes, only the order of the channels.
-                // SAFETY: both images are alive and in these layouts; the region lies in both.
+                // The size is the same: only the order of the channels changes.
+                // SAFETY: both images are alive and in these layouts; the region is inside both.
                 unsafe {
                     device.cmd_blit_image(
                         commands,
@@ -314,7 +314,7 @@ impl Screen {
                 semaphore(timelines.of(w.queue).semaphore).value(w.value).stage_mask(everything)
             };
             waits.extend(after.iter().map(wait));
-            // What the renderer does later comes after this too.
+            // Later work of the renderer waits for this too.
             let timeline = timelines.of(0);
             signals.push(semaphore(timeline.semaphore).value(timeline.submitted + 1).stage_mask(everything));
         }
@@ -326,7 +326,7 @@ impl Screen {
         unsafe { self.context.device.reset_fences(&[self.done]) }.context(|| "reset a fence".into())?;
         let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
         if let Err(error) = sent {
-            // Nothing is on its way that would signal it.
+            // No submission in flight would signal the fence.
             self.signal();
             return Err(error);
         }
@@ -339,7 +339,7 @@ impl Screen {
         Ok(())
     }
 
-    /// An empty submission that signals the fence; where even that fails the device is lost, and nothing waits.
+    /// Signals the fence by an empty submission. If that fails too, the device is lost and nothing waits for the fence.
     fn signal(&self) {
         // SAFETY: the fence is not in use.
         let _ = self.context.on_queue(|queue| unsafe { self.context.device.queue_submit2(queue, &[], self.done) });
@@ -359,19 +359,20 @@ impl Drop for Screen {
     }
 }
 
-/// Size of the monitor that is wanted, in the mode that it would be given, pixels.
+/// Resolution of the mode that `choice` selects, pixels.
 ///
 /// # Errors
 /// No such monitor or mode; a context that was not opened for a monitor.
-pub fn monitor_size(context: &Context, wanted: &MonitorChoice) -> Result<[u32; 2], GpuError> {
-    let displays = context.presentation.as_ref().and_then(|shows| shows.displays.as_ref());
+pub fn monitor_size(context: &Context, choice: &MonitorChoice) -> Result<[u32; 2], GpuError> {
+    let displays = context.presentation.as_ref().and_then(|p| p.displays.as_ref());
     let displays = displays.ok_or_else(|| GpuError::Window("the device was not opened for a monitor".into()))?;
-    let region = choose_monitor(displays, context.candidate.handle, wanted)?.mode.parameters.visible_region;
+    let region = choose_monitor(displays, context.candidate.handle, choice)?.mode.parameters.visible_region;
     Ok([region.width, region.height])
 }
 
-/// What part of a picture goes where on a window of this size, and how large that is: it is cropped, never scaled.
-pub fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u32; 2]) {
+/// The blit that copies a picture to pixel `at` of a window of this size, and the size that it covers. Pictures are cropped, never
+/// scaled.
+fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u32; 2]) {
     let from = [image.extent.width, image.extent.height];
     let [w, h] = std::array::from_fn(|i| from[i].min(size[i].saturating_sub(at[i])));
     let layers =
@@ -386,9 +387,9 @@ pub fn region(image: &Image, at: [u32; 2], size: [u32; 2]) -> (vk::ImageBlit, [u
     (blit, [w, h])
 }
 
-/// What happens to an image of the window, in this barriers.
+/// The stages of an image of the window, in order.
 #[derive(Clone, Copy)]
-pub enum Stage {
+enum Stage {
     Acquired,
     Copied,
     Drawn,
@@ -407,10 +408,10 @@ impl Stage {
 
     fn stages(self) -> vk::PipelineStageFlags2 {
         match self {
-            // As the semaphore's wait, which comes before it so.
+            // The stage of the wait for the semaphore of the acquired image.
             Stage::Acquired | Stage::Copied => vk::PipelineStageFlags2::ALL_TRANSFER,
             Stage::Drawn => vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-            // As the semaphore that showing it waits for.
+            // The stage of the semaphore that presentation waits for.
             Stage::Shown => vk::PipelineStageFlags2::ALL_COMMANDS,
         }
     }
@@ -424,7 +425,8 @@ impl Stage {
     }
 }
 
-pub fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
+/// Records the transition of a window's image from one stage to another.
+fn barrier(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image, from: Stage, to: Stage) {
     let barrier = [vk::ImageMemoryBarrier2::default()
         .src_stage_mask(from.stages())
         .src_access_mask(from.accesses())

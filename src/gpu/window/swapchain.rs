@@ -1,4 +1,4 @@
-//! The images that a surface takes in turns.
+//! The swapchain: the images of a surface.
 
 use super::target::Target;
 use crate::gpu::context::{Context, Presentation};
@@ -8,13 +8,13 @@ use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
 
-/// When a picture is shown.
+/// When a picture is presented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PresentMode {
-    /// With the next refresh of the monitor, each one: nothing is torn.
+    /// Each picture waits for a refresh of the monitor, without tearing.
     #[default]
     Fifo,
-    /// The newest with the next refresh, where the driver has it: less latency, pictures that nobody sees.
+    /// The newest picture at each refresh, if the driver supports it: less latency, but some pictures are never presented.
     Mailbox,
 }
 
@@ -30,32 +30,35 @@ impl std::str::FromStr for PresentMode {
     }
 }
 
-/// A surface, whose images come and go with its size.
+/// A surface and its images, which are recreated when its size changes.
 pub struct Swapchain {
     context: Arc<Context>,
-    /// Holds the window: the surface must go first.
+    /// Keeps the window alive; the surface must be destroyed first.
     target: Target,
     surface: vk::SurfaceKHR,
     handle: vk::SwapchainKHR,
-    pub images: Vec<Shown>,
+    pub images: Vec<SwapchainImage>,
     pub format: vk::Format,
     pub size: [u32; 2],
     present_mode: PresentMode,
 }
 
-/// One of its images.
-pub struct Shown {
+/// An image of a swapchain.
+pub struct SwapchainImage {
     pub handle: vk::Image,
     pub view: vk::ImageView,
-    /// Signalled when what is shown next has been drawn.
+    /// Signalled when the image has been drawn and can be presented.
     pub drawn: vk::Semaphore,
 }
 
-/// Formats that keep 8-bit values as they are: what a picture holds is what the monitor gets.
+/// Formats that pass 8-bit values to the monitor unchanged.
 const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
 
 impl Swapchain {
-    /// No images yet: [`Swapchain::fit`] makes them.
+    /// A surface without images; [`Swapchain::fit`] creates them.
+    ///
+    /// # Errors
+    /// A target on which the device cannot present.
     pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
@@ -65,29 +68,35 @@ impl Swapchain {
         Ok(made)
     }
 
-    fn shows(&self) -> Result<&Presentation, GpuError> {
-        self.context.presentation.as_ref().ok_or_else(|| GpuError::Window("the device was not opened for one".into()))
+    fn presentation(&self) -> Result<&Presentation, GpuError> {
+        self.context
+            .presentation
+            .as_ref()
+            .ok_or_else(|| GpuError::Window("the device was not opened for presentation".into()))
     }
 
     fn choose_format(&self) -> Result<vk::Format, GpuError> {
         let (device, family) = (self.context.candidate.handle, self.context.queue(0).family);
         // SAFETY: surface and device belong to this instance; the call only reads.
-        let shows = unsafe { self.shows()?.surfaces.get_physical_device_surface_support(device, family, self.surface) };
-        if shows != Ok(true) {
-            // Nothing else may be asked of such a surface.
-            return Err(GpuError::Window("it is gone, or the device cannot show on it".into()));
+        let is_supported =
+            unsafe { self.presentation()?.surfaces.get_physical_device_surface_support(device, family, self.surface) };
+        if is_supported != Ok(true) {
+            // No other query is allowed for such a surface.
+            return Err(GpuError::Window("the surface is gone, or the device cannot present on it".into()));
         }
         // SAFETY: surface and device belong to this instance; the call only reads.
         let there = unsafe {
-            self.shows()?.surfaces.get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
+            self.presentation()?
+                .surfaces
+                .get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
         }
         .context(|| "list the formats of the surface".into())?;
         let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
         let found = FORMATS.into_iter().find(|f| there.iter().any(|t| t.format == *f && is_plain(t)));
-        found.ok_or_else(|| GpuError::Window("the surface takes no 8-bit UNORM images".into()))
+        found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))
     }
 
-    /// A new surface on the same target: the old one was lost.
+    /// Replaces a lost surface by a new one on the same target.
     pub fn renew_surface(&mut self) -> Result<(), GpuError> {
         self.context.wait_idle();
         self.destroy();
@@ -97,15 +106,15 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Images of the surface's size, or of `wanted` where the surface has none of its own; false where there is nothing to show on, as
-    /// with a window that is minimised. Nothing may be in flight.
+    /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false
+    /// if the surface is empty, as with a minimised window. Nothing may be in flight.
     pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
-        let shows = self.shows()?;
+        let presentation = self.presentation()?;
         let device = self.context.candidate.handle;
         // SAFETY: surface and device belong to this instance; the calls only read.
         let (can, modes) = unsafe {
-            let can = shows.surfaces.get_physical_device_surface_capabilities(device, self.surface);
-            let modes = shows.surfaces.get_physical_device_surface_present_modes(device, self.surface);
+            let can = presentation.surfaces.get_physical_device_surface_capabilities(device, self.surface);
+            let modes = presentation.surfaces.get_physical_device_surface_present_modes(device, self.surface);
             (can.context(|| "ask the surface for its size".into())?, modes.unwrap_or_default())
         };
         let (least, most) = (can.min_image_extent, can.max_image_extent);
@@ -147,22 +156,23 @@ impl Swapchain {
             .present_mode(present_mode)
             .clipped(true)
             .old_swapchain(self.handle);
-        // SAFETY: the create structure is complete; nothing of the old one is in flight, and it is destroyed below.
-        let made = unsafe { shows.swapchains.create_swapchain(&create, None) }.context(|| "create a swapchain".into());
+        // SAFETY: the create structure is complete; nothing of the old swapchain is in flight, and it is destroyed below.
+        let made =
+            unsafe { presentation.swapchains.create_swapchain(&create, None) }.context(|| "create a swapchain".into());
         self.drop_images();
         self.handle = made?;
         // SAFETY: the swapchain is alive.
-        let images = unsafe { self.shows()?.swapchains.get_swapchain_images(self.handle) }
+        let images = unsafe { self.presentation()?.swapchains.get_swapchain_images(self.handle) }
             .context(|| "list the images of the swapchain".into())?;
         for handle in images {
-            let shown = self.shown(handle)?;
-            self.images.push(shown);
+            let image = self.image(handle)?;
+            self.images.push(image);
         }
         self.size = [size.width, size.height];
         Ok(true)
     }
 
-    fn shown(&self, handle: vk::Image) -> Result<Shown, GpuError> {
+    fn image(&self, handle: vk::Image) -> Result<SwapchainImage, GpuError> {
         let create = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
@@ -176,7 +186,7 @@ impl Swapchain {
         match unsafe { device.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) } {
             Ok(drawn) => {
                 self.context.name(handle, "window");
-                Ok(Shown { handle, view, drawn })
+                Ok(SwapchainImage { handle, view, drawn })
             }
             Err(result) => {
                 // SAFETY: nothing uses the view yet.
@@ -186,35 +196,35 @@ impl Swapchain {
         }
     }
 
-    /// The next image to draw on, waiting for it at most so long; the semaphore is signalled when it may be written.
+    /// Acquires the next image; waits at most so long. The semaphore is signalled when the image may be written.
     pub fn acquire(&self, nanoseconds: u64, free: vk::Semaphore) -> Result<u32, vk::Result> {
-        let Some(shows) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         self.context.faults.check(InjectionPoint::Acquire)?;
         // SAFETY: the swapchain is alive, and nothing waits for the semaphore.
         let acquired =
-            unsafe { shows.swapchains.acquire_next_image(self.handle, nanoseconds, free, vk::Fence::null()) };
-        // One that does not fit quite is shown all the same; `present` says so again.
+            unsafe { presentation.swapchains.acquire_next_image(self.handle, nanoseconds, free, vk::Fence::null()) };
+        // A suboptimal image is presented all the same; `present` reports it again.
         acquired.map(|(image, _)| image)
     }
 
-    /// Presentation an image when it has been drawn; true where the swapchain fits no more.
+    /// Presents an image when it has been drawn. Returns true if the swapchain should be recreated.
     pub fn present(&self, image: u32) -> Result<bool, vk::Result> {
-        let Some(shows) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
+        let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);
         let present = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
-        // SAFETY: the image was acquired and a submission that signals `drawn` is on its way.
-        self.context.on_queue(|queue| unsafe { shows.swapchains.queue_present(queue, &present) })
+        // SAFETY: the image was acquired and a submission in flight signals `drawn`.
+        self.context.on_queue(|queue| unsafe { presentation.swapchains.queue_present(queue, &present) })
     }
 
     fn drop_images(&mut self) {
         // SAFETY: nothing is in flight.
         unsafe {
-            for Shown { view, drawn, .. } in self.images.drain(..) {
+            for SwapchainImage { view, drawn, .. } in self.images.drain(..) {
                 self.context.device.destroy_image_view(view, None);
                 self.context.device.destroy_semaphore(drawn, None);
             }
-            if let (Some(shows), false) = (&self.context.presentation, self.handle == vk::SwapchainKHR::null()) {
-                shows.swapchains.destroy_swapchain(self.handle, None);
+            if let (Some(presentation), false) = (&self.context.presentation, self.handle == vk::SwapchainKHR::null()) {
+                presentation.swapchains.destroy_swapchain(self.handle, None);
             }
         }
         self.handle = vk::SwapchainKHR::null();
@@ -222,9 +232,9 @@ impl Swapchain {
 
     fn destroy(&mut self) {
         self.drop_images();
-        if let Some(shows) = &self.context.presentation {
+        if let Some(presentation) = &self.context.presentation {
             // SAFETY: its swapchain is gone; null is allowed.
-            unsafe { shows.surfaces.destroy_surface(self.surface, None) };
+            unsafe { presentation.surfaces.destroy_surface(self.surface, None) };
         }
         self.surface = vk::SurfaceKHR::null();
     }

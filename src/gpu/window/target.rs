@@ -1,4 +1,4 @@
-//! What pictures are shown on: a window of a windowing system, or a monitor that nothing else uses.
+//! The target of presentation: a window, or a monitor without a compositor (VK_KHR_display).
 
 use crate::gpu::device_selection::Candidate;
 use crate::gpu::error::{ErrorContext, GpuError};
@@ -7,12 +7,12 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::ffi::CStr;
 use std::sync::Arc;
 
-/// A window, whichever library made it. It lives as long as anything that is shown on it.
+/// A window of any windowing library. It lives as long as the surface on it.
 pub trait WindowHandles: HasWindowHandle + HasDisplayHandle {}
 
 impl<T: HasWindowHandle + HasDisplayHandle> WindowHandles for T {}
 
-/// What pictures are shown on.
+/// Where pictures are presented.
 #[derive(Clone)]
 pub enum Target {
     Window(Arc<dyn WindowHandles>),
@@ -24,13 +24,13 @@ impl Target {
     /// The instance extensions that a surface on it needs.
     ///
     /// # Errors
-    /// A windowing system that Vulkan cannot show on here.
+    /// A windowing system that Vulkan does not support here.
     pub fn extensions(&self, entry: &Entry) -> Result<Vec<&'static CStr>, GpuError> {
         let wanted: Vec<&'static CStr> = match self {
             Target::Window(window) => {
                 let display = window.display_handle().map_err(|e| GpuError::Window(e.to_string()))?;
                 let names = ash_window::enumerate_required_extensions(display.as_raw())
-                    .map_err(|e| GpuError::Window(format!("Vulkan knows no such windowing system ({e:?})")))?;
+                    .map_err(|e| GpuError::Window(format!("Vulkan does not support this windowing system ({e:?})")))?;
                 // SAFETY: the names are constants of ash, terminated and static.
                 names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect()
             }
@@ -52,7 +52,7 @@ impl Target {
     /// A surface on it for this device.
     ///
     /// # Errors
-    /// A window that is gone; no monitor that is free.
+    /// A window that is gone; no free monitor.
     pub fn surface(
         &self,
         entry: &Entry,
@@ -65,12 +65,12 @@ impl Target {
         };
         let display = window.display_handle().map_err(|e| GpuError::Window(e.to_string()))?;
         let handle = window.window_handle().map_err(|e| GpuError::Window(e.to_string()))?;
-        // SAFETY: both handles are alive: whoever makes the surface holds the window as long as it.
+        // SAFETY: both handles are alive: the owner of the surface keeps the window alive.
         unsafe { ash_window::create_surface(entry, instance, display.as_raw(), handle.as_raw(), None) }
             .context(|| "create a surface on the window".into())
     }
 
-    /// Notes in a candidate's list what keeps it from showing anything here.
+    /// Adds to the missing features of a candidate what it lacks to present here.
     pub fn check_support(&self, entry: &Entry, instance: &Instance, candidate: &mut Candidate) {
         if !candidate.can_present {
             candidate.missing.push("VK_KHR_swapchain or dynamicRendering".into());
@@ -90,24 +90,24 @@ impl Target {
         });
         match shows {
             Ok(true) => {}
-            Ok(false) => candidate.missing.push("a way to show pictures here".into()),
-            // Which monitors there are is said nowhere else.
+            Ok(false) => candidate.missing.push("support for presentation here".into()),
+            // Only this error names the available monitors.
             Err(why) => {
                 let why = if let GpuError::Window(why) = why { why } else { why.to_string() };
-                candidate.missing.push(format!("a way to show pictures here ({why})").into());
+                candidate.missing.push(format!("support for presentation here ({why})").into());
             }
         }
     }
 }
 
-/// Which monitor, and how.
+/// A monitor and a mode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorChoice {
-    /// A part of its name, in any case; the first unless given.
+    /// A part of its name, ignoring case; `None` for the first monitor.
     pub monitor: Option<String>,
-    /// Pixels; its own unless given.
+    /// Resolution, pixels; `None` for its native one.
     pub size: Option<[u32; 2]>,
-    /// Refreshes a second; the most at that size unless given.
+    /// Refresh rate, Hz; `None` for the highest at that resolution.
     pub refresh: Option<f64>,
 }
 
@@ -115,23 +115,24 @@ pub struct MonitorChoice {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monitor {
     pub name: String,
-    /// Pixels of its panel.
+    /// Native resolution, pixels.
     pub size: [u32; 2],
     pub modes: Vec<Mode>,
 }
 
+/// A display mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     pub size: [u32; 2],
-    /// Thousandths of a refresh a second.
+    /// Refresh rate, mHz.
     pub refresh: u32,
 }
 
 impl MonitorChoice {
-    /// Numbers of the monitor and of its mode.
+    /// The indices of the monitor and of its mode.
     ///
     /// # Errors
-    /// What is wanted and not there, with what is.
+    /// No such monitor or mode; the error lists what is available.
     pub fn choose(&self, monitors: &[Monitor]) -> Result<(usize, usize), String> {
         let all = || monitors.iter().map(|m| format!("{:?}", m.name)).collect::<Vec<_>>().join(", ");
         let is_it =
@@ -149,9 +150,9 @@ impl MonitorChoice {
         let area = |m: &Mode| u64::from(m.size[0]) * u64::from(m.size[1]);
         let near = |m: &Mode| self.refresh.map_or(0.0, |hz| (f64::from(m.refresh) / 1000.0 - hz).abs());
         let candidates = modes.iter().enumerate().filter(|(_, m)| m.size == wanted);
-        // The nearest to the refresh that is wanted; otherwise the fastest.
+        // The nearest to the requested refresh rate, or the fastest.
         let best = candidates.min_by(|(_, a), (_, b)| near(a).total_cmp(&near(b)).then(b.refresh.cmp(&a.refresh)));
-        // A panel whose own size is in no mode takes its largest.
+        // If no mode has the native resolution, the largest one is used.
         let best = best.or_else(|| match self.size {
             None => modes.iter().enumerate().max_by_key(|(_, m)| (area(m), m.refresh)),
             Some(_) => None,
@@ -166,7 +167,7 @@ impl MonitorChoice {
     }
 }
 
-/// A plane of the device that can show on a display: the lowest that is free or shows on it already.
+/// The first display plane that supports a display and is free or already used for it.
 fn plane(
     displays: &ash::khr::display::Instance,
     device: vk::PhysicalDevice,
@@ -199,13 +200,15 @@ fn plane(
     Ok(None)
 }
 
-/// What is wanted, as a device lists it.
+/// The chosen monitor and mode.
 pub(super) struct Chosen {
     name: String,
     display: vk::DisplayKHR,
     pub mode: vk::DisplayModePropertiesKHR,
 }
 
+/// Looks up the chosen monitor and mode.
+///
 /// # Errors
 /// No such monitor or mode.
 pub(super) fn choose_monitor(
@@ -236,10 +239,10 @@ pub(super) fn choose_monitor(
     Ok(Chosen { name, display: there[monitor].display, mode: modes[monitor][mode] })
 }
 
-/// A surface over all of the monitor that is wanted.
+/// A surface that covers the chosen monitor.
 ///
 /// # Errors
-/// No such monitor, or another program holds it.
+/// No such monitor, or another program uses it.
 fn monitor_surface(
     entry: &Entry,
     instance: &Instance,
@@ -287,15 +290,19 @@ mod tests {
     }
 
     #[test]
-    fn name_size_and_refresh_are_obeyed() {
+    fn name_size_and_refresh_rate_select_the_mode() {
         let wanted = |monitor: &str, size, refresh| MonitorChoice { monitor: Some(monitor.into()), size, refresh };
         assert_eq!(wanted("eizo", None, Some(60.0)).choose(&monitors()), Ok((1, 0)));
         assert_eq!(wanted("eizo", Some([1024, 768]), None).choose(&monitors()), Ok((1, 2)));
-        assert_eq!(wanted("panel", None, None).choose(&monitors()), Ok((2, 1)), "the largest, its own is in no mode");
+        assert_eq!(
+            wanted("panel", None, None).choose(&monitors()),
+            Ok((2, 1)),
+            "the largest: no mode has the native resolution"
+        );
     }
 
     #[test]
-    fn what_is_not_there_is_named_with_what_is() {
+    fn an_error_names_the_request_and_what_is_available() {
         let none =
             MonitorChoice { monitor: Some("dell".into()), ..MonitorChoice::default() }.choose(&monitors()).unwrap_err();
         assert!(none.contains("dell") && none.contains("EIZO"), "{none}");

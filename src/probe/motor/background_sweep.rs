@@ -1,4 +1,4 @@
-//! A motor that goes back and forth on a thread of its own, and where the array was lately.
+//! A sweep on a thread of its own, and the recent positions of the array.
 
 use super::drive::Drive;
 use super::fault::{Fault, MotorError, Stopped};
@@ -8,29 +8,29 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Positions that are remembered at least: of 20 s at the shortest time between two.
-const KEPT: usize = 4096;
-/// Between two positions that lie further apart nothing is known, s. At 9600 baud a position takes 20 ms, three requests 60.
-const LONGEST_GAP: f64 = 0.1;
+/// Number of positions that are kept at least: those of 20 s at the highest rate.
+const MIN_POSITIONS: usize = 4096;
+/// Between two positions that are further apart the position is not known, s. At 9600 baud a position takes 20 ms, three requests 60.
+const MAX_GAP: f64 = 0.1;
 
-/// A motor that sweeps until it is dropped, or fails. Dropping it stops the motor and waits for that: one request and its reply, or
-/// where the module no longer answers as long as stopping is tried.
+/// A motor that sweeps until this is dropped, or until it fails. Dropping it stops the motor and waits for that: one request and its
+/// reply, or all attempts to stop if the module no longer replies.
 pub struct BackgroundSweep {
     port: String,
-    watch: PositionLog,
+    positions: PositionLog,
     speed: f64,
     angle: f64,
     interrupter: Interrupter,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Where the array was lately. Clones see the same.
+/// The recent positions of the array, with their clock. All clones share them.
 #[derive(Clone)]
 pub struct PositionLog {
     /// Time 0 of the positions.
     start: Instant,
     /// The same, s since 1970.
-    start_of_stamps: f64,
+    start_since_1970: f64,
     state: Arc<Mutex<State>>,
 }
 
@@ -40,62 +40,63 @@ struct State {
 }
 
 impl BackgroundSweep {
-    /// Looks for home unless it was found before, and sweeps without an end.
+    /// Finds home unless `homed`, and sweeps until stopped. `volumes` of the sweep is ignored.
     ///
     /// # Errors
-    /// A sweep that the motor cannot do, before anything has moved. What goes wrong later is told by [`BackgroundSweep::stop`].
+    /// A sweep that exceeds the limits of the motor, before anything moves. Later faults are returned by [`BackgroundSweep::stop`].
     pub fn start(mut drive: Drive, sweep: Sweep, homed: bool) -> Result<BackgroundSweep, MotorError> {
         let sweep = Sweep { volumes: None, ..sweep };
         let speed = sweep.speed(&drive.table, drive.guard.port().settings().round_trip());
         let speed = speed.map_err(|fault| drive.guard.fail("sweep", fault))?;
-        let track = Track { positions: Vec::new(), longest_gap: LONGEST_GAP };
-        let watch = PositionLog {
+        let track = Track { positions: Vec::new(), longest_gap: MAX_GAP };
+        let positions = PositionLog {
             start: Instant::now(),
-            start_of_stamps: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
+            start_since_1970: SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
             state: Arc::new(Mutex::new(State { track, ended: None })),
         };
-        let (interrupter, theirs) = (drive.interrupter(), watch.clone());
+        let (interrupter, theirs) = (drive.interrupter(), positions.clone());
         let port = drive.guard.port().settings().path.clone();
-        let thread = std::thread::Builder::new().name("motor".into()).spawn(move || theirs.turn(drive, &sweep, homed));
+        let thread = std::thread::Builder::new().name("motor".into()).spawn(move || theirs.run(drive, &sweep, homed));
         let thread = thread.map_err(|e| {
             let fault = Fault::OutOfRange(format!("a thread for the motor cannot be started: {e}"));
             MotorError { port: port.clone(), operation: "sweep", fault, stopped: Stopped::NotMoved }
         })?;
-        Ok(BackgroundSweep { port, watch, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
+        Ok(BackgroundSweep { port, positions, speed, angle: sweep.angle, interrupter, thread: Some(thread) })
     }
 
-    pub fn watch(&self) -> &PositionLog {
-        &self.watch
+    /// The recent positions of the array.
+    pub fn positions(&self) -> &PositionLog {
+        &self.positions
     }
 
-    /// Degrees a second between the ramps.
+    /// Speed between the ramps, deg/s.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Degrees from end to end.
+    /// Angle from end to end, degrees.
     pub fn angle(&self) -> f64 {
         self.angle
     }
 
-    /// The motor sweeps no more, whyever: [`BackgroundSweep::stop`] says that.
-    pub fn has_ended(&self) -> bool {
+    /// True if the sweep has ended. [`BackgroundSweep::stop`] returns the reason.
+    pub(crate) fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// Stops the motor and waits for that.
     ///
     /// # Errors
-    /// How the motor ended, unless it was by this: a fault before, a signal, or that it could not be stopped.
+    /// The reason if the sweep had ended before: a fault or a signal; or that the motor could not be stopped.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         self.interrupter.interrupt();
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
-            // The drive has stopped the motor when it was dropped, or has said that it could not.
+            // The drive stopped the motor when it was dropped, or logged that it could not.
             let stopped = Stopped::Unconfirmed("see the messages before this one".into());
             let fault = Fault::Interrupted("a panic on its own thread");
             return Err(MotorError { port: self.port.clone(), operation: "sweep", fault, stopped });
         }
-        match self.watch.ended() {
+        match self.positions.ended() {
             Some(MotorError { fault: Fault::Interrupted(_), stopped: Stopped::Confirmed, .. }) | None => Ok(()),
             Some(error) => Err(error),
         }
@@ -104,9 +105,9 @@ impl BackgroundSweep {
 
 impl Drop for BackgroundSweep {
     fn drop(&mut self) {
-        let known = self.watch.ended().is_some();
+        let is_known = self.positions.ended().is_some();
         if let Err(error) = self.stop()
-            && !known
+            && !is_known
         {
             tracing::error!("{error}");
         }
@@ -118,21 +119,21 @@ impl PositionLog {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    fn turn(&self, mut drive: Drive, sweep: &Sweep, homed: bool) {
+    fn run(&self, mut drive: Drive, sweep: &Sweep, homed: bool) {
         let found = if homed { Ok(()) } else { drive.home() };
         let ended = found.and_then(|()| {
             drive.sweep(sweep, self.start, &mut |position| {
                 let track = &mut self.lock().track;
                 track.push(position);
-                track.forget_all_but(KEPT);
+                track.forget_all_but(MIN_POSITIONS);
             })
         });
-        // Before it is told: whoever hears of it may take the port.
+        // Dropped first: who sees the end may open the port.
         drop(drive);
         self.lock().ended = ended.err();
     }
 
-    /// A time in s of the positions' clock.
+    /// An instant on the clock of the positions, s.
     pub fn time(&self, at: Instant) -> f64 {
         match at.checked_duration_since(self.start) {
             Some(since) => since.as_secs_f64(),
@@ -140,30 +141,30 @@ impl PositionLog {
         }
     }
 
-    /// A stamp in s since 1970 on the positions' clock. Wrong by as much as the system's clock was set since the start.
-    pub fn time_of_stamp(&self, stamp: f64) -> f64 {
-        stamp - self.start_of_stamps
+    /// A time stamp in s since 1970 on the clock of the positions. Off by as much as the system's clock was adjusted since the start.
+    pub(crate) fn time_of_stamp(&self, stamp: f64) -> f64 {
+        stamp - self.start_since_1970
     }
 
-    /// When a time of the positions' clock is. A time that is none or before the start is the start.
-    pub fn instant(&self, time: f64) -> Instant {
+    /// The instant of a time on the clock of the positions. The start for a time that is not finite or before it.
+    pub(crate) fn instant(&self, time: f64) -> Instant {
         let since = Duration::try_from_secs_f64(time.max(0.0)).unwrap_or_default();
         self.start.checked_add(since).unwrap_or(self.start)
     }
 
-    /// Where the array was, see [`Track::at`].
+    /// The position of the array at a time, see [`Track::at`].
     pub fn at(&self, time: f64) -> ArrayState {
         self.lock().track.at(time)
     }
 
-    /// The first position that is remembered and the last one that was read; none before the sweep has begun.
+    /// The oldest and the newest position; None before the sweep has begun.
     pub fn span(&self) -> Option<(Position, Position)> {
         let state = self.lock();
         let positions = state.track.positions();
         Some((*positions.first()?, *positions.last()?))
     }
 
-    /// Why the motor sweeps no more.
+    /// Why the sweep has ended.
     fn ended(&self) -> Option<MotorError> {
         self.lock().ended.clone()
     }

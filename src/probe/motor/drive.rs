@@ -1,5 +1,6 @@
-//! The motor of a probe: where it is, home, back and forth over the sweep, stop. Nothing moves before the limits are checked,
-//! and nothing goes on moving after a fault.
+//! Drives the motor of a probe: status, home, sweep, stop. Nothing moves before the limits are checked, and every fault stops the motor.
+//!
+//! Home is found by the module's own reference search, or by this program with the home switch.
 
 use super::fault::{Fault, MotorError, Stopped};
 use super::guard::{Guard, Interrupter};
@@ -9,24 +10,24 @@ use super::table::{Home, MotorTable, Side};
 use super::tmcl::{self, Request, axis};
 use std::time::{Duration, Instant};
 
-/// Without any movement for so long the motor does not follow.
+/// Without any movement for so long the motor has stalled.
 const STALL_TIME: Duration = Duration::from_millis(400);
-/// Every how many positions the limit switch ahead is looked at as well.
+/// The limit switch ahead is read after so many positions.
 const LOOK_AHEAD: usize = 8;
 
-/// What the module says of itself.
+/// Status of the module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorStatus {
-    /// Number and firmware, `TMCM-1140 firmware 1.16`.
+    /// Number and firmware, for example `TMCM-1140 firmware 1.16`.
     pub module: String,
-    /// Degrees; true only after home.
+    /// Degrees; valid only after [`Drive::home`].
     pub angle: f64,
     /// Degrees a second.
     pub speed: f64,
     pub home_switch: bool,
     pub left_limit: bool,
     pub right_limit: bool,
-    /// Time of the module's own watchdog; zero if it is off, nothing if it has none.
+    /// Time-out of the module's own watchdog; zero if it is off, None if it has none.
     pub watchdog: Option<Duration>,
 }
 
@@ -38,10 +39,10 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Opens the port and makes sure that the module is the one of the table. Moves nothing.
+    /// Opens the port and checks that the module is the one of the table. Moves nothing.
     ///
     /// # Errors
-    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that already turns is then stopped if it can be.
+    /// Any [`Fault`] of the port, and [`Fault::WrongModule`]; a motor that is already moving is then stopped if possible.
     pub fn open(settings: &PortSettings, table: &MotorTable) -> Result<Drive, MotorError> {
         let mut drive = Drive::connect("open", settings, table)?;
         let module = drive.identify();
@@ -56,7 +57,7 @@ impl Drive {
         Ok(Drive { guard: Guard::new(port, table), table: table.clone(), module: String::new() })
     }
 
-    /// Where the motor is and how the module stands. Moves nothing.
+    /// Position, speed, switches and watchdog. Moves nothing.
     ///
     /// # Errors
     /// Any [`Fault`] of the port.
@@ -65,7 +66,7 @@ impl Drive {
         self.done("status", status)
     }
 
-    /// Finds home and counts positions from there.
+    /// Finds home. Positions are counted from there.
     ///
     /// # Errors
     /// Any [`Fault`]; the motor is then stopped.
@@ -76,27 +77,27 @@ impl Drive {
         self.done("home", found)
     }
 
-    /// Goes to the sweep's start and back and forth over it; [`Drive::home`] comes first. Each position that was read goes to
-    /// `seen`, its time in seconds since `start`, rising.
+    /// Moves to the start of the sweep and back and forth over it. Call [`Drive::home`] first. Each position that is read is passed to
+    /// `on_position`, with its time in s since `start`, in rising order. Returns the number of passes.
     ///
     /// # Errors
-    /// Any [`Fault`], [`Fault::OutOfRange`] before anything has moved; the motor is then stopped.
+    /// Any [`Fault`], [`Fault::OutOfRange`] before anything moves. The motor is stopped after any other.
     pub fn sweep(
         &mut self,
         sweep: &Sweep,
         start: Instant,
-        seen: &mut dyn FnMut(Position),
+        on_position: &mut dyn FnMut(Position),
     ) -> Result<usize, MotorError> {
-        let swept = self.sweep_all(sweep, start, seen);
+        let swept = self.sweep_all(sweep, start, on_position);
         self.done("sweep", swept)
     }
 
-    /// Ends from another thread whatever this one is doing. The motor is stopped within one request and its reply.
+    /// A handle that stops the motor from another thread, within one request and its reply.
     pub fn interrupter(&self) -> Interrupter {
         self.guard.interrupter().clone()
     }
 
-    /// Opens the port and stops the motor before anything else is asked, whichever module it is.
+    /// Opens the port and stops the motor before anything else is requested, whichever module it is.
     ///
     /// # Errors
     /// As [`Drive::stop`], and [`Fault::NotOpened`].
@@ -104,10 +105,10 @@ impl Drive {
         Drive::connect("stop", settings, table)?.stop()
     }
 
-    /// Stops the motor and waits until it stands.
+    /// Stops the motor and waits until it is at rest.
     ///
     /// # Errors
-    /// When the module does not confirm it, or turns on.
+    /// The module does not confirm it, or the motor keeps moving.
     pub fn stop(&mut self) -> Result<(), MotorError> {
         let stopped = self.guard.stop();
         let path = self.guard.port().settings().path.clone();
@@ -115,8 +116,8 @@ impl Drive {
             let fault = Fault::NoReply { request: "MST".into(), timeout: self.guard.port().settings().timeout };
             return Err(MotorError { port: path, operation: "stop", fault, stopped });
         }
-        let stands = self.wait_still();
-        self.done("stop", stands)
+        let stopped = self.wait_still();
+        self.done("stop", stopped)
     }
 
     fn done<T>(&mut self, operation: &'static str, result: Result<T, Fault>) -> Result<T, MotorError> {
@@ -139,14 +140,14 @@ impl Drive {
         let answer = self.guard.ask(&Request::version(self.table.address))?.value as u32;
         let (mut module, mut version) = ((answer >> 16) as u16, format!("{}.{}", answer >> 8 & 0xff, answer & 0xff));
         if module == 0 {
-            // Older firmware gives its number as text only.
+            // Older firmware reports its number as text only.
             let bytes = self.guard.ask_raw(&Request::version_text(self.table.address))?;
             (module, version) = tmcl::version_text(&bytes).unwrap_or((0, version));
         }
         match self.table.module {
-            Some(wanted) if wanted != module => Err(Fault::WrongModule {
+            Some(expected) if expected != module => Err(Fault::WrongModule {
                 found: format!("module {module}, firmware {version}"),
-                wanted: format!("module {wanted}"),
+                wanted: format!("module {expected}"),
             }),
             _ => Ok(format!("TMCM-{module} firmware {version}")),
         }
@@ -168,26 +169,31 @@ impl Drive {
     fn watchdog(&mut self) -> Result<Option<Duration>, Fault> {
         match self.guard.ask(&Request::get_global(self.table.address, tmcl::WATCHDOG)) {
             Ok(answer) => Ok(Some(Duration::from_millis(answer.value.max(0) as u64))),
-            // It knows no such parameter, or no global ones at all.
+            // The module has no such parameter, or no global parameters at all.
             Err(Fault::Refused { status: 2..=4 | 6, .. }) => Ok(None),
             Err(fault) => Err(fault),
         }
     }
 
-    /// Sets the module's watchdog as the table has it. The module keeps it over power-off, so it is written only when it differs.
+    /// Sets the module's watchdog to the value of the table. The module stores it permanently, so it is written only if it differs.
     fn set_watchdog(&mut self) -> Result<(), Fault> {
-        let Some(wanted) = self.table.watchdog_ms else { return Ok(()) };
+        let Some(expected) = self.table.watchdog_ms else { return Ok(()) };
         match self.watchdog()? {
             None => tracing::warn!("the module has no watchdog: if this process is killed, the motor is not stopped"),
-            Some(now) if now.as_millis() == u128::from(wanted) => {}
+            Some(now) if now.as_millis() == u128::from(expected) => {}
             Some(_) => {
-                self.guard.ask(&Request::set_global(self.table.address, tmcl::WATCHDOG, i32::from(wanted)))?;
+                self.guard.ask(&Request::set_global(self.table.address, tmcl::WATCHDOG, i32::from(expected)))?;
             }
         }
         Ok(())
     }
 
-    fn sweep_all(&mut self, sweep: &Sweep, start: Instant, seen: &mut dyn FnMut(Position)) -> Result<usize, Fault> {
+    fn sweep_all(
+        &mut self,
+        sweep: &Sweep,
+        start: Instant,
+        on_position: &mut dyn FnMut(Position),
+    ) -> Result<usize, Fault> {
         let speed = sweep.speed(&self.table, self.guard.port().settings().round_trip())?;
         self.set_watchdog()?;
         for side in [Side::Left, Side::Right] {
@@ -206,7 +212,7 @@ impl Drive {
                 let time = at.saturating_duration_since(start).as_secs_f64();
                 if time > last {
                     last = time;
-                    seen(Position { time, angle, direction, pass });
+                    on_position(Position { time, angle, direction, pass });
                 }
             })?;
         }
@@ -214,8 +220,8 @@ impl Drive {
         Ok(volumes)
     }
 
-    /// Goes to an angle and watches it get there.
-    fn travel(&mut self, angle: f64, speed: f64, seen: &mut dyn FnMut(Instant, f64)) -> Result<(), Fault> {
+    /// Moves to an angle, reading positions until it is reached.
+    fn travel(&mut self, angle: f64, speed: f64, on_position: &mut dyn FnMut(Instant, f64)) -> Result<(), Fault> {
         let target = self.table.position(angle);
         let begin = self.get(axis::POSITION)?;
         let from = self.table.angle(begin);
@@ -228,7 +234,7 @@ impl Drive {
             let asked = Instant::now();
             let answer = self.ask(|a, m| Request::get_axis(a, m, axis::POSITION))?;
             if !answer.repeated {
-                seen(answer.at, self.table.angle(answer.value));
+                on_position(answer.at, self.table.angle(answer.value));
             }
             if answer.value == target {
                 return Ok(());
@@ -245,7 +251,7 @@ impl Drive {
                 return Err(Fault::Stalled { angle: self.table.angle(answer.value) });
             }
             if start.elapsed() > limit {
-                return Err(Fault::TooLong { what: "the way to the end of the sweep", limit });
+                return Err(Fault::TooLong { what: "the move to the end of the sweep", limit });
             }
             std::thread::sleep(PERIOD.saturating_sub(asked.elapsed()));
         }
@@ -269,7 +275,7 @@ impl Drive {
         Ok((self.get(axis::HOME_SWITCH)? != 0) != self.table.home_inverted)
     }
 
-    /// Waits until the motor stands, 5 s at most.
+    /// Waits until the motor is at rest, 5 s at most.
     fn wait_still(&mut self) -> Result<(), Fault> {
         let (start, limit) = (Instant::now(), Duration::from_secs(5));
         while self.get(axis::SPEED)? != 0 {
@@ -282,15 +288,16 @@ impl Drive {
     }
 }
 
-/// Without any movement for so long a search has stalled. A module's own search may pause between its steps.
+/// Without any movement for so long a search has stalled. The module's own search may pause between its steps.
 const SEARCH_STALL_TIME: Duration = Duration::from_millis(1500);
-/// Speed of the second, exact approach to the switch, of that of the first.
+/// Speed of the last, exact approach to the switch, as a fraction of that of the first.
 const SLOW_APPROACH: f64 = 0.1;
 
 /// What ended a rotation.
 enum RotationEnd {
-    /// The home switch is as wanted, at this position.
+    /// The home switch reached the requested state, at this position.
     Switch(i32),
+    /// The limit switch ahead is closed.
     Limit,
 }
 
@@ -306,7 +313,7 @@ impl Drive {
         Ok(())
     }
 
-    /// Longest time that a search may take: there and back over the whole travel, and as much again.
+    /// Longest time that a search may take: twice the time to and fro over the whole travel.
     fn longest_search(&self) -> Duration {
         Duration::from_secs_f64(5.0 + 4.0 * self.table.largest_angle_deg / self.table.search_speed())
     }
@@ -333,8 +340,8 @@ impl Drive {
         Ok(())
     }
 
-    /// Turns towards the switch, turning round once at a limit switch; then slowly back over its edge, which is home. The edge is
-    /// always met in the same direction, so that the play of the gear is the same.
+    /// Rotates towards the switch, reversing once at a limit switch, then slowly back over its edge, which is home. The edge is always
+    /// approached from the same side, so that the backlash of the gear has no effect.
     fn search_by_switch(&mut self) -> Result<(), Fault> {
         let (towards, speed) = (self.table.home_direction, self.table.search_speed());
         if !self.at_home_switch()? && matches!(self.rotate(towards, speed, true)?, RotationEnd::Limit) {
@@ -344,7 +351,7 @@ impl Drive {
             }
         }
         self.rest()?;
-        // Fast off the switch and again onto it: the slow way below is then short wherever the search began.
+        // Fast off the switch and onto it again, so that the slow approach below is short wherever the search began.
         if let RotationEnd::Limit = self.rotate(towards.other(), speed, false)? {
             return Err(Fault::HomeNotFound);
         }
@@ -357,7 +364,7 @@ impl Drive {
             return Err(Fault::HomeNotFound);
         };
         self.rest()?;
-        // Position and target together, at rest: the motor has nowhere to go.
+        // Position and target are set together, at rest, so that the motor does not move.
         let position = self.get(axis::POSITION)?.saturating_sub(edge);
         self.set(axis::POSITION, position)?;
         self.set(axis::TARGET, position)
@@ -368,19 +375,19 @@ impl Drive {
         self.wait_still()
     }
 
-    /// Turns until the home switch is closed, or open, or the limit switch ahead is closed.
+    /// Rotates until the home switch is closed (or open), or the limit switch ahead is closed.
     fn rotate(&mut self, side: Side, speed: f64, until_closed: bool) -> Result<RotationEnd, Fault> {
         let (velocity, limit) = (self.table.velocity(speed), self.longest_search().mul_f64(1.0 / SLOW_APPROACH));
-        let turn = if side == Side::Left { Request::rotate_left } else { Request::rotate_right };
+        let request = if side == Side::Left { Request::rotate_left } else { Request::rotate_right };
         if self.limit_closed(side)? {
             return Ok(RotationEnd::Limit);
         }
         let first = self.get(axis::POSITION)?;
         let travel = 1.5 * self.table.largest_angle_deg * self.table.steps_per_degree();
-        self.ask(|a, m| turn(a, m, velocity))?;
+        self.ask(|a, m| request(a, m, velocity))?;
         let (start, mut moved, mut last) = (Instant::now(), Instant::now(), None);
         loop {
-            // The position before and after: the switch changed somewhere between.
+            // The switch changed between the position before and the one after.
             let before = self.get(axis::POSITION)?;
             if self.at_home_switch()? == until_closed {
                 let after = self.get(axis::POSITION)?;
@@ -402,8 +409,10 @@ impl Drive {
         }
     }
 
+    /// Checks that the motor moved lately.
+    ///
     /// # Errors
-    /// The motor has not moved for long: at a limit switch, or stalled.
+    /// It did not: it is at a limit switch, or has stalled.
     fn check_moves(&mut self, position: i32, moved: Instant) -> Result<(), Fault> {
         if moved.elapsed() < SEARCH_STALL_TIME {
             return Ok(());

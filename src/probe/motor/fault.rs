@@ -1,10 +1,10 @@
-//! What can go wrong with the motor, and whether it was stopped: one line that says what, where and what to do.
+//! Faults of the motor, and whether it was stopped: one line with the fault, the port and what to do.
 
 use super::table::Side;
 use super::tmcl::status_words;
 use std::time::Duration;
 
-/// One fault, with what to do about it.
+/// A fault, with what to do about it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Fault {
     #[error("the port cannot be opened: {0}; take one that `echolume probe ports` lists and nothing else uses")]
@@ -17,13 +17,13 @@ pub enum Fault {
     Checksum { request: String },
     #[error("the module refuses {request}: status {status}, {}; check the [motor] table", status_words(*.status))]
     Refused { request: String, status: u8 },
-    #[error("the {} limit switch is closed at {angle:.2} deg; turn the array off it by hand, then run home", .side.name())]
+    #[error("the {} limit switch is closed at {angle:.2} deg; rotate the array off it by hand, then run home", .side.name())]
     LimitSwitch { side: Side, angle: f64 },
     #[error("the motor has stalled at {angle:.2} deg; free the array or lower the acceleration, then run home")]
     Stalled { angle: f64 },
     #[error("the port is gone: {0}; is it unplugged? Plug it in, then run home")]
     Unplugged(String),
-    #[error("this is the wrong module: {found}, and not {wanted} as the probe file says; check the cable and --port")]
+    #[error("this is the wrong module: {found}, and not {wanted} as in the probe file; check the cable and --port")]
     WrongModule { found: String, wanted: String },
     #[error("the home switch was not found within the probe's travel; check the switch, home_inverted and home")]
     HomeNotFound,
@@ -31,29 +31,29 @@ pub enum Fault {
     TooLong { what: &'static str, limit: Duration },
     #[error("interrupted by {0}")]
     Interrupted(&'static str),
-    /// What was asked is beyond the probe or the module: nothing has moved.
+    /// The request exceeds the limits of the probe or the module. Nothing moved.
     #[error("{0}")]
     OutOfRange(String),
 }
 
-/// What became of the motor after a fault.
+/// Whether the motor was stopped after a fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stopped {
-    /// It was never set in motion.
+    /// It was never moved.
     NotMoved,
-    /// The module has confirmed it.
+    /// The module confirmed that it stopped.
     Confirmed,
-    /// The port took the command to stop, but the module has not confirmed it: why.
+    /// The command to stop was sent, but the module did not confirm it: the reason.
     Unconfirmed(String),
-    /// Not even the command could be sent: why.
+    /// The command to stop could not be sent: the reason.
     Failed(String),
 }
 
-/// A fault, where it occurred, and what became of the motor.
+/// A fault, where it occurred, and whether the motor was stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorError {
     pub port: String,
-    /// What was being done: "sweep", "home" ...
+    /// The operation that failed: "sweep", "home" ...
     pub operation: &'static str,
     pub fault: Fault,
     pub stopped: Stopped,

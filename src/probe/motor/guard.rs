@@ -1,7 +1,7 @@
-//! What stops the motor whatever happens: on drop, and so on an early return or a panic, and on SIGINT, SIGTERM and SIGHUP.
+//! Stops the motor in every case: on drop, and so on an early return or a panic, and on SIGINT, SIGTERM and SIGHUP.
 //!
-//! A process that is killed outright (SIGKILL) or whose machine fails cannot do that: only the module's own watchdog can,
-//! see [`super::tmcl::WATCHDOG`].
+//! A process that is killed (SIGKILL), or whose machine fails, cannot do that. Then only the module's own watchdog stops the motor, see
+//! [`super::tmcl::WATCHDOG`].
 
 use super::fault::{Fault, MotorError, Stopped};
 use super::port::{Answer, Port};
@@ -11,13 +11,13 @@ use crate::files::signals::Held;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Interrupts what a motor is doing from any thread, as a signal would. Clones are one and the same.
+/// Interrupts the operation of a motor from any thread, as a signal does. All clones control the same motor.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupter(Arc<AtomicBool>);
 
 impl Interrupter {
-    /// Whatever the motor is doing ends with [`Fault::Interrupted`] before the next request, the motor stopped; so does all that it
-    /// is asked to do later.
+    /// The current operation ends with [`Fault::Interrupted`] before its next request, and the motor is stopped. All later operations
+    /// end in the same way.
     pub fn interrupt(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
@@ -27,14 +27,14 @@ impl Interrupter {
     }
 }
 
-/// The only way to the module: whatever may set the motor in motion goes through it, so it knows what has to be stopped.
+/// All requests to the module go through the guard, so that it knows whether the motor has to be stopped.
 pub struct Guard {
     port: Port,
     address: u8,
     motor: u8,
     /// The motor may be in motion.
     moving: bool,
-    /// The module may be looking for its reference.
+    /// The module may be searching its reference.
     searching: bool,
     held: Held,
     interrupter: Interrupter,
@@ -52,7 +52,7 @@ impl Guard {
     /// Those of [`Port::ask`], and [`Fault::Interrupted`] once a signal has come or the [`Interrupter`] was used.
     pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
         self.interrupted()?;
-        // Before it is sent: what was not answered may have been carried out.
+        // Set before it is sent: a request without a reply may have been carried out.
         self.moving |= request.moves();
         self.searching |= request.moves() && request.command == command::REFERENCE_SEARCH;
         self.port.ask(request)
@@ -62,7 +62,7 @@ impl Guard {
     ///
     /// # Errors
     /// As [`Guard::ask`].
-    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+    pub(crate) fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
         self.interrupted()?;
         self.port.ask_raw(request)
     }
@@ -90,22 +90,22 @@ impl Guard {
         self.moving
     }
 
-    /// The motor has come to rest by itself where it was sent.
-    pub fn at_rest(&mut self) {
+    /// The motor has stopped by itself at its target.
+    pub(crate) fn at_rest(&mut self) {
         (self.moving, self.searching) = (false, false);
     }
 
-    /// Stops the motor, and a search, signal or not: each command is sent up to three times until the module confirms it.
+    /// Stops the motor, and a reference search, also after a signal. Each command is sent up to three times until the module confirms it.
     pub fn stop(&mut self) -> Stopped {
-        // What is still on its way is no answer to MST: no waiting for it.
+        // Does not wait for the replies to earlier requests.
         self.port.hurry();
         let stop = Request::stop(self.address, self.motor);
-        let mut told = self.port.ask(&stop);
-        if self.searching && !matches!(told, Err(Fault::Unplugged(_))) {
-            // Some modules go on with a reference search after MST alone.
-            told = self.port.ask(&Request::search_stop(self.address, self.motor)).and_then(|_| self.port.ask(&stop));
+        let mut reply = self.port.ask(&stop);
+        if self.searching && !matches!(reply, Err(Fault::Unplugged(_))) {
+            // Some modules continue a reference search after MST alone.
+            reply = self.port.ask(&Request::search_stop(self.address, self.motor)).and_then(|_| self.port.ask(&stop));
         }
-        match told {
+        match reply {
             Ok(_) => {
                 (self.moving, self.searching) = (false, false);
                 Stopped::Confirmed
@@ -115,18 +115,18 @@ impl Guard {
         }
     }
 
-    /// Stops the motor after a fault and says so.
+    /// Stops the motor after a fault.
     pub fn fail(&mut self, operation: &'static str, fault: Fault) -> MotorError {
-        // A motor that was not moved from here is stopped all the same: another program may have left it turning.
+        // A motor that this program did not move is stopped, too: another program may have left it moving.
         let harmless = matches!(fault, Fault::OutOfRange(_)) && !self.moving;
         let stopped = if harmless { Stopped::NotMoved } else { self.stop() };
-        // It was tried three times: once more on drop would only take longer.
+        // It was tried three times. Trying again on drop would only take longer.
         self.moving = false;
         MotorError { port: self.port.settings().path.clone(), operation, fault, stopped }
     }
 }
 
-/// A fault of stopping, without the advice.
+/// A fault while stopping, without the advice.
 fn why(fault: &Fault) -> String {
     match fault {
         Fault::NoReply { .. } => "it does not answer".into(),

@@ -1,8 +1,8 @@
 //! The motor that wobbles the array: a stepper behind a TMCL module on a serial port.
 //!
-//! [`tmcl`] is the protocol and [`port`] the line; [`guard`] stops the motor whatever happens; [`drive`] finds home and sweeps;
-//! [`sweep`] gives each frame its angle and direction; [`background_sweep`] sweeps on a thread of its own beside a stream of frames;
-//! [`simulate`] is a module for those who have none.
+//! [`tmcl`] is the protocol and [`port`] the serial port. [`guard`] stops the motor in every case. [`drive`] finds home and sweeps,
+//! [`sweep`] computes the speed and gives each frame its angle and direction, [`background_sweep`] sweeps on a thread of its own during
+//! a stream, and [`simulate`] is a simulated module for tests and demonstrations.
 
 pub mod background_sweep;
 pub mod drive;

@@ -1,8 +1,8 @@
-//! One TMCL module behind a serial port: requests and replies, with a time-out on everything.
+//! The serial port of one TMCL module: requests and replies, all with a time-out.
 //!
-//! A TMCL reply names its command but not the parameter, so an answer that comes too late could be taken for the answer to
-//! the next question. Therefore whatever lies in the port is thrown away before a request, and after a time-out also what
-//! still arrives. Only requests that do no harm twice are sent again ([`Request::repeatable`]).
+//! A TMCL reply names its command but not the parameter, so a late reply could be mistaken for the reply to the next request. Therefore
+//! the port's input is discarded before each request, and after a time-out also what still arrives. Only requests that may be carried
+//! out twice are sent again ([`Request::repeatable`]).
 
 use super::fault::Fault;
 use super::tmcl::{LENGTH, Reply, Request, SUCCESS};
@@ -14,13 +14,13 @@ pub use serialport::{Parity, StopBits};
 
 /// Shortest time between two requests for the position.
 pub(super) const PERIOD: Duration = Duration::from_millis(5);
-/// How often a repeatable request is sent at most.
-const TRIES: usize = 3;
+/// Most attempts of a repeatable request.
+const MAX_TRIES: usize = 3;
 
-/// How to reach the module. TMCL modules come with 9600 baud, no parity, one stop bit.
+/// Settings of the serial port. The default of TMCL modules is 9600 baud, no parity, one stop bit.
 #[derive(Clone, Debug)]
 pub struct PortSettings {
-    /// `/dev/ttyUSB0`, `COM3`.
+    /// For example `/dev/ttyUSB0` or `COM3`.
     pub path: String,
     /// Bits a second.
     pub baud: u32,
@@ -41,7 +41,7 @@ impl PortSettings {
         }
     }
 
-    /// Time that a request and its reply are on the wire at least.
+    /// Transmission time of a request and its reply.
     pub fn round_trip(&self) -> Duration {
         let parity = u32::from(self.parity != Parity::None);
         let stop = if self.stop_bits == StopBits::Two { 2 } else { 1 };
@@ -53,9 +53,9 @@ impl PortSettings {
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     pub value: i32,
-    /// Half way between the request and its reply.
+    /// Midway between the request and its reply.
     pub at: Instant,
-    /// Needed more than one try: `at` may belong to another reply than `value`.
+    /// More than one attempt was needed: `at` may belong to another reply than `value`.
     pub repeated: bool,
 }
 
@@ -63,12 +63,12 @@ pub struct Answer {
 pub struct Port {
     serial: Box<dyn SerialPort>,
     settings: PortSettings,
-    /// An earlier reply may still be on its way.
+    /// The reply to an earlier request may still arrive.
     late: bool,
 }
 
 impl Port {
-    /// Opens the port for this process alone.
+    /// Opens the port exclusively.
     ///
     /// # Errors
     /// [`Fault::NotOpened`].
@@ -91,16 +91,16 @@ impl Port {
     /// [`Fault::NoReply`], [`Fault::Checksum`] after three tries of a repeatable request and one of any other;
     /// [`Fault::Refused`]; [`Fault::Unplugged`].
     pub fn ask(&mut self, request: &Request) -> Result<Answer, Fault> {
-        let tries = if request.repeatable() { TRIES } else { 1 };
+        let tries = if request.repeatable() { MAX_TRIES } else { 1 };
         let mut fault = None;
         for attempt in 0..tries {
             match self.ask_once(request) {
                 Ok((reply, at)) if reply.status == SUCCESS => {
-                    // It may be the answer to an earlier try, and that to the last still be on its way.
+                    // This may be the reply to an earlier attempt, and that to the last may still arrive.
                     self.late |= attempt > 0;
                     return Ok(Answer { value: reply.value, at, repeated: attempt > 0 });
                 }
-                // Status 1: it has understood nothing and done nothing.
+                // Status 1: the module received a wrong checksum and did nothing.
                 Ok((reply, _)) => fault = Some(Fault::Refused { request: request.to_string(), status: reply.status }),
                 Err(gone @ Fault::Unplugged(_)) => return Err(gone),
                 Err(other) => fault = Some(other),
@@ -113,11 +113,11 @@ impl Port {
         Err(fault.unwrap_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout }))
     }
 
-    /// Sends a request whose nine bytes of reply have no checksum, and gives them as they are.
+    /// Sends a request whose reply of nine bytes has no checksum. Returns the bytes.
     ///
     /// # Errors
     /// [`Fault::NoReply`], [`Fault::Unplugged`].
-    pub fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
+    pub(crate) fn ask_raw(&mut self, request: &Request) -> Result<[u8; LENGTH], Fault> {
         let mut received = self.send(request)?;
         let until = Instant::now() + self.settings.timeout;
         while received.len() < LENGTH && self.receive(&mut received, until)? {}
@@ -126,8 +126,8 @@ impl Port {
         bytes.ok_or(Fault::NoReply { request: request.to_string(), timeout: self.settings.timeout })
     }
 
-    /// Lets the next request go out at once, even if an earlier reply may still be on its way.
-    pub fn hurry(&mut self) {
+    /// The next request is sent at once, even if the reply to an earlier one may still arrive.
+    pub(crate) fn hurry(&mut self) {
         self.late = false;
     }
 
@@ -140,7 +140,7 @@ impl Port {
                 let answered = Instant::now();
                 return Ok((reply, sent + (answered - sent) / 2));
             }
-            // Noise may come before the reply, but not for ever.
+            // Noise may precede the reply, but only so much.
             if received.len() > 64 * LENGTH || !self.receive(&mut received, until)? {
                 break;
             }
@@ -152,7 +152,7 @@ impl Port {
         Err(Fault::Checksum { request: request.to_string() })
     }
 
-    /// Sends a request into a quiet line.
+    /// Discards pending input, then sends a request.
     fn send(&mut self, request: &Request) -> Result<Vec<u8>, Fault> {
         if self.late {
             self.drain()?;
@@ -170,7 +170,7 @@ impl Port {
         Ok(Vec::with_capacity(2 * LENGTH))
     }
 
-    /// Waits for more bytes until a time; whether there were any. Once a whole reply's worth has come, a pause ends it.
+    /// Waits for more bytes until `until`; false if none arrived. After the length of a reply, a short pause ends the wait.
     fn receive(&mut self, received: &mut Vec<u8>, until: Instant) -> Result<bool, Fault> {
         let pause = (self.settings.round_trip() + Duration::from_millis(40)).min(self.settings.timeout);
         let until = if received.len() < LENGTH { until } else { until.min(Instant::now() + pause) };
@@ -185,7 +185,7 @@ impl Port {
         }
     }
 
-    /// Throws away what still arrives, until nothing has for one time-out, for three at most.
+    /// Discards what still arrives until nothing did for one time-out, for at most three.
     fn drain(&mut self) -> Result<(), Fault> {
         let start = Instant::now();
         let mut bytes = [0; 64];
@@ -201,7 +201,7 @@ impl Port {
         Ok(())
     }
 
-    /// Reads or writes by a time; nothing if that has passed.
+    /// Reads or writes until `until`; None if that has passed.
     fn timed(
         &mut self,
         until: Instant,
@@ -213,7 +213,7 @@ impl Port {
             match act(&mut *self.serial) {
                 Ok(count) => return Ok(Some(count)),
                 Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => return Ok(None),
-                // A signal: whoever asked for it is told elsewhere.
+                // A signal. It is handled elsewhere.
                 Err(e) if e.kind() == ErrorKind::Interrupted => {}
                 Err(e) => return Err(Fault::Unplugged(e.to_string())),
             }
@@ -225,7 +225,7 @@ fn gone(error: serialport::Error) -> Fault {
     Fault::Unplugged(error.to_string())
 }
 
-/// The serial ports of this machine, each with what is known about it.
+/// The serial ports of this machine: name and description.
 ///
 /// # Errors
 /// In words, where the system cannot list them.

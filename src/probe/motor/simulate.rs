@@ -1,4 +1,9 @@
-//! A TMCL module on a pseudo-terminal, for tests and for anyone without the hardware: [`Simulator`].
+//! A simulated TMCL module on a pseudo-terminal, for tests and for users without the hardware: [`Simulator`].
+//!
+//! It models ramps, a load with inertia, a position counter and switches. The shaft's own position is counted from the edge of the home
+//! switch, in microsteps. The module's counter starts at 0 wherever the shaft is, until a search. The home switch is a flag over half
+//! the travel: closed left of home (right of it if `home_direction` is right). A reference search goes straight to it. This is a model of
+//! the protocol and of how a motor moves, not of the firmware of a product.
 
 use super::table::{MotorTable, Side};
 use super::tmcl::{self, LENGTH, Reply, Request, SUCCESS, axis, command};
@@ -14,28 +19,29 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// What can be made to go wrong.
+/// The kinds of faults that can be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// Obeys, but does not answer.
+    /// Carries out requests but does not reply.
     Mute,
-    /// Every answer's checksum is wrong.
+    /// The checksum of every reply is wrong.
     Checksum,
     /// The right limit switch closes and stays closed.
     LimitSwitch,
-    /// The rotor is held fast; the module notices and stops.
+    /// The rotor is blocked; the module notices and stops.
     Stall,
-    /// The port vanishes.
+    /// The port disappears.
     Unplugged,
-    /// The firmware gives another module's number.
+    /// The firmware reports the number of another module.
     WrongModule,
-    /// Bytes of noise come before every answer, some of which are whole answers with a wrong checksum.
+    /// Noise precedes every reply; some of it are complete replies with a wrong checksum.
     Noise,
-    /// Every answer comes three seconds late.
+    /// Every reply is three seconds late.
     Slow,
 }
 
 impl FaultKind {
+    /// All kinds, with their names on the command line.
     pub const ALL: [(&'static str, FaultKind); 8] = [
         ("mute", FaultKind::Mute),
         ("checksum", FaultKind::Checksum),
@@ -48,8 +54,7 @@ impl FaultKind {
     ];
 }
 
-/// A fault and when it begins: `NAME`, from the start; `NAME@SECONDS`, so long after the module was first sent to a position,
-/// which is when a sweep begins.
+/// A fault and when it begins: `NAME` at once; `NAME@SECONDS` so long after the first move to a position, which is when a sweep begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedFault {
     pub kind: FaultKind,
@@ -63,7 +68,7 @@ impl FromStr for SimulatedFault {
         let (name, after) = text.split_once('@').map_or((text, None), |(name, after)| (name, Some(after)));
         let kind = FaultKind::ALL.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
         let names = FaultKind::ALL.map(|(name, _)| name).join(", ");
-        let kind = kind.ok_or_else(|| format!("'{name}' is no fault; there are {names}"))?;
+        let kind = kind.ok_or_else(|| format!("'{name}' is not a fault; the faults are {names}"))?;
         let seconds = |text: &str| text.parse::<f64>().ok().filter(|s| (0.0..=3600.0).contains(s));
         let after = match after {
             None => None,
@@ -73,7 +78,7 @@ impl FromStr for SimulatedFault {
     }
 }
 
-/// What the simulator is to be.
+/// What to simulate.
 #[derive(Clone, Debug, Default)]
 pub struct SimulatorOptions {
     pub table: MotorTable,
@@ -103,7 +108,7 @@ impl Simulator {
         grantpt(&master)?;
         unlockpt(&master)?;
         let path = PathBuf::from(ptsname(&master, Vec::new())?.to_string_lossy().into_owned());
-        // Held open here, the terminal outlives its users and keeps the settings: no echo of what is sent.
+        // Kept open, so that the terminal outlives its users and keeps its settings: no echo.
         let slave = ioctl_tiocgptpeer(&master, OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         let mut settings = tcgetattr(&slave)?;
         settings.make_raw();
@@ -123,22 +128,22 @@ impl Simulator {
         &self.path
     }
 
-    /// Every request that was understood so far, in order.
+    /// All valid requests so far, in order.
     pub fn received(&self) -> Vec<Request> {
         locked(&self.shared.received).clone()
     }
 
-    /// The motor turns at this moment.
-    pub fn turning(&self) -> bool {
-        locked(&self.shared.module).turning()
+    /// True while the motor moves.
+    pub fn is_moving(&self) -> bool {
+        locked(&self.shared.module).is_moving()
     }
 
-    /// Where the array really is, in degrees of the sweep.
+    /// The true angle of the array in the sweep, degrees.
     pub fn angle(&self) -> f64 {
         locked(&self.shared.module).angle()
     }
 
-    /// It was unplugged, or its port has failed.
+    /// True if it was unplugged or its port has failed.
     pub fn ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
@@ -187,7 +192,7 @@ impl Line {
                 let count = rustix::io::read(&self.master, &mut bytes)?;
                 pending.extend_from_slice(&bytes[..count]);
             } else {
-                // Whoever was killed has left the port to itself alone; the next one is to have it.
+                // A user that was killed left the port in exclusive mode; the next one must be able to open it.
                 let _ = ioctl_tiocnxcl(&self.slave);
             }
             let (now, before) = (Instant::now(), last);
@@ -214,9 +219,9 @@ impl Line {
                         replies.push(module.answer(&request).bytes());
                         pending = rest.to_vec();
                     }
-                    // Another module's: this one says nothing.
+                    // For another module: no reply.
                     Some(_) => pending = rest.to_vec(),
-                    // Shifted: the next byte may be the first.
+                    // Out of step: the next byte may be the first.
                     None => drop(pending.remove(0)),
                 }
             }
@@ -254,7 +259,7 @@ impl Line {
     }
 }
 
-/// What of the reply number `count` goes over the wire.
+/// The bytes that are sent for reply number `count`.
 fn with_fault(mut reply: [u8; LENGTH], due: Option<FaultKind>, count: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     match due {
@@ -273,10 +278,10 @@ fn with_fault(mut reply: [u8; LENGTH], due: Option<FaultKind>, count: usize) -> 
 }
 
 /// Longest step of the integration, s.
-const STEP: f64 = 5e-4;
-/// Where the shaft is when the module is switched on, degrees from home.
+const MAX_STEP: f64 = 5e-4;
+/// Angle of the shaft when the module is switched on, degrees from home.
 const START_ANGLE: f64 = 7.0;
-/// How far beyond the largest sweep the limit switches are, degrees.
+/// Distance of the limit switches from the ends of the largest sweep, degrees.
 const LIMIT_MARGIN: f64 = 3.0;
 /// Status codes.
 const BAD_COMMAND: u8 = 2;
@@ -299,18 +304,18 @@ struct Module {
     table: MotorTable,
     /// Number in the firmware's version.
     number: u16,
-    /// Whether it has a watchdog.
+    /// It has a watchdog.
     watchdog: bool,
-    /// The load takes no steeper ramp: beyond it the motor stalls. Microsteps a second squared.
+    /// Steepest ramp under load, microsteps/s2. Above it the motor stalls.
     strength: f64,
-    /// The rotor does not follow any more, and the module has noticed and stopped.
+    /// The rotor no longer follows, and the module has noticed and stopped.
     stalled: bool,
     /// The right limit switch is closed wherever the shaft is.
     limit_closed: bool,
     activity: Activity,
     /// Microsteps from the home switch's edge.
     shaft: f64,
-    /// The counter less the shaft.
+    /// Counter minus shaft.
     offset: f64,
     /// Microsteps a second.
     speed: f64,
@@ -343,13 +348,13 @@ impl Module {
         }
     }
 
-    /// Degrees of the array in the sweep, whatever the counter says.
+    /// Angle of the array in the sweep, degrees, whatever the counter is.
     fn angle(&self) -> f64 {
         self.table.angle(self.shaft.round() as i32)
     }
 
-    /// The motor turns, or would.
-    fn turning(&self) -> bool {
+    /// True while the motor moves.
+    fn is_moving(&self) -> bool {
         self.speed != 0.0
     }
 
@@ -375,7 +380,7 @@ impl Module {
         closed != self.table.home_inverted
     }
 
-    /// Lets time pass. `idle`: no command is waiting to be read, so the watchdog may bark.
+    /// Advances the simulation. `idle`: no command is waiting to be read, so the watchdog may act.
     fn pass(&mut self, time: Duration, idle: bool) {
         let mut left = time.as_secs_f64();
         self.since_command += left;
@@ -383,7 +388,7 @@ impl Module {
             self.activity = Activity::Velocity(0.0);
         }
         while left > 0.0 {
-            let step = left.min(STEP);
+            let step = left.min(MAX_STEP);
             self.step(step);
             left -= step;
         }
@@ -392,11 +397,11 @@ impl Module {
     fn step(&mut self, time: f64) {
         let acceleration = self.register(axis::LARGEST_ACCELERATION) / self.table.acceleration_scale();
         let towards = |from: f64, to: f64, most: f64| {
-            // As fast as can still be braked, a little less for the size of the steps.
+            // The speed from which it can still brake, slightly less because of the finite steps.
             let fast = (1.9 * acceleration * (to - from).abs()).sqrt();
             fast.min(most).copysign(to - from)
         };
-        let (wanted, end) = match self.activity {
+        let (target_speed, end) = match self.activity {
             Activity::Velocity(velocity) => (velocity, None),
             Activity::Position(target) => {
                 let most = self.register(axis::LARGEST_SPEED) / self.table.speed_scale();
@@ -412,7 +417,7 @@ impl Module {
             self.halt();
             return;
         }
-        let change = (wanted - self.speed).clamp(-acceleration * time, acceleration * time);
+        let change = (target_speed - self.speed).clamp(-acceleration * time, acceleration * time);
         if change != 0.0 && acceleration > self.strength {
             self.stalled = true;
         }
@@ -435,7 +440,7 @@ impl Module {
         }
     }
 
-    /// Stands at once. A search goes on by itself no more.
+    /// Stops at once. A search does not continue.
     fn halt(&mut self) {
         self.speed = 0.0;
         if let Activity::Velocity(_) | Activity::Position(_) = self.activity {

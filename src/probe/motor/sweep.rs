@@ -1,59 +1,58 @@
-//! A sweep: how fast it has to be, and where the array was at any time, from the positions that were read: each frame's
-//! angle and direction. Pure.
+//! A sweep: its speed, and the position and direction of the array at any time, from the positions that were read. Pure.
 
 use super::fault::Fault;
 use super::port::PERIOD;
 use super::table::MotorTable;
 use std::time::Duration;
 
-/// Fewest passes a second: slower ones would take longer than anything is waited for.
-const SLOWEST: f64 = 1e-3;
+/// Fewest passes a second. Slower ones would exceed every time-out.
+const MIN_RATE: f64 = 1e-3;
 /// Narrowest sweep, degrees.
-const NARROWEST: f64 = 1e-3;
+const MIN_ANGLE: f64 = 1e-3;
 
-/// A sweep to be done.
+/// A requested sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
-    /// From end to end, degrees; the middle is 0.
+    /// From end to end, degrees; centred on 0.
     pub angle: f64,
-    /// Passes over the angle, and so volumes, a second.
+    /// Passes over the angle, that is volumes, a second.
     pub rate: f64,
-    /// Passes; without a number until interrupted.
+    /// Number of passes; None: until interrupted.
     pub volumes: Option<usize>,
 }
 
 impl Sweep {
-    /// Speed, degrees a second, of the middle of a pass between the table's ramps. `round_trip`: of a request and its reply.
+    /// Speed between the ramps of a pass, deg/s. `round_trip`: time of a request and its reply.
     ///
     /// # Errors
     /// [`Fault::OutOfRange`] naming the limit.
     pub fn speed(&self, table: &MotorTable, round_trip: Duration) -> Result<f64, Fault> {
         let Sweep { angle, rate, volumes } = *self;
         let refuse = |fault: String| Err(Fault::OutOfRange(fault));
-        if !(NARROWEST..=table.largest_angle_deg).contains(&angle) {
+        if !(MIN_ANGLE..=table.largest_angle_deg).contains(&angle) {
             return refuse(format!(
-                "--angle {angle}: must be {NARROWEST} to {} deg, the probe's widest",
+                "--angle {angle}: must be {MIN_ANGLE} to {} deg, the probe's widest",
                 table.largest_angle_deg
             ));
         }
-        if !(SLOWEST..=table.largest_rate).contains(&rate) {
+        if !(MIN_RATE..=table.largest_rate).contains(&rate) {
             return refuse(format!(
-                "--rate {rate}: must be {SLOWEST} to {} volumes/s, the probe's most",
+                "--rate {rate}: must be {MIN_RATE} to {} volumes/s, the probe's most",
                 table.largest_rate
             ));
         }
         if volumes == Some(0) {
             return refuse("--volumes 0: must be at least 1".into());
         }
-        // At the turn: the end is noticed, and the way back is asked for.
-        let turn = 2.5 * round_trip.max(PERIOD).as_secs_f64();
-        let (time, acceleration) = (1.0 / rate - turn, table.acceleration_deg_per_s2);
-        // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2, written so that nothing cancels.
+        // At each end: the end is noticed, and the next pass is requested.
+        let pause = 2.5 * round_trip.max(PERIOD).as_secs_f64();
+        let (time, acceleration) = (1.0 / rate - pause, table.acceleration_deg_per_s2);
+        // Ramps of a trapezoid over `angle` in `time`: v = (a t - sqrt((a t)^2 - 4 a angle)) / 2, written without cancellation.
         let least = (4.0 * angle / acceleration).sqrt();
         if time < least {
             return refuse(format!(
                 "--rate {rate}: over {angle} deg at {acceleration} deg/s2 at most {:.2} volumes/s can be done",
-                1.0 / (least + turn)
+                1.0 / (least + pause)
             ));
         }
         let at = acceleration * time;
@@ -68,16 +67,17 @@ impl Sweep {
     }
 }
 
-/// The way of a pass.
+/// The direction of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Towards larger angles.
     Forward,
+    /// Towards smaller angles.
     Backward,
 }
 
 impl Direction {
-    /// 1 forwards, -1 backwards.
+    /// 1 for forward, -1 for backward.
     pub fn sign(self) -> f64 {
         if self == Direction::Forward { 1.0 } else { -1.0 }
     }
@@ -87,27 +87,27 @@ impl Direction {
     }
 }
 
-/// One position that was read during a sweep.
+/// A position that was read during a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// Seconds, of any clock that all positions and frames share.
+    /// s, on a clock that positions and frames share.
     pub time: f64,
     /// Degrees.
     pub angle: f64,
-    /// Of the pass that it belongs to.
+    /// Direction of its pass.
     pub direction: Direction,
     /// Number of the pass, from 0.
     pub pass: usize,
 }
 
-/// Where a frame lies.
+/// Position of the array at the time of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArrayState {
-    /// Within a pass.
+    /// Within a pass; angle in degrees.
     Sweeping { angle: f64, direction: Direction, pass: usize },
-    /// Near a turning point: the angle is between those of two passes, the direction is not known.
+    /// Near a reversal between two passes: the direction is not known. Angle in degrees.
     Reversing { angle: f64 },
-    /// Before the first or after the last position, or within a gap.
+    /// Not known: before the first or after the last position, or within a gap.
     Unknown,
 }
 
@@ -119,10 +119,10 @@ pub struct Track {
 }
 
 impl Track {
-    /// Positions in order of time. Two that lie further apart than `longest_gap` seconds have nothing known between them.
+    /// Positions in order of time. Between two that are more than `longest_gap` seconds apart the position is not known.
     ///
     /// # Errors
-    /// In words, when a time or an angle is not finite, the times do not rise, or the gap is not above 0.
+    /// In words: a time or an angle is not finite, the times do not rise, or the gap is not above 0.
     pub fn new(positions: Vec<Position>, longest_gap: f64) -> Result<Track, String> {
         if let Some(at) = positions.iter().position(|p| !p.time.is_finite() || !p.angle.is_finite()) {
             return Err(format!("position {at} is not finite"));
@@ -140,7 +140,7 @@ impl Track {
         &self.positions
     }
 
-    /// Adds a position behind the others. One that is not finite, or not later than the last, is left out: false.
+    /// Appends a position. One that is not finite or not later than the last is left out; then false.
     pub fn push(&mut self, position: Position) -> bool {
         let later = self.positions.last().is_none_or(|last| position.time > last.time);
         let fits = later && position.time.is_finite() && position.angle.is_finite();
@@ -150,15 +150,15 @@ impl Track {
         fits
     }
 
-    /// Forgets the oldest positions, now and then: at least `newest` stay, and never more than twice as many.
+    /// Removes the oldest positions: at least `newest` remain, and never more than twice as many.
     pub fn forget_all_but(&mut self, newest: usize) {
         if self.positions.len() > 2 * newest {
             self.positions.drain(..self.positions.len() - newest);
         }
     }
 
-    /// Where the array was at a time, linearly between the two positions around it. The error is at most a dt^2 / 8 for an
-    /// acceleration a and positions dt apart: 0.1 deg for 8000 deg/s2 and 10 ms.
+    /// Position of the array at a time, interpolated linearly between the two positions around it. The error is at most a dt^2 / 8 for
+    /// an acceleration a and positions dt apart: 0.1 deg for 8000 deg/s2 and 10 ms.
     pub fn at(&self, time: f64) -> ArrayState {
         let after = self.positions.partition_point(|p| p.time < time);
         let Some(b) = self.positions.get(after) else { return ArrayState::Unknown };
@@ -171,7 +171,7 @@ impl Track {
             return ArrayState::Unknown;
         }
         let angle = a.angle + (b.angle - a.angle) * ((time - a.time) / gap);
-        // Against the direction of its pass the array only swings.
+        // A movement against the direction of the pass is an oscillation at its end.
         let along = (b.angle - a.angle) * a.direction.sign() > 0.0;
         if a.pass == b.pass && along {
             ArrayState::Sweeping { angle, direction: a.direction, pass: a.pass }

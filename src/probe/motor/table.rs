@@ -1,29 +1,30 @@
-//! The `[motor]` table of a probe file, and what its numbers make of degrees. Angles are those of the sweep, in degrees: 0 in
-//! the middle, rising forwards.
+//! The `[motor]` table of a probe file, and conversions between degrees and the units of the module. Angles are those of the sweep, in
+//! degrees: 0 in the middle, increasing forwards.
 
 use serde::Deserialize;
 
 /// Clock of the motion controllers whose velocities are not in microsteps a second, Hz.
 const TMC429_CLOCK: f64 = 16e6;
 
-/// How the motor finds the place that its positions count from.
+/// How the motor finds home, the position that all others are counted from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Home {
-    /// By the module's own search (RFS), in the mode that is set in the module.
+    /// By the module's own reference search (RFS), in the mode that is set in the module.
     #[default]
     ReferenceSearch,
-    /// By turning until the home switch closes, and slowly back until it opens: there is home.
+    /// By rotating until the home switch closes, and slowly back until it opens: that is home.
     Switch,
 }
 
-/// Where the home switch is looked for first.
+/// A direction of rotation of the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
     /// Towards smaller positions of the module.
     #[default]
     Left,
+    /// Towards larger positions of the module.
     Right,
 }
 
@@ -37,11 +38,11 @@ impl Side {
     }
 }
 
-/// What the module's velocities and accelerations count.
+/// Unit of the module's velocities and accelerations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Units {
-    /// Microsteps a second, and a second squared.
+    /// Microsteps/s and microsteps/s2.
     #[default]
     Pps,
     /// 0 to 2047, scaled by the pulse and the ramp divisor (axis parameters 154 and 153).
@@ -52,42 +53,43 @@ pub enum Units {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorTable {
-    /// Full steps of the motor a turn, 4 to 10000.
+    /// Full steps of one revolution of the motor, 4 to 10000.
     pub steps_per_turn: u32,
     /// Microsteps of a full step, as set in the module: 1, 2, 4 ... 256.
     pub microsteps: u32,
-    /// Turns of the motor for one of the array, 0.001 to 10000.
+    /// Revolutions of the motor for one revolution of the array, 0.001 to 10000.
     pub gear: f64,
-    /// Rising positions turn the array backwards.
+    /// Increasing positions rotate the array backwards.
     #[serde(default)]
     pub reversed: bool,
-    /// The module's address, 1 to 255.
+    /// Address of the module, 1 to 255.
     #[serde(default = "one")]
     pub address: u8,
     /// The axis of the module, 0 to 5.
     #[serde(default)]
     pub motor: u8,
-    /// Number that the firmware gives (1140 of a TMCM-1140); without it any TMCL module will do.
+    /// Number that the firmware reports (1140 for a TMCM-1140); None: any TMCL module.
     pub module: Option<u16>,
     #[serde(default)]
     pub home: Home,
+    /// Direction in which the home switch is searched first.
     #[serde(default)]
     pub home_direction: Side,
     /// The home switch reads 0 when it is closed.
     #[serde(default)]
     pub home_inverted: bool,
-    /// Where home lies in the sweep, degrees.
+    /// Angle of home in the sweep, degrees.
     #[serde(default)]
     pub home_angle_deg: f64,
-    /// Speed of the search for home, degrees a second; without it the module's own (reference search) or 10 (switch).
+    /// Speed of the search for home, deg/s; None: the module's own (reference search) or 10 (switch).
     pub search_speed_deg_per_s: Option<f64>,
-    /// Largest sweep from end to end that the probe allows, degrees, up to 360.
+    /// Largest sweep of the probe from end to end, degrees, up to 360.
     pub largest_angle_deg: f64,
-    /// Most sweeps (volumes) a second that the probe allows, up to 100.
+    /// Most sweeps (volumes) a second, up to 100.
     pub largest_rate: f64,
-    /// Largest speed that the motor follows, degrees a second.
+    /// Largest speed that the motor follows, deg/s.
     pub largest_speed_deg_per_s: f64,
-    /// Of the ramps; what the motor follows under its load. Degrees a second squared.
+    /// Acceleration of the ramps, which the motor must be able to follow under its load, deg/s2.
     pub acceleration_deg_per_s2: f64,
     #[serde(default)]
     pub units: Units,
@@ -96,8 +98,8 @@ pub struct MotorTable {
     pub pulse_divisor: u8,
     #[serde(default)]
     pub ramp_divisor: u8,
-    /// The module's own watchdog, 100 to 65535 ms: stops the motor when no command came for so long. 0: is switched off.
-    /// Left out: stays as it is in the module.
+    /// The module's own watchdog, 100 to 65535 ms: the motor is stopped if no command arrives for so long. 0 switches it off. None leaves
+    /// the setting of the module unchanged.
     pub watchdog_ms: Option<u16>,
 }
 
@@ -106,7 +108,7 @@ fn one() -> u8 {
 }
 
 impl Default for MotorTable {
-    /// Of the simulated module: a motor of 200 steps, 16 microsteps, geared 12 to 1.
+    /// The table of the simulated module: 200 steps, 16 microsteps, gear ratio 12.
     fn default() -> MotorTable {
         MotorTable {
             steps_per_turn: 200,
@@ -134,6 +136,9 @@ impl Default for MotorTable {
 }
 
 impl MotorTable {
+    /// Checks all fields.
+    ///
+    /// # Errors
     /// The first field that is out of its range, and what is wrong with it.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
         let limits = [
@@ -175,19 +180,19 @@ impl MotorTable {
                 return Err((field, format!("makes {register:.1} in the module, which takes 1 to {most}")));
             }
         }
-        // One microstep is the finest that a position can say; the ends of the widest sweep must still be an i32.
+        // A sweep needs at least two microsteps, and its ends must fit into an i32.
         if self.largest_angle_deg * self.steps_per_degree() < 2.0 || self.steps_per_degree() > 4e6 {
             return Err(("motor.gear", format!("makes {} microsteps a degree", self.steps_per_degree())));
         }
         Ok(())
     }
 
-    /// Microsteps of the motor a degree of the array.
+    /// Microsteps of the motor for one degree of the array.
     pub fn steps_per_degree(&self) -> f64 {
         f64::from(self.steps_per_turn) * f64::from(self.microsteps) * self.gear / 360.0
     }
 
-    /// The module's position, in microsteps from home, nearest to an angle in degrees. Saturates.
+    /// The position nearest to an angle in degrees: microsteps from home. Saturates.
     pub fn position(&self, angle: f64) -> i32 {
         ((angle - self.home_angle_deg) * self.steps_per_degree() * self.sign()).round() as i32
     }
@@ -201,7 +206,7 @@ impl MotorTable {
         if self.reversed { -1.0 } else { 1.0 }
     }
 
-    /// Degrees a second of the search for home.
+    /// Speed of the search for home, deg/s.
     pub fn search_speed(&self) -> f64 {
         self.search_speed_deg_per_s.unwrap_or(self.largest_speed_deg_per_s.min(10.0))
     }
@@ -214,8 +219,8 @@ impl MotorTable {
         acceleration * self.steps_per_degree() * self.acceleration_scale()
     }
 
-    /// The module's units of one microstep a second.
-    pub fn speed_scale(&self) -> f64 {
+    /// One microstep/s in the module's unit.
+    pub(crate) fn speed_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
             // TMC429 data sheet: v = clock * velocity / (2^pulse_divisor * 2048 * 32).
@@ -223,8 +228,8 @@ impl MotorTable {
         }
     }
 
-    /// The module's units of one microstep a second squared.
-    pub fn acceleration_scale(&self) -> f64 {
+    /// One microstep/s2 in the module's unit.
+    pub(crate) fn acceleration_scale(&self) -> f64 {
         match self.units {
             Units::Pps => 1.0,
             // TMC429 data sheet: a = clock^2 * acceleration / 2^(pulse_divisor + ramp_divisor + 29).
@@ -234,17 +239,17 @@ impl MotorTable {
         }
     }
 
-    /// A speed in degrees a second as the module's velocity, at least 1.
+    /// A speed in deg/s as the module's velocity, at least 1.
     pub fn velocity(&self, speed: f64) -> i32 {
         (self.speed_register(speed).round() as i32).max(1)
     }
 
-    /// A velocity of the module in degrees a second.
+    /// A velocity of the module in deg/s.
     pub fn speed(&self, velocity: i32) -> f64 {
         f64::from(velocity) / self.speed_scale() / self.steps_per_degree() * self.sign()
     }
 
-    /// An acceleration in degrees a second squared in the module's units, at least 1.
+    /// An acceleration in deg/s2 in the module's unit, at least 1.
     pub fn acceleration(&self, acceleration: f64) -> i32 {
         (self.acceleration_register(acceleration).round() as i32).max(1)
     }

@@ -1,10 +1,10 @@
-//! TMCL, Trinamic's binary serial protocol: nine bytes there, nine bytes back. Nothing here touches a port.
+//! TMCL, Trinamic's binary serial protocol: requests and replies of nine bytes. Pure.
 //!
 //! A request is {address, command, type, motor or bank, value as big-endian i32, checksum}, a reply {host, module, status,
 //! command, value as big-endian i32, checksum}; the checksum is the sum of the first eight bytes modulo 256. Source: the
 //! TMCL firmware manuals of the TMCM modules, chapters "Binary command format" and "Reply format".
 
-/// Bytes of a request and of a reply.
+/// Length of a request and of a reply, bytes.
 pub const LENGTH: usize = 9;
 
 /// Numbers of the commands.
@@ -43,10 +43,10 @@ pub mod axis {
 /// which the module stops its motors; 0 is off.
 pub const WATCHDOG: u8 = 68;
 
-/// What a reply says when all went well.
+/// Status of a reply: the command was carried out.
 pub const SUCCESS: u8 = 100;
 
-/// A status code in words.
+/// Description of a status code.
 pub fn status_words(status: u8) -> &'static str {
     match status {
         SUCCESS => "carried out",
@@ -57,7 +57,7 @@ pub fn status_words(status: u8) -> &'static str {
         4 => "the value is out of its range",
         5 => "its configuration memory is locked",
         6 => "the command is not available at present",
-        128 => "the target was reached, which nobody asked",
+        128 => "the target was reached; this was not requested",
         _ => "a status that no TMCL manual lists",
     }
 }
@@ -67,15 +67,15 @@ pub fn checksum(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |sum, b| sum.wrapping_add(*b))
 }
 
-/// One request, whatever its command.
+/// A request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
-    /// The module's, 1 to 255.
+    /// Address of the module, 1 to 255.
     pub address: u8,
     pub command: u8,
-    /// What the command is about: a parameter's number, or how to move.
+    /// Type of the command: the number of a parameter, or how to move.
     pub kind: u8,
-    /// The axis, or of global parameters and inputs the bank.
+    /// The axis, or the bank of global parameters and inputs.
     pub motor: u8,
     pub value: i32,
 }
@@ -85,27 +85,27 @@ impl Request {
         Request { address, command, kind, motor, value }
     }
 
-    /// ROR: turns right, towards larger positions, until told otherwise. `velocity` in the module's units.
+    /// ROR: rotates right, towards larger positions, until another command. `velocity` in the module's unit.
     pub fn rotate_right(address: u8, motor: u8, velocity: i32) -> Request {
         Request::new(address, motor, command::ROTATE_RIGHT, 0, velocity)
     }
 
-    /// ROL: turns left, towards smaller positions, until told otherwise.
+    /// ROL: rotates left, towards smaller positions, until another command.
     pub fn rotate_left(address: u8, motor: u8, velocity: i32) -> Request {
         Request::new(address, motor, command::ROTATE_LEFT, 0, velocity)
     }
 
-    /// MST: slows down to a stop.
+    /// MST: decelerates to a stop.
     pub fn stop(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::STOP, 0, 0)
     }
 
-    /// MVP ABS: goes to a position in microsteps.
+    /// MVP ABS: moves to a position in microsteps.
     pub fn move_to(address: u8, motor: u8, position: i32) -> Request {
         Request::new(address, motor, command::MOVE_TO, 0, position)
     }
 
-    /// MVP REL: goes so many microsteps further.
+    /// MVP REL: moves by a number of microsteps.
     pub fn move_by(address: u8, motor: u8, distance: i32) -> Request {
         Request::new(address, motor, command::MOVE_TO, 1, distance)
     }
@@ -120,7 +120,7 @@ impl Request {
         Request::new(address, motor, command::GET_AXIS, parameter, 0)
     }
 
-    /// SGP in bank 0, which the module keeps over power-off.
+    /// SGP in bank 0; the module stores the value permanently.
     pub fn set_global(address: u8, parameter: u8, value: i32) -> Request {
         Request::new(address, 0, command::SET_GLOBAL, parameter, value)
     }
@@ -130,7 +130,7 @@ impl Request {
         Request::new(address, 0, command::GET_GLOBAL, parameter, 0)
     }
 
-    /// RFS START: the module looks for its reference by itself.
+    /// RFS START: the module searches its reference by itself.
     pub fn search_start(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 0, 0)
     }
@@ -140,7 +140,7 @@ impl Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 1, 0)
     }
 
-    /// RFS STATUS: 0 once no search goes on.
+    /// RFS STATUS: 0 if no search is in progress.
     pub fn search_status(address: u8, motor: u8) -> Request {
         Request::new(address, motor, command::REFERENCE_SEARCH, 2, 0)
     }
@@ -150,17 +150,17 @@ impl Request {
         Request::new(address, bank, command::GET_INPUT, input, 0)
     }
 
-    /// The firmware's version as a number: module in the upper half (0 on modules that leave it out), version below.
+    /// Version of the firmware as a number: module in the upper half (0 if the module omits it), version in the lower one.
     pub fn version(address: u8) -> Request {
         Request::new(address, 0, command::VERSION, 1, 0)
     }
 
-    /// The firmware's version as text, in a reply of its own form: see [`version_text`].
+    /// Version of the firmware as text, in a reply of its own format: see [`version_text`].
     pub fn version_text(address: u8) -> Request {
         Request::new(address, 0, command::VERSION, 0, 0)
     }
 
-    /// What goes over the wire.
+    /// The bytes that are transmitted.
     pub fn bytes(&self) -> [u8; LENGTH] {
         let [a, b, c, d] = self.value.to_be_bytes();
         let mut bytes = [self.address, self.command, self.kind, self.motor, a, b, c, d, 0];
@@ -168,14 +168,14 @@ impl Request {
         bytes
     }
 
-    /// The request in nine bytes, or nothing if their checksum is wrong.
+    /// Parses a request; None if its checksum is wrong.
     pub fn parse(bytes: &[u8; LENGTH]) -> Option<Request> {
         let [address, command, kind, motor, a, b, c, d, sum] = *bytes;
         let value = i32::from_be_bytes([a, b, c, d]);
         (checksum(&bytes[..8]) == sum).then_some(Request { address, command, kind, motor, value })
     }
 
-    /// Carrying it out may set the motor in motion.
+    /// True if the request may set the motor in motion.
     pub fn moves(&self) -> bool {
         match self.command {
             command::ROTATE_RIGHT | command::ROTATE_LEFT | command::MOVE_TO => true,
@@ -186,7 +186,7 @@ impl Request {
         }
     }
 
-    /// Carrying it out twice does no more than once: reads, and stopping.
+    /// True if carrying it out twice has the same effect as once: reads, and stopping.
     pub fn repeatable(&self) -> bool {
         use command::*;
         match self.command {
@@ -197,7 +197,7 @@ impl Request {
     }
 }
 
-/// As the manuals write it: `MVP 0, 0, -800`.
+/// In the notation of the manuals: `MVP 0, 0, -800`.
 impl std::fmt::Display for Request {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         use command::*;
@@ -219,20 +219,20 @@ impl std::fmt::Display for Request {
     }
 }
 
-/// One reply.
+/// A reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
     pub host: u8,
     pub module: u8,
     /// See [`status_words`].
     pub status: u8,
-    /// Of the request that is answered.
+    /// Command of the request that is answered.
     pub command: u8,
     pub value: i32,
 }
 
 impl Reply {
-    /// What goes over the wire.
+    /// The bytes that are transmitted.
     pub fn bytes(&self) -> [u8; LENGTH] {
         let [a, b, c, d] = self.value.to_be_bytes();
         let mut bytes = [self.host, self.module, self.status, self.command, a, b, c, d, 0];
@@ -240,14 +240,14 @@ impl Reply {
         bytes
     }
 
-    /// The reply in nine bytes, or nothing if their checksum is wrong.
+    /// Parses a reply; None if its checksum is wrong.
     pub fn parse(bytes: &[u8; LENGTH]) -> Option<Reply> {
         let [host, module, status, command, a, b, c, d, sum] = *bytes;
         let value = i32::from_be_bytes([a, b, c, d]);
         (checksum(&bytes[..8]) == sum).then_some(Reply { host, module, status, command, value })
     }
 
-    /// The first reply to this request anywhere in what was received: noise may come before and after it.
+    /// The first reply to this request in the received bytes. Noise may precede and follow it.
     pub fn find(received: &[u8], request: &Request) -> Option<Reply> {
         let replies = received.windows(LENGTH).filter_map(|w| Reply::parse(w.try_into().ok()?));
         let mut ours = replies.filter(|r| r.module == request.address && r.command == request.command);
@@ -256,7 +256,7 @@ impl Reply {
 }
 
 /// The module's number and version in a reply to [`Request::version_text`]: the host's address and eight characters such as
-/// `1161V115`, without a checksum. Nothing if this is not what they say.
+/// `1161V115`, without a checksum. None if the bytes have another format.
 pub fn version_text(bytes: &[u8; LENGTH]) -> Option<(u16, String)> {
     let text = std::str::from_utf8(&bytes[1..]).ok()?.trim_end_matches('\0');
     let (module, version) = text.split_once(['V', 'v'])?;

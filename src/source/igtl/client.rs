@@ -1,4 +1,4 @@
-//! A connection that is kept up by a thread of its own, and the queue that the thread fills.
+//! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
 use super::codec::{BODY_LIMIT, Decoded, decode};
 use super::message::Message;
@@ -11,40 +11,41 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Where OpenIGTLink servers listen by custom, and a client connects unless told otherwise.
+/// Default TCP port of OpenIGTLink servers.
 pub const PORT: u16 = 18944;
-/// How often a waiting thread looks whether it shall stop.
+/// How often the waiting thread checks whether it is to stop.
 const POLL: Duration = Duration::from_millis(100);
-/// Shortest time for a try, and between two, whatever the options say: a refused one comes back at once.
+/// Shortest time of an attempt, and between two, whatever the options are: a refused connection fails at once.
 const MIN_WAIT: Duration = Duration::from_millis(10);
-/// How long dropping a client waits for its thread, which may be looking up a name.
+/// How long dropping a client waits for its thread, which may be resolving a name.
 const STOP: Duration = Duration::from_secs(1);
-/// A message is read in steps of so many bytes: memory follows what came, not what was claimed.
+/// A message is read in steps of so many bytes, so that memory grows with the data and not with the claimed size.
 const STEP: usize = 1 << 20;
-/// What a large message leaves allocated for the next, bytes.
+/// Largest buffer that is kept for the next message, bytes.
 const MAX_KEPT_BYTES: usize = 16 << 20;
-/// Addresses of one name that are tried.
+/// Most addresses of one name that are tried.
 const MAX_ADDRESSES: usize = 8;
-/// Longest description of a fault, in characters.
+/// Longest description of an error, characters.
 const MAX_ERROR_CHARACTERS: usize = 600;
 
-/// How a [`Client`] behaves. Every number may be anything; zeros make little sense but do no harm: tries take and are apart 10 ms at least.
+/// Options of a [`Client`]. All values are safe: attempts take at least 10 ms and are at least 10 ms apart.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
-    /// How long one address may take to answer.
+    /// Time-out of a connection to one address.
     pub connect_timeout: Duration,
-    /// How long a message that has begun may stand still before the connection is given up.
+    /// Longest pause within a message before the connection is closed.
     pub stall_timeout: Duration,
-    /// How long nothing at all may come; a peer that lost its power says no good-bye.
+    /// Longest time without any message before the connection is closed: a peer that lost power does not close it.
     pub silence_timeout: Duration,
-    /// Before the first new try; doubled with every try that brings no message.
+    /// Wait before the first reconnection. Doubled with every connection that brings no message.
     pub first_wait: Duration,
+    /// Longest wait before a reconnection.
     pub longest_wait: Duration,
-    /// Largest body, bytes.
+    /// Largest body of a message, bytes.
     pub body_limit: usize,
-    /// Most messages that wait to be taken; at least one always may.
+    /// Most messages in the queue; at least one is always kept.
     pub queue_messages: usize,
-    /// Most memory of the messages that wait, bytes. A single larger one still waits.
+    /// Most memory of the queued messages, bytes. A single larger one is still kept.
     pub queue_bytes: usize,
 }
 
@@ -63,34 +64,34 @@ impl Default for ClientOptions {
     }
 }
 
-/// What has happened since the client was made.
+/// Counts since the client was created.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ClientStatistics {
-    /// There is a connection now.
+    /// Connected at the moment.
     pub connected: bool,
-    /// Decoded, of all types.
+    /// Decoded messages of all types.
     pub messages: u64,
-    /// Received, whatever came of them.
+    /// Received bytes.
     pub bytes: u64,
-    /// Passed over because their checksum was wrong.
+    /// Messages skipped because of a wrong checksum.
     pub checksum_failures: u64,
-    /// Passed over because their body was none that their type allows.
+    /// Messages skipped because their body is invalid for their type.
     pub malformed: u64,
-    /// Of the decoded: of types that are not read.
+    /// Decoded messages of types that are not used.
     pub skipped: u64,
-    /// Of the decoded: pushed out of the queue by newer ones.
+    /// Decoded messages that were dropped from the queue for newer ones.
     pub dropped: u64,
     /// Connections that ended within a message.
     pub cut_short: u64,
-    /// Connections given up because no header was where one must be.
+    /// Connections closed because a header was expected and not found.
     pub lost_framing: u64,
     /// Connections after the first.
     pub reconnects: u64,
 }
 
-/// A connection to an OpenIGTLink server, made again whenever it breaks. Dropping it ends it within a second.
+/// A connection to an OpenIGTLink server that is renewed whenever it breaks. Dropping the client ends it within a second.
 ///
-/// Memory: at most the queue's bytes or its newest message, and while one is decoded three times its body.
+/// Memory: at most the queue's bytes or its newest message, and three times the body of a message while it is decoded.
 pub struct Client {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -111,19 +112,19 @@ struct State {
     finished: bool,
 }
 
-/// Why a connection ended, in words.
+/// The end of a connection, and why.
 struct ConnectionEnd {
     why: String,
-    /// It had brought a message.
+    /// It had delivered a message.
     useful: bool,
 }
 
 impl Client {
-    /// Starts connecting to `address`: a name or number, with a port behind a colon unless it is [`PORT`]. A server that is
-    /// not there is waited for; [`last_error`](Client::last_error) says what is amiss.
+    /// Starts to connect to `address`: a name or a number, followed by a colon and the port unless it is [`PORT`]. If the server cannot be
+    /// reached, the client keeps trying; [`last_error`](Client::last_error) is the reason.
     ///
     /// # Errors
-    /// The operating system starts no thread.
+    /// The thread cannot be started.
     pub fn connect(address: &str, options: ClientOptions) -> io::Result<Client> {
         let state = State {
             queue: Queue::new(options.queue_messages, options.queue_bytes),
@@ -140,12 +141,12 @@ impl Client {
         Ok(Client { shared, thread: Some(thread) })
     }
 
-    /// The oldest message that waits, if there is one.
+    /// The oldest queued message, if any.
     pub fn try_next(&self) -> Option<Received> {
         self.shared.lock().queue.pop()
     }
 
-    /// The oldest message that waits; if there is none, the next to come within `timeout`.
+    /// The oldest queued message. If there is none, waits for one for at most `timeout`.
     pub fn next(&self, timeout: Duration) -> Option<Received> {
         let started = Instant::now();
         let mut state = self.shared.lock();
@@ -161,11 +162,12 @@ impl Client {
         }
     }
 
+    /// Counts since the client was created.
     pub fn statistics(&self) -> ClientStatistics {
         self.shared.lock().statistics.clone()
     }
 
-    /// What last went wrong, on one line.
+    /// The last error, on one line.
     pub fn last_error(&self) -> Option<String> {
         self.shared.lock().last_error.clone()
     }
@@ -177,7 +179,7 @@ impl Drop for Client {
         let mut state = self.shared.lock();
         state.stop = true;
         if let Some(socket) = &state.socket {
-            // Wakes the thread from reading; it does not matter if the peer has gone already.
+            // Wakes the thread from reading. It may fail if the peer has closed the connection.
             let _ = socket.shutdown(Shutdown::Both);
         }
         self.shared.changed.notify_all();
@@ -186,14 +188,14 @@ impl Drop for Client {
         }
         let finished = state.finished;
         drop(state);
-        // One that is still looking up a name or connecting ends by itself when that has come to an end.
+        // A thread that is still resolving a name or connecting ends by itself later.
         if let Some(thread) = self.thread.take().filter(|_| finished) {
             let _ = thread.join();
         }
     }
 }
 
-/// Says that the thread is done, however it came to that.
+/// Marks the thread as finished, also after a panic.
 struct FinishOnExit(Arc<Shared>);
 
 impl Drop for FinishOnExit {
@@ -205,7 +207,7 @@ impl Drop for FinishOnExit {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while it holds the lock, and the state is whole between any two lines if something did.
+        // Nothing panics while it holds the lock, and the state would still be consistent.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -262,10 +264,10 @@ impl Shared {
         Err(last)
     }
 
-    /// Until the connection breaks, or cannot be understood any more, or the client is dropped.
+    /// Receives messages until the connection breaks, its framing is lost, or the client is dropped.
     fn receive(&self, stream: &TcpStream, options: &ClientOptions) -> ConnectionEnd {
         let mut input = BufReader::with_capacity(1 << 16, stream);
-        // Never more than one message, so that none has to be moved.
+        // Holds one message at most, so that no bytes have to be moved.
         let mut bytes = Vec::new();
         let mut useful = false;
         let mut last = Instant::now();
@@ -282,8 +284,8 @@ impl Shared {
                     self.lock().statistics.lost_framing += 1;
                     return ConnectionEnd { why: DecodeError::Framing { error }.to_string(), useful };
                 }
-                Err(passed_over) => {
-                    self.pass_over(&passed_over);
+                Err(skipped) => {
+                    self.skip(&skipped);
                     clear(&mut bytes);
                     continue;
                 }
@@ -326,7 +328,7 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    fn pass_over(&self, refused: &DecodeError) {
+    fn skip(&self, refused: &DecodeError) {
         let mut state = self.lock();
         match refused {
             DecodeError::Checksum { .. } => state.statistics.checksum_failures += 1,
@@ -341,7 +343,7 @@ fn clear(bytes: &mut Vec<u8>) {
     bytes.shrink_to(MAX_KEPT_BYTES);
 }
 
-/// The address with [`PORT`] where it names none.
+/// The address, with [`PORT`] if it has no port.
 fn with_port(address: &str) -> String {
     match address.parse::<IpAddr>() {
         Ok(IpAddr::V6(number)) => format!("[{number}]:{PORT}"),
@@ -350,17 +352,17 @@ fn with_port(address: &str) -> String {
     }
 }
 
-/// A message and when it came.
+/// A message, and when it arrived.
 #[derive(Clone, Debug)]
 pub struct Received {
     pub message: Message,
-    /// When its last byte was there.
+    /// When its last byte was received.
     pub arrived: Instant,
 }
 
 struct Queue {
     waiting: VecDeque<(Received, usize)>,
-    /// Of memory, of all that wait.
+    /// Memory of all queued messages.
     bytes: usize,
     max_messages: usize,
     max_bytes: usize,
@@ -371,7 +373,8 @@ impl Queue {
         Queue { waiting: VecDeque::new(), bytes: 0, max_messages, max_bytes }
     }
 
-    /// How many had to go for it. The newest itself always stays: with a limit below its size nothing would ever come.
+    /// Adds a message and returns how many older ones were dropped. The new one is always kept: otherwise, with a limit below its size,
+    /// none would ever be delivered.
     fn push(&mut self, received: Received) -> u64 {
         let weight = received.message.weight();
         self.bytes = self.bytes.saturating_add(weight);

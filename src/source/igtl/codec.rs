@@ -1,31 +1,31 @@
-//! From bytes to a message and back. Any bytes give a message, the number of bytes that are missing, or a fault.
+//! Decodes and encodes messages. Any bytes decode to a message, the number of missing bytes, or an error.
 
 use super::message::{Image, Message, Other, Status, Text, Tool, ToolKind, TrackingData, Transform};
 use super::wire::{DecodeError, EXTENDED, Fault, Fields, HEADER, Header, MessageError, crc64, stamp, until_nul};
 
-/// The largest body that is accepted unless asked otherwise, bytes.
+/// Default limit of the body, bytes.
 pub const BODY_LIMIT: usize = 256 << 20;
-/// Bytes of a tool in TDATA.
+/// Length of a tool in TDATA, bytes.
 const TOOL_BYTES: usize = 70;
 /// IANA's number of ISO-8859-1, a STRING's encoding.
 const LATIN_1: u16 = 4;
 
-/// What bytes gave.
+/// The result of decoding.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Decoded {
-    /// At least so many bytes are missing; 1 or more.
+    /// At least so many bytes are missing, 1 or more.
     Need(usize),
-    /// The next message begins `length` bytes on.
+    /// A message; the next one begins after `length` bytes.
     Message { message: Message, length: usize },
 }
 
-/// The message at the start of `bytes`.
+/// Decodes the message at the start of `bytes`.
 ///
-/// `limit`: the largest body, bytes. A larger claim is refused as soon as its header is there, and nothing is allocated
-/// before the whole body is: never more than the bytes that came.
+/// `limit`: the largest body, bytes. A larger one is refused as soon as its header is complete. Nothing is allocated before the whole
+/// body is available, and never more than its bytes.
 ///
 /// # Errors
-/// [`DecodeError`] says what is wrong in one line, and how many bytes to skip if the next message can be found.
+/// [`DecodeError`]: what is wrong, and how many bytes to skip if the next message can be found.
 pub fn decode(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     let Some(head) = bytes.first_chunk::<HEADER>() else { return Ok(Decoded::Need(HEADER - bytes.len())) };
     let framing =
@@ -54,7 +54,7 @@ fn read(header: &Header, body: &[u8]) -> Result<Message, Fault> {
     Ok(match header.kind.as_str() {
         "TRANSFORM" => {
             let matrix = fields.matrix()?;
-            nothing_behind(&fields, content)?;
+            expect_end(&fields, content)?;
             Message::Transform(Transform { device, time, matrix })
         }
         "TDATA" => {
@@ -98,7 +98,7 @@ fn tool(bytes: &[u8]) -> Result<Tool, Fault> {
     Ok(Tool { name, kind, matrix: fields.matrix()? })
 }
 
-fn nothing_behind(fields: &Fields, content: &[u8]) -> Result<(), Fault> {
+fn expect_end(fields: &Fields, content: &[u8]) -> Result<(), Fault> {
     match fields.0.len() {
         0 => Ok(()),
         more => Err(Fault::new("content", format!("is {} bytes, must be {}", content.len(), content.len() - more))),
@@ -108,7 +108,7 @@ fn nothing_behind(fields: &Fields, content: &[u8]) -> Result<(), Fault> {
 /// Version of the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Version {
-    /// What every peer reads.
+    /// Every peer reads it.
     V1,
     /// With an extended header and empty metadata.
     V2,
@@ -118,11 +118,11 @@ pub enum Version {
 const ASCII: u16 = 3;
 const UTF_8: u16 = 106;
 
-/// The bytes of a message, as [`decode`] reads them.
+/// Encodes a message. For simulated devices and tests.
 ///
 /// # Errors
-/// A field that the format cannot hold (a name that is too long or has zero bytes, a time before 1970 or after 2106, a
-/// number that is not finite, sizes that disagree with the samples), or a message of another type, whose body was not kept.
+/// A field that the format cannot represent (a name that is too long or has zero bytes, a time before 1970 or after 2106, a
+/// number that is not finite, sizes that disagree with the samples), or [`Message::Other`], whose body was not kept.
 pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageError> {
     let error = |fault| MessageError::new(message.kind(), message.device(), fault);
     let mut bytes = vec![0; HEADER];
@@ -143,7 +143,7 @@ pub fn encode(message: &Message, version: Version) -> Result<Vec<u8>, MessageErr
 }
 
 fn write(message: &Message, version: Version, body: &mut Vec<u8>) -> Result<(), Fault> {
-    // A count of metadata even if there are none: the reference library reads it without looking at its size.
+    // The number of metadata entries is written even if it is 0: the reference library reads it without checking the size.
     let metadata: &[u8] = if version == Version::V1 { &[] } else { &0u16.to_be_bytes() };
     if version == Version::V2 {
         body.extend((EXTENDED as u16).to_be_bytes());

@@ -1,4 +1,4 @@
-//! The messages as a consumer gets them.
+//! The messages, as the user of a client receives them.
 
 use super::wire::{Fault, Fields};
 use glam::{DMat4, DVec3, DVec4};
@@ -19,7 +19,7 @@ pub enum Message {
 pub struct Transform {
     /// At most 20 bytes on the wire.
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
     /// Upper three rows of the 4 x 4 matrix; the last column in mm. Finite.
     pub matrix: [[f32; 4]; 3],
@@ -29,9 +29,9 @@ pub struct Transform {
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackingData {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// Those that are seen at the moment; may be none.
+    /// The tools that are visible at the moment; may be empty.
     pub tools: Vec<Tool>,
 }
 
@@ -45,7 +45,7 @@ pub struct Tool {
     pub matrix: [[f32; 4]; 3],
 }
 
-/// What of a tool's pose is known (trackingdata.md).
+/// Which degrees of freedom of a tool are known (trackingdata.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToolKind {
     /// 1: the tracker itself.
@@ -54,19 +54,19 @@ pub enum ToolKind {
     SixD,
     /// 3: only the tip.
     ThreeD,
-    /// 4: tip and handle, but not the turn about the line between them.
+    /// 4: tip and handle, but not the rotation about the line between them.
     FiveD,
 }
 
-/// STATUS: how a device is.
+/// STATUS: the state of a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// 1 is well, 2 to 19 are faults that status.md lists.
+    /// 1 is OK, 2 to 19 are faults that status.md lists.
     pub code: u16,
-    /// The device's own.
+    /// Defined by the device.
     pub subcode: i64,
     /// At most 20 bytes on the wire.
     pub name: String,
@@ -77,21 +77,21 @@ pub struct Status {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// Latin-1 where the message says so, otherwise read as UTF-8, which ASCII is a part of. At most 65535 bytes on the wire.
+    /// Decoded from Latin-1 if the message says so, otherwise from UTF-8. At most 65535 bytes on the wire.
     pub text: String,
 }
 
-/// A message of a type that is not read; its body was checked and passed over.
+/// A message of a type that is not used. The checksum of its body was verified.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Other {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
-    /// The type's name, at most 12 bytes on the wire.
+    /// Name of the type, at most 12 bytes on the wire.
     pub kind: String,
-    /// Of the body.
+    /// Length of the body, bytes.
     pub bytes: usize,
 }
 
@@ -124,7 +124,7 @@ impl Message {
         }
     }
 
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub fn time(&self) -> f64 {
         match self {
             Message::Transform(m) => m.time,
@@ -136,7 +136,7 @@ impl Message {
         }
     }
 
-    /// The type's name on the wire.
+    /// Name of the type on the wire.
     pub fn kind(&self) -> &str {
         match self {
             Message::Transform(_) => "TRANSFORM",
@@ -148,7 +148,7 @@ impl Message {
         }
     }
 
-    /// Bytes of memory, about.
+    /// Approximate memory, bytes.
     pub(super) fn weight(&self) -> usize {
         let held = match self {
             Message::TrackingData(m) => m.tools.iter().map(|t| size_of::<Tool>() + t.name.len()).sum(),
@@ -162,30 +162,30 @@ impl Message {
     }
 }
 
-/// IMAGE: a picture, a volume, or a box of one.
+/// IMAGE: a 2D image, a volume, or a part of one. On the wire: 72 bytes that describe the samples, then the samples (image.md).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     pub device: String,
-    /// Since 1970, s; 0: not stamped.
+    /// Time stamp, s since 1970; 0: none.
     pub time: f64,
     /// Pixels of the whole image along i (fastest), j and k, each at least 1.
     pub size: [u16; 3],
-    /// The box of the image that this message brings: all of it, as a rule.
+    /// The part of the image that this message contains; usually all of it.
     pub region: Region,
     pub scalar: Scalar,
     /// Values of a pixel, interleaved; at least 1.
     pub components: u8,
-    /// Which way x and y of `axes` and `centre` point.
+    /// Coordinate system of `axes` and `centre`.
     pub coordinates: Coordinates,
-    /// One step along i, j and k, mm: directions times spacing. Finite; that of an axis of one pixel may be 0.
+    /// One step along i, j and k, mm: direction times spacing. Finite; may be 0 for an axis of one pixel.
     pub axes: [[f32; 3]; 3],
-    /// The middle of the whole image, mm. Finite.
+    /// Centre of the whole image, mm. Finite.
     pub centre: [f32; 3],
-    /// The region's samples, little-endian whatever came over the wire, i fastest.
+    /// Samples of the region, converted to little-endian, i fastest.
     pub bytes: Vec<u8>,
 }
 
-/// A box of pixels within an image.
+/// A rectangular part of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// The first pixel.
@@ -193,7 +193,7 @@ pub struct Region {
     pub size: [u16; 3],
 }
 
-/// What a sample is.
+/// Type of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scalar {
     I8,
@@ -206,7 +206,7 @@ pub enum Scalar {
     F64,
 }
 
-/// Axes of the patient: x to the right or left, y to the front or back, z to the head.
+/// Coordinate system of the patient: x to the right or left, y to the front or back, z to the head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
     /// Right, anterior, superior.
@@ -242,9 +242,9 @@ impl Scalar {
 }
 
 impl Image {
-    /// Pixel index of the whole image (of the pixel's middle, from 0) to mm, in the coordinates asked for.
+    /// The transformation from pixel index (of the pixel's centre, from 0, in the whole image) to mm in the given coordinate system.
     ///
-    /// The message's position is the middle of the image (image.md, note of 2011), which lies at index (size - 1) / 2.
+    /// The position in the message is the centre of the image (image.md, note of 2011), that is index (size - 1) / 2.
     pub fn index_to_mm(&self, coordinates: Coordinates) -> DMat4 {
         let axes = self.axes.map(|a| DVec3::from(a.map(f64::from)));
         let middle = self.size.map(|n| (f64::from(n) - 1.0) / 2.0);
@@ -257,7 +257,7 @@ impl Image {
         }
     }
 
-    /// Distance of neighbouring pixels along i, j and k, mm.
+    /// Distance between neighbouring pixels along i, j and k, mm.
     pub fn spacing(&self) -> [f64; 3] {
         self.axes.map(|a| DVec3::from(a.map(f64::from)).length())
     }
@@ -299,7 +299,7 @@ impl Image {
         Ok(image)
     }
 
-    /// Sizes that agree with each other and with the samples.
+    /// Checks that the sizes agree with each other and with the samples.
     fn check(&self) -> Result<(), Fault> {
         let Region { offset, size } = self.region;
         if self.size.contains(&0) {
@@ -317,7 +317,7 @@ impl Image {
                 return Err(Fault::new("sub-volume", fault));
             }
         }
-        // Below 2^16 each, 255 components and 8 bytes: fits.
+        // Cannot overflow: each below 2^16, at most 255 components of 8 bytes.
         let pixels: u64 = size.iter().map(|n| u64::from(*n)).product();
         let bytes = pixels * u64::from(self.components) * self.scalar.bytes() as u64;
         match self.bytes.len() as u64 == bytes {

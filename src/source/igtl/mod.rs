@@ -1,10 +1,10 @@
-//! OpenIGTLink: what trackers, scanners and navigation software (PLUS, 3D Slicer) send over TCP.
+//! OpenIGTLink, the protocol of trackers, scanners and navigation software (PLUS, 3D Slicer) over TCP.
 //!
-//! [`decode`] and [`encode`] are pure, and the first is total; [`Client`] keeps a connection and a bounded queue;
-//! [`Pairing`] gives tracked 2D frames their poses; [`Network`] makes a live source of all that.
+//! [`decode`] and [`encode`] are pure, and [`decode`] accepts any bytes. [`Client`] maintains a connection and a bounded queue, [`Pairing`]
+//! gives tracked 2D frames their poses, and [`Network`] is the live source that combines them.
 //!
-//! The format is OpenIGTLink's protocol 3 (its repository's Documents/Protocol). Where that document and the reference
-//! library's bytes differ, the bytes are followed: the document's extended header has 8 or 14 bytes, the library's 12.
+//! The format is OpenIGTLink's protocol 3 (its repository's Documents/Protocol). Where that document and the bytes of
+//! the reference library differ, this module follows the bytes: the document's extended header has 8 or 14 bytes, the library's 12.
 
 mod client;
 mod codec;

@@ -1,22 +1,22 @@
-//! Poses for 2D frames: an IMAGE says where its pixels lie within the frame, a TRANSFORM where the frame was at a time.
+//! Poses of 2D frames: an IMAGE has the positions of its pixels in the frame, a TRANSFORM the pose of the frame at a time.
 
 use super::message::{Image, Message};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::collections::VecDeque;
 
-/// Poses that are kept to choose from.
+/// Most poses that are kept.
 const MAX_POSES: usize = 1024;
-/// Frames that wait for a later pose, and their bytes.
+/// Most frames that wait for a later pose, and their bytes.
 const MAX_FRAMES: usize = 64;
 const MAX_FRAME_BYTES: usize = 256 << 20;
-/// How far from a rotation (largest entry of R^T R - 1) a matrix may be to be turned by angles.
+/// Largest entry of R^T R - 1 for which a matrix counts as a rotation, so that it can be interpolated.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// Gives every 2D frame (IMAGE of depth 1) a pose, in the order in which the frames came. Pure: its clock is the stamps.
+/// Gives every 2D frame (IMAGE of depth 1) a pose, in order of arrival. Pure: its clock is the time stamps.
 ///
 /// With poses on both sides within the tolerance, the translation is interpolated linearly and the rotation along the
-/// shorter arc; across different devices, or where a matrix is no rotation, the nearer one is taken. A frame waits for a
-/// pose behind it until a later one has come, or frames have gone on for `patience`, or 64 frames or 256 MiB wait.
+/// shorter arc; between different devices, or if a matrix is not a rotation, the nearer pose is used. A frame waits for a
+/// later pose until one has arrived, or until frames are `patience` ahead, or until 64 frames or 256 MiB wait.
 pub struct Pairing {
     device: Option<String>,
     tolerance: f64,
@@ -27,27 +27,27 @@ pub struct Pairing {
     counts: PairingCounts,
 }
 
-/// A frame and where it was.
+/// A frame and its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairedFrame {
     pub image: Image,
-    /// The TRANSFORM at the frame's time, mm: from the space that the image's own matrix leads to.
+    /// The TRANSFORM at the frame's time, mm. It is applied after the image's own matrix.
     pub pose: DAffine3,
-    /// Of the nearest pose.
+    /// Device of the nearest pose.
     pub device: String,
-    /// Time of the frame less that of the nearest pose, s.
+    /// Time of the frame minus that of the nearest pose, s.
     pub lag: f64,
-    /// Between two poses.
+    /// Interpolated between two poses.
     pub interpolated: bool,
 }
 
-/// What became of the images.
+/// Counts of images.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PairingCounts {
     pub paired: u64,
     /// Frames without a pose within the tolerance.
     pub dropped: u64,
-    /// Images that are no 2D frames: passed over.
+    /// Images that are not 2D frames: skipped.
     pub volumes: u64,
 }
 
@@ -59,9 +59,9 @@ struct Pose {
 }
 
 impl Pairing {
-    /// `device`: whose TRANSFORM, or which tool of TDATA; `None`: whichever TRANSFORM is nearest, of several the last to
-    /// come. `tolerance`: between a frame's and its pose's stamps, s. `patience`: how far frames may run ahead of the
-    /// poses, s. Negative ones and NaN are taken as 0.
+    /// `device`: device of the TRANSFORM, or name of the tool in TDATA; None: the nearest TRANSFORM, the last of several. `tolerance`:
+    /// largest difference between the stamps of a frame and its pose, s. `patience`: how far frames may be ahead of the poses, s.
+    /// Negative values and NaN count as 0.
     pub fn new(device: Option<String>, tolerance: f64, patience: f64) -> Pairing {
         Pairing {
             device,
@@ -74,14 +74,14 @@ impl Pairing {
         }
     }
 
-    /// The frames that this message settles, which may be none; messages of other types settle nothing.
+    /// Takes a message and returns the frames that are paired by it, possibly none.
     pub fn push(&mut self, message: Message) -> Vec<PairedFrame> {
-        let wanted = self.device.clone();
+        let selected = self.device.clone();
         match message {
-            Message::Transform(m) if wanted.as_ref().is_none_or(|w| *w == m.device) => {
+            Message::Transform(m) if selected.as_ref().is_none_or(|w| *w == m.device) => {
                 self.pose(m.device, m.time, &m.matrix)
             }
-            Message::TrackingData(m) => match m.tools.into_iter().find(|t| wanted.as_ref() == Some(&t.name)) {
+            Message::TrackingData(m) => match m.tools.into_iter().find(|t| selected.as_ref() == Some(&t.name)) {
                 Some(tool) => self.pose(tool.name, m.time, &tool.matrix),
                 None => return Vec::new(),
             },
@@ -95,11 +95,12 @@ impl Pairing {
         self.settle(false)
     }
 
-    /// The frames that still wait, with the poses that there are.
+    /// Pairs the waiting frames with the poses so far.
     pub fn finish(&mut self) -> Vec<PairedFrame> {
         self.settle(true)
     }
 
+    /// Counts so far.
     pub fn counts(&self) -> PairingCounts {
         self.counts.clone()
     }
@@ -113,7 +114,7 @@ impl Pairing {
         self.poses.push_back(Pose { device, time, matrix });
     }
 
-    /// In order: a frame that waits holds up those behind it.
+    /// Pairs frames in order: a frame that waits holds up those after it.
     fn settle(&mut self, at_once: bool) -> Vec<PairedFrame> {
         let mut settled = Vec::new();
         while let Some(frame) = self.frames.front() {
@@ -139,31 +140,31 @@ impl Pairing {
         settled
     }
 
-    /// The nearest pose, and the one at `time`. `over`: no later pose will come.
+    /// The nearest pose, and the pose at `time`. `over`: no later pose is expected.
     fn find(&self, time: f64, over: bool) -> Option<(Pose, DAffine3, bool)> {
         let near = || self.poses.iter().filter(|p| (p.time - time).abs() <= self.tolerance);
-        // Of equals, max_by takes the last, and min_by the first: both the one that came last.
+        // Of equal elements, max_by returns the last and min_by the first: in both cases the one that arrived last.
         let before = near().filter(|p| p.time <= time).max_by(|a, b| a.time.total_cmp(&b.time));
         let after = near().rev().filter(|p| p.time > time).min_by(|a, b| a.time.total_cmp(&b.time));
-        let alone = |pose: &Pose| Some((pose.clone(), pose.matrix, false));
+        let single = |pose: &Pose| Some((pose.clone(), pose.matrix, false));
         match (before, after) {
-            (Some(exact), _) if exact.time == time => alone(exact),
+            (Some(exact), _) if exact.time == time => single(exact),
             (Some(a), Some(b)) => {
                 let part = (time - a.time) / (b.time - a.time);
                 let nearest = if part <= 0.5 { a } else { b };
                 match between(&a.matrix, &b.matrix, part).filter(|_| a.device == b.device) {
                     Some(pose) => Some((nearest.clone(), pose, true)),
-                    None => alone(nearest),
+                    None => single(nearest),
                 }
             }
-            (None, Some(b)) => alone(b),
-            (Some(a), None) if over => alone(a),
+            (None, Some(b)) => single(b),
+            (Some(a), None) if over => single(a),
             _ => None,
         }
     }
 }
 
-/// The pose a `part` of the way from `a` to `b`, if both are rotations and translations.
+/// The pose at the fraction `part` from `a` to `b`, if both are rigid.
 fn between(a: &DAffine3, b: &DAffine3, part: f64) -> Option<DAffine3> {
     let rotation = |m: DMat3| {
         let off = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();

@@ -1,13 +1,13 @@
-//! The parts that every message has in common: the header of 58 bytes, big-endian fields, the checksum, and what can be wrong with them.
+//! The parts that all messages have in common: the header of 58 bytes, big-endian fields, the checksum, and their errors.
 
 use crate::files::{escaped, quoted};
 use crc::{CRC_64_ECMA_182, Crc, Table};
 
-/// Bytes of a header: version, type, device, time stamp, body size, checksum (header.md).
+/// Length of a header, bytes: version, type, device, time stamp, body size, checksum (header.md).
 pub const HEADER: usize = 58;
-/// Bytes of an extended header as the reference library writes it; a longer one may follow in later versions.
+/// Length of an extended header as the reference library writes it, bytes. Later versions may have a longer one.
 pub(super) const EXTENDED: usize = 12;
-/// Time stamps are fixed-point: u32 seconds since 1970, and so many parts of a second (timestamp.md).
+/// Time stamps are fixed-point: u32 seconds since 1970, and this many ticks in a second (timestamp.md).
 const TICKS: f64 = 4_294_967_296.0;
 
 pub(super) struct Header {
@@ -34,7 +34,7 @@ impl Header {
         })
     }
 
-    /// Bytes of the body, if this can be a header.
+    /// Length of the body, if this is a valid header.
     pub fn accepted(&self, limit: usize) -> Result<usize, Fault> {
         if !(1..=3).contains(&self.version) {
             return Err(Fault::new("version", format!("is {}, must be 1 to 3", self.version)));
@@ -45,7 +45,7 @@ impl Header {
         }
     }
 
-    /// The body less what versions 2 and 3 put around the content: extended header before it, metadata behind it.
+    /// The content: the body without what versions 2 and 3 add, an extended header before it and metadata after it.
     pub fn content<'a>(&self, body: &'a [u8]) -> Result<&'a [u8], Fault> {
         if self.version == 1 {
             return Ok(body);
@@ -72,11 +72,11 @@ impl Header {
 
 /// A time stamp in seconds, below 2^32. An f64 of this century keeps 0.24 microseconds.
 pub(super) fn seconds(whole: u32, fraction: u32) -> f64 {
-    // The last of all stamps would round up to what none can hold.
+    // The largest stamp would round up to 2^32.
     (f64::from(whole) + f64::from(fraction) / TICKS).min(TICKS.next_down())
 }
 
-/// Seconds as a time stamp, if one can hold them; the inverse of [`seconds`].
+/// Seconds as a time stamp, if it can represent them; the inverse of [`seconds`].
 pub(super) fn stamp(time: f64) -> Option<(u32, u32)> {
     (0.0..TICKS).contains(&time).then(|| (time as u32, (time.fract() * TICKS) as u32))
 }
@@ -112,7 +112,7 @@ impl<'a> Fields<'a> {
         Ok([self.u16(field)?, self.u16(field)?, self.u16(field)?])
     }
 
-    /// A finite number: whatever is reckoned with one that is not places nothing.
+    /// A finite number.
     pub fn f32(&mut self, field: &'static str) -> Result<f32, Fault> {
         match self.array(field).map(f32::from_be_bytes)? {
             value if value.is_finite() => Ok(value),
@@ -120,11 +120,11 @@ impl<'a> Fields<'a> {
         }
     }
 
-    pub fn vector(&mut self, field: &'static str) -> Result<[f32; 3], Fault> {
+    pub(crate) fn vector(&mut self, field: &'static str) -> Result<[f32; 3], Fault> {
         Ok([self.f32(field)?, self.f32(field)?, self.f32(field)?])
     }
 
-    /// The upper three rows of a 4 x 4 matrix, which comes column by column (transform.md).
+    /// The upper three rows of a 4 x 4 matrix, which is stored column by column (transform.md).
     pub fn matrix(&mut self) -> Result<[[f32; 4]; 3], Fault> {
         let mut rows = [[0.0; 4]; 3];
         for column in 0..4 {
@@ -140,27 +140,27 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Text up to the first zero byte. The format asks for ASCII; what is not even UTF-8 becomes U+FFFD.
+/// Text up to the first zero byte. The format requires ASCII; bytes that are not UTF-8 become U+FFFD.
 pub(super) fn until_nul(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }
 
 /// Polynomial 0x42F0E1EBA9EA3693, initially 0, nothing reflected or inverted: ECMA-182's, which OpenIGTLink's header.md
-/// names. Sixteen bytes at a time: images come at tens of megabytes per second.
+/// names. Sixteen bytes at a time, because images arrive at tens of megabytes per second.
 static CRC: Crc<u64, Table<16>> = Crc::<u64, Table<16>>::new(&CRC_64_ECMA_182);
 
-/// CRC-64/ECMA-182 of a message's body: everything behind the 58 bytes of the header.
+/// CRC-64/ECMA-182 of the body of a message: everything after the 58 bytes of the header.
 pub fn crc64(body: &[u8]) -> u64 {
     CRC.checksum(body)
 }
 
-/// Longest part of an error, in characters.
+/// Longest part of an error, characters.
 const MAX_PART: usize = 300;
 
-/// A fault of a message: one line naming the message, the field, its value and what is allowed.
+/// An error of a message: one line with the message, the field, its value and what is allowed.
 ///
-/// Whatever came over the wire is escaped and shortened on the way in, so that no peer can write to a terminal.
+/// Everything that comes from the peer is escaped and shortened, so that it cannot send control characters to a terminal.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}: {field}: {fault}")]
 pub struct MessageError {
@@ -184,17 +184,17 @@ impl MessageError {
     }
 }
 
-/// Why bytes gave no message, and what is left to be done with them.
+/// Why bytes are not a message, and where the next message begins.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    /// The body is not the one that was sent. The next message begins `length` bytes on.
+    /// The checksum of the body is wrong. The next message begins after `length` bytes.
     #[error("{error}")]
     Checksum { length: usize, error: MessageError },
-    /// The body came as it was sent, and is none that its type allows. The next message begins `length` bytes on.
+    /// The body is invalid for its type. The next message begins after `length` bytes.
     #[error("{error}")]
     Content { length: usize, error: MessageError },
-    /// This is no header. Nothing in the format marks where a message begins: the stream cannot be found again, and the
-    /// connection has to be made anew.
+    /// These bytes are no header. The format has no marks of message boundaries, so the stream cannot be re-synchronised and the
+    /// connection has to be renewed.
     #[error("{error}; the stream cannot be re-synchronised")]
     Framing { error: MessageError },
 }
@@ -209,7 +209,7 @@ impl DecodeError {
     }
 }
 
-/// A fault of a field, before it is known whose.
+/// An error of a field, before its message is known.
 pub(super) struct Fault {
     pub field: &'static str,
     pub fault: String,
@@ -226,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stamps_survive_the_way_there_and_back() {
+    fn stamps_survive_a_round_trip() {
         for (whole, fraction) in [(0, 0), (0, 1), (1, u32::MAX), (1_700_000_000, 1 << 30), (u32::MAX, u32::MAX)] {
             let time = seconds(whole, fraction);
             let (w, f) = stamp(time).expect("a stamp");

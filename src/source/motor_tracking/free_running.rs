@@ -1,4 +1,4 @@
-//! The phantom as a free-running probe: frame after frame as fast as sound allows, each of where the array really is.
+//! The phantom as a free-running probe: frames as fast as sound allows, each at the true position of the array.
 
 use crate::files::InputError;
 use crate::probe::motor::{ArrayState, PositionLog};
@@ -8,33 +8,33 @@ use crate::source::phantom::{Phantom, PhantomOptions};
 use crate::source::phantom_source::PhantomSource;
 use std::time::{Duration, Instant};
 
-/// Share of the way to the next slice that the motor may travel during a frame, for as many lines as that leaves time for.
+/// Largest fraction of the distance to the next slice that the motor travels during a frame; limits the number of lines.
 const MAX_ADVANCE: f64 = 0.75;
 /// Fewest lines of a frame.
 const MIN_LINES: usize = 16;
 
-/// The phantom, seen by an array that a motor turns: a demonstration of placing frames, and so its frames have no place.
+/// The phantom, scanned by an array that a motor sweeps. Its frames have no position, so that motor tracking can be demonstrated.
 ///
 /// Memory: the phantom's volumes, computed once.
 pub struct FreeRunning {
     header: Header,
-    watch: PositionLog,
+    positions: PositionLog,
     /// By volume and slice.
     volumes: Vec<Vec<Frame>>,
-    /// Of a frame, s.
+    /// Duration of a frame, s.
     period: f64,
     begun: bool,
-    /// When the first line of the frame is taken that is on its way, s on the motor's clock.
+    /// When the first line of the current frame is acquired, s on the motor's clock.
     next: Option<f64>,
     count: u32,
 }
 
 impl FreeRunning {
-    /// These options for an array that turns at `speed` deg/s: both ways, with as many lines as sound has time for and the motor's
-    /// way during a frame.
+    /// The phantom for an array that moves at `speed` deg/s: swept in both directions, with as many lines as sound has time for, and with
+    /// the motor's travel during a frame.
     ///
     /// # Errors
-    /// As of [`Phantom::new`].
+    /// As [`Phantom::new`].
     pub fn phantom(options: PhantomOptions, speed: f64) -> Result<Phantom, InputError> {
         let options = PhantomOptions { both_ways: true, volumes: options.volumes.next_multiple_of(2), ..options };
         let ratio = |options: &PhantomOptions| {
@@ -49,26 +49,26 @@ impl FreeRunning {
         Phantom::new(PhantomOptions { speed_ratio, ..options })
     }
 
-    /// Computes the phantom's volumes. `watch`: of the motor that turns the array.
-    pub fn new(phantom: Phantom, watch: PositionLog) -> FreeRunning {
+    /// Computes the phantom's volumes. `positions`: of the motor that sweeps the array.
+    pub fn new(phantom: Phantom, positions: PositionLog) -> FreeRunning {
         let mut volumes: Vec<Vec<Frame>> = (0..phantom.volumes()).map(|v| phantom.volume(v)).collect();
         volumes.iter_mut().for_each(|volume| volume.sort_by_key(|frame| frame.slice));
         let probe = phantom.probe(0);
         let period = probe.acquisition_time() / probe.slices.len() as f64;
         let header = PhantomSource::new(phantom).header();
-        FreeRunning { header, watch, volumes, period, begun: false, next: None, count: 0 }
+        FreeRunning { header, positions, volumes, period, begun: false, next: None, count: 0 }
     }
 
-    /// What the array saw at a time: the frame of the nearest slice, swept the way that the array went.
-    fn seen(&self, time: f64) -> Option<&Frame> {
-        let (angle, pass) = match self.watch.at(time) {
+    /// The frame at the position of the array at a time: that of the nearest slice, with the direction of the pass.
+    fn frame_at(&self, time: f64) -> Option<&Frame> {
+        let (angle, pass) = match self.positions.at(time) {
             ArrayState::Sweeping { angle, pass, .. } => (angle, pass),
             ArrayState::Reversing { angle } => (angle, 0),
-            ArrayState::Unknown => self.watch.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
+            ArrayState::Unknown => self.positions.span().map_or((0.0, 0), |(_, last)| (last.angle, last.pass)),
         };
         let volume = self.volumes.get(pass % self.volumes.len().max(1))?;
         let crate::probe::Geometry::Sweep(probe) = &self.header.forward else { return None };
-        // Saturates: beyond the fan it is that of its edge.
+        // Saturates: beyond the fan, the slice at its edge.
         let slice = probe.slices.index_of(angle.to_radians()).round() as usize;
         volume.get(slice.min(volume.len().saturating_sub(1)))
     }
@@ -81,22 +81,22 @@ impl Live for FreeRunning {
             return Event::Begin(Box::new(self.header.clone()));
         }
         let now = Instant::now();
-        let first_line = *self.next.get_or_insert(self.watch.time(now));
-        let left = self.watch.instant(first_line + self.period).saturating_duration_since(now);
+        let first_line = *self.next.get_or_insert(self.positions.time(now));
+        let left = self.positions.instant(first_line + self.period).saturating_duration_since(now);
         if left > patience {
             std::thread::sleep(patience);
             return Event::Idle;
         }
         std::thread::sleep(left);
         let mut next = first_line + self.period;
-        // Frames that nobody fetched in time are gone.
-        let behind = self.watch.time(Instant::now()) - next;
+        // Frames that were not taken in time are lost.
+        let behind = self.positions.time(Instant::now()) - next;
         if behind > self.period {
             next += (behind / self.period).floor() * self.period;
         }
-        let seen = self.seen(next - self.period).cloned();
+        let frame = self.frame_at(next - self.period).cloned();
         self.next = Some(next);
-        let Some(frame) = seen else { return Event::End(Some("the phantom has no frames".into())) };
+        let Some(frame) = frame else { return Event::End(Some("the phantom has no frames".into())) };
         self.count = self.count.wrapping_add(1);
         Event::Frame(Frame { volume: 0, number: self.count, slice: 0, backward: false, time: None, ..frame })
     }

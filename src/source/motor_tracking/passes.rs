@@ -6,26 +6,26 @@ use crate::source::frame::Frame;
 use crate::source::live::Event;
 use std::collections::VecDeque;
 
-/// Missing slices in a row that are filled at most.
+/// Most consecutive missing slices that are filled.
 pub(super) const MAX_FILLED: usize = 2;
 
 /// The passes over a slice axis, in order of time.
 pub(super) struct Passes {
     /// rad.
     slices: Axis,
-    now: Option<Pass>,
-    /// The last pass that is over.
+    current: Option<Pass>,
+    /// Number of the last pass that is over.
     over: Option<usize>,
 }
 
 struct Pass {
     number: usize,
     direction: Direction,
-    /// The frame that is nearest so far to the slice that the array is at. The nearer counts and not the later, since
-    /// it shows more nearly what lies there. It is given when a frame of the next slice shows that none can be nearer.
+    /// The frame nearest so far to the slice at the array's position. The nearest frame is used and not the last one, because it shows
+    /// the slice most accurately. It is emitted when a frame of the next slice arrives.
     nearest: Option<Candidate>,
-    /// The one that was given last.
-    given: Option<Candidate>,
+    /// The frame that was emitted last.
+    emitted: Option<Candidate>,
     slices: usize,
 }
 
@@ -41,32 +41,32 @@ struct Candidate {
 impl Passes {
     /// `slices`: rad, at least two.
     pub fn new(slices: Axis) -> Passes {
-        Passes { slices, now: None, over: None }
+        Passes { slices, current: None, over: None }
     }
 
-    /// The fractional place of an angle (rad) in the order of a pass.
+    /// Fractional index of an angle (rad) in the order of a pass.
     fn step(&self, angle: f64, direction: Direction) -> f64 {
         let index = self.slices.index_of(angle);
         if direction == Direction::Forward { index } else { self.slices.len() as f64 - 1.0 - index }
     }
 
-    /// A frame and where the array was at its first line. What is thereby known goes `out`.
+    /// Adds a frame and the state of the array at its first line. Slices that are final are appended to `out`.
     pub fn frame(&mut self, frame: Frame, place: ArrayState, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
         let last = self.slices.len() as f64 - 1.0;
         match place {
             ArrayState::Unknown => counts.unknown += 1,
             ArrayState::Reversing { angle } => {
                 counts.turning += 1;
-                // At the far end of a pass it is over: nothing is gained by waiting for the next to begin.
-                let step = self.now.as_ref().map(|now| self.step(angle.to_radians(), now.direction));
+                // At its far end the pass is over. There is no need to wait for the next one.
+                let step = self.current.as_ref().map(|current| self.step(angle.to_radians(), current.direction));
                 if step.is_some_and(|step| step > (last - MAX_FILLED as f64).max(last / 2.0)) {
                     self.end(counts, out);
                 }
             }
             ArrayState::Sweeping { angle, direction, pass } => {
-                let newest = self.over.max(self.now.as_ref().map(|now| now.number));
+                let newest = self.over.max(self.current.as_ref().map(|current| current.number));
                 if Some(pass) == self.over {
-                    // The array stood at the end, and still moved on a little.
+                    // The array paused at the end and then moved on a little.
                     counts.turning += 1;
                     return;
                 }
@@ -74,7 +74,7 @@ impl Passes {
                     counts.late += 1;
                     return;
                 }
-                if self.now.as_ref().is_some_and(|now| now.number != pass) {
+                if self.current.as_ref().is_some_and(|current| current.number != pass) {
                     self.end(counts, out);
                 }
                 let angle = angle.to_radians();
@@ -87,78 +87,83 @@ impl Passes {
                     return;
                 }
                 let near = Candidate { step: step.round().clamp(0.0, last) as usize, angle, frame };
-                let mut now =
-                    self.now.take().unwrap_or(Pass { number: pass, direction, nearest: None, given: None, slices: 0 });
-                match now.nearest.take() {
+                let mut current = self.current.take().unwrap_or(Pass {
+                    number: pass,
+                    direction,
+                    nearest: None,
+                    emitted: None,
+                    slices: 0,
+                });
+                match current.nearest.take() {
                     Some(other) if near.step < other.step => {
                         counts.late += 1;
-                        now.nearest = Some(other);
+                        current.nearest = Some(other);
                     }
                     Some(other) if near.step == other.step => {
                         counts.farther += 1;
-                        let nearer = self.distance(&near, &now) < self.distance(&other, &now);
-                        now.nearest = Some(if nearer { near } else { other });
+                        let nearer = self.distance(&near, &current) < self.distance(&other, &current);
+                        current.nearest = Some(if nearer { near } else { other });
                     }
                     other => {
                         if let Some(other) = other {
-                            self.give(&mut now, other, counts, out);
+                            self.emit(&mut current, other, counts, out);
                         }
-                        now.nearest = Some(near);
+                        current.nearest = Some(near);
                     }
                 }
-                self.now = Some(now);
+                self.current = Some(current);
             }
         }
     }
 
-    /// The pass that goes on, if any, is over.
+    /// Ends the current pass, if any.
     pub fn end(&mut self, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
-        let Some(mut now) = self.now.take() else { return };
-        if let Some(nearest) = now.nearest.take() {
-            self.give(&mut now, nearest, counts, out);
+        let Some(mut current) = self.current.take() else { return };
+        if let Some(nearest) = current.nearest.take() {
+            self.emit(&mut current, nearest, counts, out);
         }
-        if let Some(given) = now.given.take() {
-            let missing = given.step + 1..self.slices.len();
+        if let Some(emitted) = current.emitted.take() {
+            let missing = emitted.step + 1..self.slices.len();
             if missing.len() <= MAX_FILLED {
                 for step in missing {
                     counts.filled += 1;
-                    out.push_back(self.event(&mut now, step, given.frame.clone()));
+                    out.push_back(self.event(&mut current, step, emitted.frame.clone()));
                 }
             }
         }
-        let whole = now.slices == self.slices.len();
+        let whole = current.slices == self.slices.len();
         counts.whole += u64::from(whole);
         counts.incomplete += u64::from(!whole);
-        self.over = Some(now.number);
+        self.over = Some(current.number);
     }
 
-    /// Gives a frame, and before it those that stand in for missing slices: each that of the neighbour whose angle is nearer.
-    fn give(&self, now: &mut Pass, near: Candidate, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
-        let before = now.given.take();
-        let missing = before.as_ref().map_or(0, |given| given.step + 1)..near.step;
+    /// Emits a frame, and before it copies for missing slices: each of the neighbour whose angle is nearer.
+    fn emit(&self, current: &mut Pass, near: Candidate, counts: &mut TrackingCounts, out: &mut VecDeque<Event>) {
+        let before = current.emitted.take();
+        let missing = before.as_ref().map_or(0, |emitted| emitted.step + 1)..near.step;
         if missing.len() <= MAX_FILLED {
             for step in missing {
                 counts.filled += 1;
-                let at = self.slices.at(self.slice(step, now.direction) as f64);
-                let stands_in = match &before {
-                    Some(given) if (given.angle - at).abs() < (near.angle - at).abs() => given,
+                let at = self.slices.at(self.slice(step, current.direction) as f64);
+                let neighbour = match &before {
+                    Some(emitted) if (emitted.angle - at).abs() < (near.angle - at).abs() => emitted,
                     _ => &near,
                 };
-                out.push_back(self.event(now, step, stands_in.frame.clone()));
+                out.push_back(self.event(current, step, neighbour.frame.clone()));
             }
         }
         counts.placed += 1;
-        out.push_back(self.event(now, near.step, near.frame.clone()));
-        now.given = Some(near);
+        out.push_back(self.event(current, near.step, near.frame.clone()));
+        current.emitted = Some(near);
     }
 
-    fn event(&self, now: &mut Pass, step: usize, frame: Frame) -> Event {
-        now.slices += 1;
+    fn event(&self, current: &mut Pass, step: usize, frame: Frame) -> Event {
+        current.slices += 1;
         Event::Frame(Frame {
-            volume: u32::try_from(now.number).unwrap_or(u32::MAX),
+            volume: u32::try_from(current.number).unwrap_or(u32::MAX),
             number: step as u32,
-            slice: self.slice(step, now.direction),
-            backward: now.direction == Direction::Backward,
+            slice: self.slice(step, current.direction),
+            backward: current.direction == Direction::Backward,
             ..frame
         })
     }
@@ -167,39 +172,39 @@ impl Passes {
         if direction == Direction::Forward { step } else { self.slices.len() - 1 - step }
     }
 
-    /// From the middle of its slice, rad.
-    fn distance(&self, near: &Candidate, now: &Pass) -> f64 {
-        (near.angle - self.slices.at(self.slice(near.step, now.direction) as f64)).abs()
+    /// Distance from the centre of its slice, rad.
+    fn distance(&self, near: &Candidate, current: &Pass) -> f64 {
+        (near.angle - self.slices.at(self.slice(near.step, current.direction) as f64)).abs()
     }
 }
 
-/// Of frames unless said otherwise.
+/// What happened to the frames. Counts frames unless stated otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TrackingCounts {
-    /// Were given a slice.
+    /// Placed in a slice.
     pub placed: u64,
     /// Left out: before the sweep had begun.
     pub early: u64,
-    /// Left out: near a turning point, where the direction is not known.
+    /// Left out: near a reversal, where the direction is not known.
     pub turning: u64,
     /// Left out: more than half a pitch beyond the first or last slice.
     pub beyond: u64,
     /// Left out: another frame of the pass was nearer to the slice.
     pub farther: u64,
-    /// Left out: without a time, or the motor's position was not known at theirs, or not soon enough.
+    /// Left out: no time stamp, or the motor's position at that time was not known in time.
     pub unknown: u64,
-    /// Left out: of a pass or a slice before the newest.
+    /// Left out: of an earlier pass or slice than the newest.
     pub late: u64,
-    /// Slices that no frame came nearest to, and that a neighbour's frame stands in for.
+    /// Slices without a frame of their own, filled with a neighbour's.
     pub filled: u64,
-    /// Passes that became whole volumes.
+    /// Passes that became complete volumes.
     pub whole: u64,
-    /// Passes that more was missing of.
+    /// Passes with more slices missing than are filled.
     pub incomplete: u64,
 }
 
 impl TrackingCounts {
-    /// What was counted since an earlier time.
+    /// The difference to earlier counts.
     pub fn since(&self, before: &TrackingCounts) -> TrackingCounts {
         TrackingCounts {
             placed: self.placed - before.placed,
@@ -215,7 +220,7 @@ impl TrackingCounts {
         }
     }
 
-    /// What is worth telling, on one line. Frames that were left out because there were more than needed are not.
+    /// What deserves a report, on one line. Frames that were left out because there were more than needed do not.
     pub fn fault(&self) -> Option<String> {
         let parts = [
             (self.filled, "slices had no frame of their own and were given a neighbour's"),
@@ -258,7 +263,7 @@ mod tests {
         Frame { volume: 9, number: 9, slice: 9, backward: false, time: None, bytes: vec![tag] }
     }
 
-    /// Passes of these angles, deg, every second one backwards; frames are tagged by their place in the list.
+    /// Passes of these angles, deg, every second one backwards; frames are tagged by their index in the list.
     fn run_passes(passes: &[&[f64]]) -> (Vec<Frame>, TrackingCounts) {
         let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let mut tag = 0;
@@ -279,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_back_is_another_volume_and_its_slices_run_down() {
+    fn a_backward_pass_is_another_volume_with_descending_slices() {
         let forth = [-6.1, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0];
         let back = forth.map(|a| -a);
         let (frames, counts) = run_passes(&[&forth, &back]);
@@ -293,14 +298,14 @@ mod tests {
     }
 
     #[test]
-    fn of_two_frames_at_a_slice_the_nearer_counts_whichever_comes_first() {
+    fn of_two_frames_at_a_slice_the_nearer_is_used_in_any_order() {
         let (frames, counts) = run_passes(&[&[-6.0, -5.2, -4.4, -3.9, -2.0, -1.2, 0.0, 2.0, 4.0, 6.0, 6.9]]);
         assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 3), (2, 4), (3, 6), (4, 7), (5, 8), (6, 9)]);
         assert_eq!((counts.farther, counts.whole), (4, 1));
     }
 
     #[test]
-    fn up_to_two_missing_slices_are_given_the_nearer_neighbours_frame_and_three_are_not() {
+    fn up_to_two_missing_slices_get_the_nearer_neighbours_frame_and_three_do_not() {
         let (frames, counts) = run_passes(&[&[-4.0, -2.0, 3.7, 6.0]]);
         assert_eq!(slices_and_tags(&frames), [(0, 0), (1, 0), (2, 1), (3, 1), (4, 2), (5, 2), (6, 3)]);
         assert_eq!((counts.filled, counts.placed, counts.whole, counts.incomplete), (3, 4, 1, 0));
@@ -313,13 +318,13 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_half_a_pitch_beyond_the_sweep_or_at_a_turn_is_left_out_and_ends_the_pass() {
+    fn frames_beyond_the_sweep_or_at_a_reversal_are_left_out_and_end_the_pass() {
         let (mut all, mut counts, mut out) = (Passes::new(slices()), TrackingCounts::default(), VecDeque::new());
         let at = |angle, pass| ArrayState::Sweeping { angle, direction: Direction::Forward, pass };
         for angle in [-9.0, -7.01, -6.9, -4.0, -2.0, 0.0, 2.0, 4.0, 6.9] {
             all.frame(frame(0), at(angle, 0), &mut counts, &mut out);
         }
-        assert_eq!((counts.beyond, out.len()), (2, 6), "the last may still be bettered");
+        assert_eq!((counts.beyond, out.len()), (2, 6), "a nearer one may follow the last");
         all.frame(frame(0), at(7.1, 0), &mut counts, &mut out);
         assert_eq!((counts.beyond, out.len(), counts.whole), (3, 7, 1));
         for angle in [-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0] {
@@ -336,7 +341,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever places come: volumes are numbered upwards, no slice is given twice, and none lies beyond the last.
+        /// For any sequence of states: volume numbers rise, no slice is emitted twice, and none is beyond the last.
         #[test]
         fn no_order_of_places_gives_a_slice_twice(
             places in prop::collection::vec((-9.0..9.0_f64, 0..4_usize, 0..6_u8), 0..200),
@@ -368,7 +373,7 @@ mod count_tests {
     use super::*;
 
     #[test]
-    fn what_is_left_out_of_plenty_is_no_fault() {
+    fn surplus_frames_are_no_fault() {
         let plenty = TrackingCounts {
             placed: 9,
             early: 3,

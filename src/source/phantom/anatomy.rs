@@ -1,13 +1,13 @@
 //! The shape of a fetus of about 32 weeks, as signed distances: head and face, skull, hand, cord, shoulders.
 //!
-//! The head has its own axes, mm: x to the right of the picture, y towards the crown, z out of the face; the origin lies
+//! Axes of the head, mm: x to the right of the picture, y towards the crown, z out of the face; the origin is
 //! between the eyes. Sizes follow usual biometry: outer orbital distance 50 mm, biparietal diameter 78 mm.
 
 use glam::{Vec3, vec3};
 
 /// Skin of the head. `mouth` is how far the jaw is lowered, mm.
 pub(super) fn skin(p: Vec3, mouth: f32) -> f32 {
-    // Paired parts are made once: q is p, or its mirror image.
+    // Paired parts are modelled once: q is p, or its mirror image.
     let q = vec3(p.x.abs(), p.y, p.z);
     let mut d = ellipsoid(p, vec3(0.0, 22.0, -42.0), vec3(38.0, 42.0, 45.5));
     d = join(d, ellipsoid(q, vec3(0.0, -11.0, -24.0), vec3(27.0, 27.0, 24.5)), 8.0);
@@ -69,14 +69,14 @@ fn lips(p: Vec3, q: Vec3, skin: f32, mouth: f32) -> f32 {
     carve(d, slit, 1.0)
 }
 
-/// The rim of the outer ear and its lobe, seen nearly edge on from the front.
+/// The rim of the outer ear and its lobe, nearly parallel to the beam.
 fn ear(q: Vec3) -> f32 {
     let shell = ellipsoid(q, vec3(36.5, -3.0, -37.0), vec3(4.5, 14.5, 9.0));
     let bowl = ellipsoid(q, vec3(40.5, -1.5, -34.5), vec3(4.0, 9.0, 6.0));
     carve(shell, bowl, 1.5).min(ball(q, vec3(35.0, -15.0, -35.0), 3.5))
 }
 
-/// Outer face of the bone: the vault, brows, cheek bones, both jaws. Sockets, nose and fontanelle have none.
+/// Outer surface of the bone: vault, brows, cheek bones, both jaws. Eye sockets, nose and fontanelle have none.
 pub(super) fn bone(p: Vec3, mouth: f32) -> f32 {
     let q = vec3(p.x.abs(), p.y, p.z);
     let vault = ellipsoid(p, vec3(0.0, 22.0, -42.0), vec3(35.0, 39.0, 42.3));
@@ -97,10 +97,10 @@ pub(super) fn brain(p: Vec3) -> f32 {
     ellipsoid(p, vec3(0.0, 22.0, -42.0), vec3(33.0, 37.0, 40.3))
 }
 
-/// A hand beside the cheek, its back to the probe, fingers up; in the head's axes, but it does not turn with it.
-/// `curl` bends the fingers, 0..1.
+/// A hand next to the cheek, its back to the probe, fingers up; in the head's axes, but it does not rotate with the head.
+/// `curl`: flexion of the fingers, 0..=1.
 pub(super) fn hand(p: Vec3, curl: f32) -> f32 {
-    // AsyncPipelineCompiler the cheek, clear of it.
+    // Next to the cheek, not touching it.
     let p = p - vec3(4.0, -3.0, -2.0);
     let bound = ball(p, vec3(40.0, -38.0, -10.0), 48.0);
     if bound > 6.0 {
@@ -108,7 +108,7 @@ pub(super) fn hand(p: Vec3, curl: f32) -> f32 {
     }
     let mut d = ellipsoid(p, vec3(38.0, -34.0, -9.0), vec3(9.5, 9.5, 4.6));
     d = join(d, rod(p, vec3(39.0, -41.0, -10.5), vec3(43.0, -66.0, -17.0), [6.2, 7.5]), 6.0);
-    // Four fingers of two joints: root, and how far they reach.
+    // Four fingers of two joints: root and length.
     const FINGERS: [(f32, f32, f32); 4] =
         [(31.4, -28.0, 9.5), (36.2, -26.4, 11.0), (41.0, -26.6, 10.4), (45.4, -28.6, 8.0)];
     for (x, y, length) in FINGERS {
@@ -124,7 +124,7 @@ pub(super) fn hand(p: Vec3, curl: f32) -> f32 {
     join(d, rod(p, thumb, vec3(27.8, -24.0, -1.5), [2.6, 2.1]), 1.5)
 }
 
-/// Two arteries around a vein: a twisted rope of 11 mm, slung beside the other cheek. In the head's axes.
+/// Umbilical cord: two arteries around a vein, a twisted rope of 11 mm next to the other cheek. In the head's axes.
 pub(super) fn cord(p: Vec3) -> f32 {
     const KNOTS: [Vec3; 7] = [
         Vec3::new(-62.0, 14.0, -22.0),
@@ -151,7 +151,7 @@ pub(super) fn cord(p: Vec3) -> f32 {
         }
         run += length;
     }
-    // Three strands, one turn in 26 mm: the rope is thicker where a strand lies outside.
+    // Three strands, one revolution in 26 mm: the rope is thicker where a strand is on the outside.
     let around = away.z.atan2(away.x);
     nearest.sqrt() - 5.0 - 1.1 * (3.0 * around + at * std::f32::consts::TAU * 3.0 / 26.0).cos()
 }
@@ -171,11 +171,11 @@ pub(super) fn ellipsoid(p: Vec3, centre: Vec3, radii: Vec3) -> f32 {
     let scaled = (p - centre) / radii;
     let slope = (scaled / radii).length();
     let k = scaled.length();
-    // In the very middle the slope vanishes; there the smallest radius is the distance.
+    // At the centre the slope vanishes; there the smallest radius is the distance.
     if slope < 1e-6 { -radii.min_element() } else { k * (k - 1.0) / slope }
 }
 
-/// A rod with round ends whose radius goes from one value to the other.
+/// A rod with round ends, its radius interpolated between two values.
 pub(super) fn rod(p: Vec3, from: Vec3, to: Vec3, radii: [f32; 2]) -> f32 {
     let along = to - from;
     let share = ((p - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);

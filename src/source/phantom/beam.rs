@@ -3,14 +3,14 @@
 use crate::probe::{Indices, Probe};
 use glam::{DVec3, Vec3};
 
-/// The grey scale: 255 is 0 dB, 0 is this far below. dB.
+/// Range of the grey scale, dB: 255 is 0 dB, 0 is so far below.
 pub const DYNAMIC_RANGE: f64 = 50.0;
 
-/// Where and when one scan line looks. Space is that of [`Probe`], mm.
+/// Position, direction and time of one scan line. Space is that of [`Probe`], mm.
 pub(super) struct Beam {
-    /// Place of sample 0.
+    /// Position of sample 0.
     pub first: DVec3,
-    /// From one sample to the next: both maps of the probe are linear along a line.
+    /// Step from one sample to the next. Both maps of the probe are linear along a line.
     pub step: DVec3,
     /// mm from sample to sample.
     pub pitch: f64,
@@ -28,7 +28,7 @@ impl Beam {
     pub fn new(probe: &Probe, line: usize, slice: usize, time: f64) -> Beam {
         let (line, slice) = (line as f64, slice as f64);
         let place = |sample| probe.to_space(Indices { sample, line, slice });
-        // Over the whole length, so that no digits are lost.
+        // Computed over the whole length, for precision.
         let last = (probe.samples - 1) as f64;
         Beam {
             first: place(0.0),
@@ -46,8 +46,8 @@ impl Beam {
         self.first + self.step * sample as f64
     }
 
-    /// In f32, for bodies whose distances need no more.
-    pub fn rough_place(&self, sample: usize) -> Vec3 {
+    /// In f32, for bodies that need no higher precision.
+    pub(crate) fn rough_place(&self, sample: usize) -> Vec3 {
         self.place(sample).as_vec3()
     }
 
@@ -57,20 +57,20 @@ impl Beam {
     }
 }
 
-/// What a place sends back, dB re full scale.
+/// Echo of a point, dB re full scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Echo {
-    /// From scatterers too many to tell apart: they give speckle.
+    /// From many unresolved scatterers, which give speckle.
     pub diffuse: f32,
-    /// From a surface or wire as a whole: it gives none.
+    /// From a surface or wire, without speckle.
     pub mirror: f32,
 }
 
 impl Echo {
-    /// Far below anything shown.
+    /// Far below the dynamic range.
     pub const SILENT: Echo = Echo { diffuse: -200.0, mirror: -200.0 };
 
-    /// Without speckle: the sum of both powers, dB.
+    /// The level without speckle: the sum of both powers, dB.
     pub fn bare(self) -> f32 {
         if self.mirror <= Echo::SILENT.mirror {
             return self.diffuse;
@@ -81,6 +81,6 @@ impl Echo {
 
 /// Grey value of an echo in dB re full scale.
 pub(super) fn grey(level: f32) -> u8 {
-    // A float turns into the nearest end of u8 where it lies outside.
+    // Saturates at 0 and 255.
     ((1.0 + level / DYNAMIC_RANGE as f32) * 255.0).round() as u8
 }

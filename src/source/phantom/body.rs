@@ -1,4 +1,4 @@
-//! The bodies: which there are, what they send back, and the exact answers of those that have any.
+//! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
 use super::beam::{Beam, DYNAMIC_RANGE, Echo};
 use super::head::Head;
@@ -9,19 +9,19 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
-/// What the probe looks at.
+/// The body that is scanned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Body {
-    /// A fetal head, a hand and cord in fluid behind the uterine wall; it moves.
+    /// A fetal head, a hand and a cord in fluid behind the uterine wall; moving.
     #[default]
     Head,
     /// A bright ball in dark fluid.
     Sphere,
-    /// Dark above a plane across the beam, bright below.
+    /// Dark above a plane across the beam, bright below it.
     Step,
     /// Thin bright wires in dark fluid.
     Wires,
-    /// The same everywhere.
+    /// The same grey everywhere.
     Constant,
     /// Grey that rises linearly with range, line angle and motor angle.
     Ramp,
@@ -58,7 +58,7 @@ impl FromStr for Body {
     }
 }
 
-/// A straight wire between two places, mm.
+/// A straight wire between two points, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
     pub from: DVec3,
@@ -66,7 +66,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// From the nearest point of the wire, mm.
+    /// Distance from the wire, mm.
     pub fn distance(&self, place: DVec3) -> f64 {
         let along = self.to - self.from;
         let share = ((place - self.from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
@@ -75,7 +75,7 @@ impl Wire {
 }
 
 /// Grey = `middle` + `per_mm` (range - `range`) + `per_line_rad` line angle + `per_motor_rad` motor angle. Range is from the
-/// in-plane apex. Trilinear interpolation between samples reproduces it, whichever way the motor went.
+/// in-plane apex. Trilinear interpolation between samples reproduces it, for both directions of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RampTruth {
     pub middle: f64,
@@ -94,12 +94,12 @@ impl RampTruth {
     }
 }
 
-/// What the answer must be: places in mm in the space of [`Probe`], greys 0..255 as they are without speckle.
+/// The ground truth: positions in mm in the space of [`Probe`], grey values 0..255 without speckle.
 ///
 /// Edges are linear in grey over one sample along the beam, with the middle grey on the edge itself.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Truth {
-    /// No formula.
+    /// There is no formula.
     Head,
     Sphere {
         centre: DVec3,
@@ -126,15 +126,15 @@ pub enum Truth {
     Ramp(RampTruth),
 }
 
-/// Greys of the bodies with exact answers. The constant one is 15 dB below full scale, where neither end of the scale clips.
+/// Grey values of the bodies with a formula. The constant one is 15 dB below full scale, where neither end of the scale clips.
 const BRIGHT: f64 = 204.0;
 const DARK: f64 = 25.5;
 const CONSTANT: f64 = 255.0 * (1.0 - 15.0 / DYNAMIC_RANGE);
 const WIRE_PEAK: f64 = 250.0;
-/// Grey falls by this times the square of the distance: a wire is 2.9 mm wide in all, so that no frame pitch skips it.
+/// Grey falls by this times the square of the distance: a wire is 2.9 mm wide in all, so that no frame pitch misses it.
 const WIRE_FALL: f64 = 107.0;
 
-/// A body, placed before a probe.
+/// A body in front of a probe.
 pub(super) enum Scatterers {
     Head(Box<Head>),
     Exact { truth: Truth, pitch: f64 },
@@ -158,7 +158,7 @@ impl Scatterers {
                     let place = |[x, y, z]: [f64; 3]| DVec3::new(x, depth(y), z);
                     Wire { from: place(from), to: place(to) }
                 };
-                // Along the elevation, and aslant: a wire along the lateral axis may lie between two frames.
+                // Along the elevation, and oblique. A wire along the lateral axis might be between two frames.
                 let wires = vec![
                     wire([0.0, 30.0, -60.0], [0.0, 30.0, 60.0]),
                     wire([-22.0, 45.0, -60.0], [-22.0, 45.0, 60.0]),
@@ -170,7 +170,7 @@ impl Scatterers {
             }
             Body::Constant => Truth::Constant { grey: CONSTANT },
             Body::Ramp => {
-                // A third of the scale for each of the three, so that the corners stay within it.
+                // A third of the scale for each of the three, so that no corner clips.
                 let share = 80.0;
                 let over = |span: f64| share / span;
                 Truth::Ramp(RampTruth {
@@ -178,7 +178,7 @@ impl Scatterers {
                     range: (probe.first_range() + probe.last_range()) / 2.0,
                     per_mm: over(probe.last_range() - probe.first_range()),
                     per_line_rad: over(probe.lines.last() - probe.lines.first()),
-                    // The motor goes up to one pitch further than the last frame's first line.
+                    // The motor travels up to one pitch beyond the last frame's first line.
                     per_motor_rad: over(probe.slices.last() - probe.slices.first() + 2.0 * probe.slices.pitch()),
                 })
             }
@@ -193,7 +193,7 @@ impl Scatterers {
         }
     }
 
-    /// What each sample of a line sends back.
+    /// The echo of each sample of a line.
     pub fn along(&self, beam: &Beam, out: &mut [Echo]) {
         match self {
             Scatterers::Head(head) => head.along(beam, out),
@@ -212,7 +212,7 @@ fn level(grey: f64) -> f32 {
 
 fn exact(truth: &Truth, beam: &Beam, sample: usize, pitch: f64) -> Echo {
     let place = beam.place(sample);
-    // From one side of an edge to the other within one sample: a harder edge could not be placed between samples.
+    // An edge is linear over one sample. A sharper edge could not be located between samples.
     let edge = |beyond: f64, near: f64, far: f64| near + (far - near) * (beyond / pitch + 0.5).clamp(0.0, 1.0);
     let diffuse = match truth {
         Truth::Sphere { centre, radius, inside, outside } => {

@@ -1,15 +1,15 @@
-//! The fetal head in its fluid: what a beam meets on its way, what it sends back and what it loses.
+//! The fetal head in fluid: echoes and attenuation along a scan line.
 
 use super::anatomy::{self, normal};
 use super::beam::{Beam, Echo};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
 
-/// Levels, dB re full scale, where nothing has been lost yet.
+/// Levels without attenuation, dB re full scale.
 const FLUID: f32 = -46.0;
-/// The receiver's own noise: no shadow is darker.
+/// Noise of the receiver: no shadow is darker.
 const FLOOR: f32 = -48.0;
-/// Skin seen edge on, and what more it sends when it faces the beam.
+/// Skin parallel to the beam, and the additional level when it faces the beam.
 const SKIN: f32 = -9.0;
 const SKIN_FACING: f32 = 4.0;
 /// The skin's mirror echo when it faces the beam; the sum over the point-spread function adds about 15 dB.
@@ -21,19 +21,19 @@ const WALL: f32 = -19.0;
 const LINING: f32 = -11.0;
 const PROBE_SKIN: f32 = -9.0;
 
-/// Two-way losses beyond what the time-gain compensation makes up for, dB/mm.
+/// Two-way attenuation beyond the time-gain compensation, dB/mm.
 const LOSS_SOFT: f32 = 0.12;
 const LOSS_BONE: f32 = 4.5;
-/// Gain that the compensation gives everywhere, so that what lies behind fluid is brighter, dB/mm.
+/// Gain of the compensation at every depth, dB/mm. It makes tissue behind fluid brighter.
 const GAIN: f32 = 0.05;
 
 /// Thicknesses, mm.
 const SKIN_THICKNESS: f32 = 2.2;
 const BONE_THICKNESS: f32 = 1.6;
 
-/// mm of the world for one of the anatomy's.
+/// Scale of the anatomy: mm in space for one mm of the model.
 const SCALE: f32 = 1.0;
-/// The anatomy's distances may grow faster than the place moves: shares of them are safe to leap over.
+/// The distances of the model may grow faster than the point moves. So much of a distance is safe to skip.
 const SAFE_STEP: f32 = 0.6;
 
 pub(super) struct Head {
@@ -43,36 +43,36 @@ pub(super) struct Head {
     face: f32,
 }
 
-/// What moves, at one time.
+/// The moving parts at one time.
 struct Pose {
-    /// From the world's axes to the head's.
-    turn: Mat3,
-    /// Of the jaw, mm.
+    /// Rotation from the axes of space to those of the head.
+    rotation: Mat3,
+    /// Opening of the jaw, mm.
     mouth: f32,
-    /// Of the fingers, 0..1.
+    /// Flexion of the fingers, 0..=1.
     curl: f32,
 }
 
 impl Pose {
-    /// Everything begins at rest, so that the first volume shows a still face.
+    /// All movements begin with zero speed, so that the first volume shows a still face.
     fn at(time: f64) -> Pose {
         // 0 at time 0, 1 after half a period.
         let swing = |period: f64| (0.5 - 0.5 * (std::f64::consts::TAU * time / period).cos()) as f32;
-        // The head is held a little to one side, and nods and turns by a few degrees.
+        // The head is slightly tilted, and nods and rotates by a few degrees.
         let yaw = (-7.0 + 15.0 * swing(9.0)).to_radians();
         let pitch = (2.0 - 3.0 * swing(7.0)).to_radians();
         let roll = 4.0f32.to_radians();
-        let turn = Mat3::from_rotation_z(roll) * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(yaw);
+        let rotation = Mat3::from_rotation_z(roll) * Mat3::from_rotation_x(pitch) * Mat3::from_rotation_y(yaw);
         // The lips are a little apart; a yawn every five seconds.
-        Pose { turn, mouth: 1.4 + 5.0 * swing(5.0).powi(3), curl: 0.25 + 0.6 * swing(6.0) }
+        Pose { rotation, mouth: 1.4 + 5.0 * swing(5.0).powi(3), curl: 0.25 + 0.6 * swing(6.0) }
     }
 }
 
-/// What there is at one place.
+/// The tissue at a point.
 enum Tissue {
-    /// Nothing to be met within so many mm.
+    /// Fluid; no tissue within so many mm.
     Fluid(f32),
-    /// Depth below the nearest skin, mm, and whose it is.
+    /// Depth below the nearest skin, mm, and the part that it belongs to.
     Inside(f32, Part),
 }
 
@@ -83,7 +83,7 @@ enum Part {
 }
 
 impl Head {
-    /// In front of an array whose face lies at Y = `face` mm.
+    /// A head in front of an array whose face is at Y = `face` mm.
     pub fn new(face: f64) -> Head {
         let face = face as f32;
         Head { origin: vec3(0.0, face + 55.0, 5.0), face }
@@ -94,7 +94,7 @@ impl Head {
         let pitch = beam.pitch as f32;
         let direction = beam.direction();
         let mut loss = 0.0;
-        // How squarely the beam met the skin that it is behind.
+        // Cosine of the angle between the beam and the normal of the skin that it entered.
         let mut facing: Option<f32> = None;
         let mut sample = 0;
         while sample < out.len() {
@@ -115,7 +115,7 @@ impl Head {
                 }
                 Tissue::Fluid(away) if wall < 0.0 => {
                     facing = None;
-                    // Up to the next thing that may be met it is all the same.
+                    // Up to the next possible surface everything is fluid.
                     let clear = (away.min(-wall) * SAFE_STEP / pitch) as usize;
                     let end = (sample + clear).min(out.len() - 1);
                     for (i, echo) in out[sample..end].iter_mut().enumerate() {
@@ -136,7 +136,7 @@ impl Head {
         }
     }
 
-    /// From the anatomy's axes: x right, y up, z towards the probe.
+    /// A point in the axes of the model: x right, y up, z towards the probe.
     fn local(&self, place: Vec3) -> Vec3 {
         let p = (place - self.origin) / SCALE;
         vec3(p.x, p.z, -p.y)
@@ -144,7 +144,7 @@ impl Head {
 
     fn tissue(&self, place: Vec3, pose: &Pose) -> Tissue {
         let p = self.local(place);
-        let head = anatomy::skin(pose.turn * p, pose.mouth) * SCALE;
+        let head = anatomy::skin(pose.rotation * p, pose.mouth) * SCALE;
         let limb = anatomy::hand(p, pose.curl).min(anatomy::cord(p)).min(anatomy::shoulders(p)) * SCALE;
         match head.min(limb) {
             away if away > 0.0 => Tissue::Fluid(away),
@@ -154,7 +154,7 @@ impl Head {
 
     /// Distance into the uterine wall, mm, negative in the cavity. The inner face is slightly uneven.
     fn wall(&self, place: Vec3) -> f32 {
-        // The near wall is pressed in by the probe, the far one hollow.
+        // The near wall is pressed in by the probe, the far one is concave.
         let near = 88.0 - (place - vec3(0.0, self.face - 72.0, 0.0)).length();
         let far = (place - vec3(0.0, self.face + 22.0, 0.0)).length() - 90.0;
         let cavity = near.max(far);
@@ -167,14 +167,14 @@ impl Head {
     fn flesh(&self, place: Vec3, pose: &Pose, deep: f32, part: Part, facing: f32) -> (Echo, f32) {
         let skin = || Echo {
             diffuse: SKIN + SKIN_FACING * facing,
-            // A mirror sends its echo back along the beam only.
+            // A specular echo returns only if the surface faces the beam.
             mirror: if deep < 0.5 { SKIN_MIRROR + 20.0 * facing.max(0.1).log10() * 3.0 } else { Echo::SILENT.mirror },
         };
         let soft = Echo { diffuse: SOFT + texture(place, 0.5), ..Echo::SILENT };
         if part == Part::Limb {
             return (if deep < SKIN_THICKNESS { skin() } else { soft }, LOSS_SOFT);
         }
-        let p = pose.turn * self.local(place);
+        let p = pose.rotation * self.local(place);
         let bone = -anatomy::bone(p, pose.mouth) * SCALE;
         let in_brain = anatomy::brain(p) < 0.0;
         if bone > 0.0 && bone < BONE_THICKNESS {
@@ -191,12 +191,12 @@ impl Head {
     }
 }
 
-/// What is received of a level, dB.
+/// The received echo of a level, dB.
 fn received(level: f32, loss: f32, depth: f32) -> Echo {
     Echo { diffuse: (level - loss + GAIN * (depth - 50.0)).max(FLOOR), ..Echo::SILENT }
 }
 
-/// Maternal skin, fascia and muscle in layers; the bright lining of the cavity.
+/// Layers of maternal skin, fascia and muscle, and the bright lining of the cavity.
 fn uterus(place: Vec3, wall: f32, depth: f32) -> Echo {
     let layers = 3.0 * (wall * TAU / 3.4 + 0.5 * (place.x * 0.2).sin()).sin();
     let level = if depth < 2.0 {
@@ -209,7 +209,7 @@ fn uterus(place: Vec3, wall: f32, depth: f32) -> Echo {
     Echo { diffuse: level, ..Echo::SILENT }
 }
 
-/// Slow changes of a tissue's level, dB, over about `1 / fineness` mm.
+/// Slow variation of a tissue's level, dB, over about `1 / fineness` mm.
 fn texture(place: Vec3, fineness: f32) -> f32 {
     let p = place * fineness;
     let wave = |a: Vec3| (p.dot(a)).sin();

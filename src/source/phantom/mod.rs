@@ -1,8 +1,8 @@
-//! The phantom: sweeps of a body that is known exactly, as a wobbling abdominal probe would see it.
+//! The phantom: simulated sweeps of an exactly known body with a wobbling abdominal probe.
 //!
-//! Each scan line looks along its own straight line through the body, at the motor's angle and the time at which that line
-//! is fired (`beam`); what it meets is an echogenicity (`body`, `head`), to which `speckle` gives the grain of a real
-//! picture. The same options give the same bytes on any machine with the same mathematics library, on any number of threads.
+//! Each scan line is a straight line through the body, at the motor's angle and the time at which it is fired (`beam`). The body defines
+//! an echogenicity (`body`, `head`), and `speckle` adds the speckle of a real image. The same options give the same bytes on every machine
+//! with the same mathematics library, with any number of threads.
 
 mod anatomy;
 mod beam;
@@ -29,29 +29,29 @@ use std::path::Path;
 const ARRAY_RADIUS: f64 = 40.0;
 const WOBBLE_RADIUS: f64 = 25.0;
 const SECTOR_ANGLE_DEG: f64 = 75.0;
-/// From its first frame to the last.
+/// Angle from the first frame to the last.
 pub const FAN_ANGLE_DEG: f64 = 61.0;
 /// Depth of the last sample, mm.
 const END_DEPTH: f64 = 120.0;
 /// m/s.
 const SOUND_SPEED: f64 = 1540.0;
 
-/// Most samples of one volume; its complex field takes eight bytes a sample.
+/// Most samples of one volume. Its complex field takes eight bytes a sample.
 const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
-/// What is to be made.
+/// What to simulate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
-    /// Other seeds give other speckle; the body stays.
+    /// Seed of the speckle. The body does not depend on it.
     pub seed: u64,
     pub body: Body,
-    /// Volumes, one after the other in time, 1..=10000.
+    /// Number of volumes, consecutive in time, 1..=10000.
     pub volumes: usize,
     /// Every second volume is swept backwards.
     pub both_ways: bool,
-    /// Without it samples are the bare echogenicity: for exact answers.
+    /// Adds speckle. Without it samples are the exact echogenicity.
     pub speckle: bool,
-    /// Share of the way to the next frame that the motor travels while one frame is acquired, 0..=1.
+    /// Fraction of the distance to the next frame that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
     /// Frames a volume, 2..=1024.
     pub frames: usize,
@@ -80,14 +80,15 @@ impl Default for PhantomOptions {
 /// PhantomOptions that were checked, and the probe that they make. Frames are computed when asked for.
 pub struct Phantom {
     options: PhantomOptions,
-    /// Swept forwards, without its advance.
+    /// Without its advance.
     probe: Probe,
     volumes: Volumes,
     scatterers: Scatterers,
 }
 
 impl Phantom {
-    /// Refuses what cannot be swept, on one line.
+    /// # Errors
+    /// An option that is out of its range.
     pub fn new(options: PhantomOptions) -> Result<Phantom, InputError> {
         let whole = |field, value: usize, least: usize, most: usize| match (least..=most).contains(&value) {
             true => Ok(()),
@@ -137,23 +138,23 @@ impl Phantom {
         self.volumes.count
     }
 
-    /// Where the samples of a volume lie, the motor's way during each frame included.
+    /// The probe of a volume, including the motor's travel during each frame.
     pub fn probe(&self, volume: usize) -> Probe {
         Probe { advance: self.volumes.advance(volume, &self.probe.slices), ..self.probe.clone() }
     }
 
-    /// What the body is, in the space of [`Probe`] and in grey values without speckle.
+    /// The ground truth of the body, in the space of [`Probe`] and in grey values without speckle.
     pub fn truth(&self) -> Truth {
         self.scatterers.truth()
     }
 
-    /// The frames of a volume in the order in which they are acquired: u8, log-compressed, over [`DYNAMIC_RANGE`].
+    /// The frames of a volume in order of acquisition: u8, log-compressed over [`DYNAMIC_RANGE`].
     pub fn volume(&self, volume: usize) -> Vec<Frame> {
         let probe = self.probe(volume);
         let backward = self.volumes.backward(volume);
         let frames = self.options.frames;
         let number_of = |slice: usize| if backward { frames - 1 - slice } else { slice };
-        // A line takes 2 d / c (thesis 4.3), and the next follows at once.
+        // A line takes 2 d / c (thesis 4.3), and the next one follows at once.
         let line_time = probe.acquisition_time() / (frames * self.options.lines) as f64;
         let time_of = |slice: usize| ((volume * frames + number_of(slice)) * self.options.lines) as f64 * line_time;
 
@@ -168,7 +169,7 @@ impl Phantom {
                 echoes
             })
             .collect();
-        // Scatterers that stay give the same speckle every time; in a body that moves, they do not stay.
+        // Scatterers at rest give the same speckle in every volume. Those of a moving body do not.
         let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
         let slices: Vec<Vec<u8>> = match self.options.speckle {
             true => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
@@ -190,8 +191,10 @@ impl Phantom {
         made
     }
 
-    /// Writes all volumes as a PLUS sequence (`.mha`), and the probe file `<stem>.probe.toml` beside it. Both appear whole or
-    /// not at all.
+    /// Writes all volumes as a PLUS sequence (`.mha`), and its probe file `<stem>.probe.toml`. Both files are complete, or neither exists.
+    ///
+    /// # Errors
+    /// More than 20000 frames, a path that does not end in .mha, a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), InputError> {
         write_sequence(self, path)
     }
@@ -216,7 +219,8 @@ fn write_sequence(phantom: &Phantom, path: &Path) -> Result<(), InputError> {
     })
 }
 
-/// The keys of a pre-scan sweep where those can say all, so that the file stands alone.
+/// The header of the sequence. If the keys of a pre-scan sweep can describe all of it, they are added, so that the file needs no probe
+/// file.
 fn header(phantom: &Phantom) -> String {
     let options = phantom.options();
     let probe = phantom.probe(0);

@@ -1,4 +1,4 @@
-//! Speckle: what becomes of an echogenicity when scatterers too many to tell apart send it back.
+//! Speckle: the interference of many unresolved scatterers.
 //!
 //! Complex Gaussian noise times the root of the echogenicity, convolved in polar space with a separable point-spread
 //! function; its magnitude is the envelope. Where the medium is constant that is fully developed speckle: Rayleigh in
@@ -18,7 +18,7 @@ const ELEVATION: f32 = 0.7;
 /// Depth of the focus, mm.
 const FOCUS: f64 = 55.0;
 
-/// A mirror's echoes add up over the point-spread function, in phase, where those of scatterers do not: so much less of it.
+/// Specular echoes add up in phase over the point-spread function, those of scatterers do not. This factor compensates for it.
 const MIRROR: f32 = 0.3;
 
 /// Complex samples of one slice, line by line.
@@ -41,7 +41,7 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64
         .map(|slice| {
             let near = (-reach..=reach)
                 .filter_map(|k| fields.get(slice.checked_add_signed(k)?).map(|f| (f, bell(k as f32, ELEVATION))));
-            // At the ends of the fan the frames that are there carry all the power.
+            // At the ends of the fan the existing frames carry all the power.
             let power: f32 = near.clone().map(|(_, w)| w * w).sum();
             let mut sum = Field::silent(echoes[slice].len());
             for (field, weight) in near {
@@ -52,7 +52,7 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64
         .collect()
 }
 
-/// Noise of unit power times the root of the echogenicity, and the mirrors' echo in phase.
+/// Noise of unit power times the square root of the echogenicity, plus the specular echo in phase.
 fn scattered(echoes: &[Echo], stream: u64) -> Field {
     let mut field = Field::silent(echoes.len());
     for (i, echo) in echoes.iter().enumerate() {
@@ -130,7 +130,7 @@ impl Blur {
         let mut out = vec![0.0; part.len()];
         for (line, out) in part.chunks_exact(self.samples).zip(out.chunks_exact_mut(self.samples)) {
             for (tap, weight) in self.axial.iter().enumerate() {
-                // out[i] += weight * line[i + tap - reach], where both are there.
+                // out[i] += weight * line[i + tap - reach], where both exist.
                 let (from, to) = (tap.saturating_sub(reach), reach.saturating_sub(tap));
                 for (sum, value) in out.iter_mut().skip(to).zip(line.iter().skip(from)) {
                     *sum += weight * value;
@@ -180,13 +180,13 @@ fn stream(seed: u64, volume: u64, slice: u64) -> u64 {
         .fold(mix(seed.wrapping_add(GOLDEN)), |state, part| mix(state ^ mix(part.wrapping_add(1).wrapping_mul(GOLDEN))))
 }
 
-/// Two independent standard normal numbers (Box and Muller 1958). By counter, not by state: any thread may ask for any one.
+/// Two independent standard normal numbers (Box and Muller 1958), from a counter and not from a state, so that threads are independent.
 fn gaussian_pair(stream: u64, counter: u64) -> (f32, f32) {
     let bits = mix(stream.wrapping_add(counter.wrapping_mul(GOLDEN)));
     // Never 0, whose logarithm is infinite.
     let share = ((bits >> 40) as f32 + 0.5) / (1u64 << 24) as f32;
-    let turn = (bits & 0xff_ffff) as f32 / (1u64 << 24) as f32;
+    let phase = (bits & 0xff_ffff) as f32 / (1u64 << 24) as f32;
     let radius = (-2.0 * share.ln()).sqrt();
-    let (sin, cos) = (turn * std::f32::consts::TAU).sin_cos();
+    let (sin, cos) = (phase * std::f32::consts::TAU).sin_cos();
     (radius * cos, radius * sin)
 }

@@ -17,7 +17,7 @@ const MAX_DEVICES: usize = 32;
 
 /// A message of the input devices, or a wake.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::ui) enum DeviceMessage {
+pub(crate) enum DeviceMessage {
     Input(Input),
     /// A fault to report to the user.
     Warning(String),

@@ -7,52 +7,52 @@ use egui::{Rect, pos2, vec2};
 use std::time::Duration;
 
 /// Sizes of the panels, points: buttons on the left, sliders on the right, cine loop below.
-pub(in crate::ui) const MODES_WIDTH: f32 = 208.0;
-pub(in crate::ui) const SLIDERS_WIDTH: f32 = 330.0;
-pub(in crate::ui) const CINE_BAR_HEIGHT: f32 = 76.0;
+pub(crate) const MODES_WIDTH: f32 = 208.0;
+pub(crate) const SLIDERS_WIDTH: f32 = 330.0;
+pub(crate) const CINE_BAR_HEIGHT: f32 = 76.0;
 /// A smaller window shows the picture without panels, points.
 const MIN_WINDOW: [f32; 2] = [760.0, 420.0];
 
 /// What the panels show.
-pub(in crate::ui) struct PanelState<'a> {
-    pub(in crate::ui) controls: &'a Controls,
-    pub(in crate::ui) scene: Option<&'a Scene>,
-    pub(in crate::ui) times: &'a Times,
+pub(crate) struct PanelState<'a> {
+    pub(crate) controls: &'a Controls,
+    pub(crate) scene: Option<&'a Scene>,
+    pub(crate) times: &'a Times,
     /// Upper left corner and size of the picture, pixels.
-    pub(in crate::ui) picture: ([u32; 2], [u32; 2]),
-    pub(in crate::ui) shows_panels: bool,
-    pub(in crate::ui) shows_help: bool,
-    pub(in crate::ui) shows_times: bool,
-    pub(in crate::ui) is_frozen: bool,
-    pub(in crate::ui) is_playing: bool,
+    pub(crate) picture: ([u32; 2], [u32; 2]),
+    pub(crate) shows_panels: bool,
+    pub(crate) shows_help: bool,
+    pub(crate) shows_times: bool,
+    pub(crate) is_frozen: bool,
+    pub(crate) is_playing: bool,
     /// Number of volumes in the cine loop, and the index of the one that is shown.
-    pub(in crate::ui) cine: (usize, Option<usize>),
+    pub(crate) cine: (usize, Option<usize>),
     /// True after the first picture.
-    pub(in crate::ui) has_drawn: bool,
+    pub(crate) has_drawn: bool,
     /// The current rung of the quality ladder, and the frame budget.
-    pub(in crate::ui) quality: &'a str,
-    pub(in crate::ui) budget: Option<Duration>,
-    pub(in crate::ui) banner: Option<Banner>,
-    pub(in crate::ui) notes: &'a [Note],
+    pub(crate) quality: &'a str,
+    pub(crate) budget: Option<Duration>,
+    pub(crate) banner: Option<Banner>,
+    pub(crate) notes: &'a [Note],
     /// The keys that end the program, for the help.
-    pub(in crate::ui) exit_key: &'a str,
+    pub(crate) exit_key: &'a str,
     /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
-    pub(in crate::ui) pointer: Option<[f64; 2]>,
+    pub(crate) pointer: Option<[f64; 2]>,
 }
 
 /// A message that lasts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in crate::ui) struct Banner {
-    pub(in crate::ui) title: String,
-    pub(in crate::ui) text: String,
-    pub(in crate::ui) is_fault: bool,
+pub(crate) struct Banner {
+    pub(crate) title: String,
+    pub(crate) text: String,
+    pub(crate) is_fault: bool,
 }
 
 /// A message about an event.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in crate::ui) struct Note {
-    pub(in crate::ui) text: String,
-    pub(in crate::ui) is_fault: bool,
+pub(crate) struct Note {
+    pub(crate) text: String,
+    pub(crate) is_fault: bool,
 }
 
 /// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
@@ -66,7 +66,7 @@ pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2]
 }
 
 /// The area of the picture in points.
-pub(in crate::ui) fn picture_rect(state: &PanelState, scale: f32) -> Rect {
+pub(crate) fn picture_rect(state: &PanelState, scale: f32) -> Rect {
     let ([x, y], [w, h]) = state.picture;
     let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
     Rect::from_min_size(pos2(x, y), vec2(w, h))

@@ -1,17 +1,17 @@
-//! A run as JUnit XML, which CI systems read: a suite a group, a case a check.
+//! A run as JUnit XML for CI systems: one suite per group, one case per check.
 
-use super::baseline::Compared;
-use super::numbers::of_allowed;
-use super::{Outcome, Run, Verdict, words};
+use super::baseline::BaselineComparison;
+use super::numbers::value_of_limit;
+use super::{Outcome, Run, Verdict, summary};
 use crate::text::escaped;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::time::Duration;
 
-/// The whole file. With a comparison there is one suite more, whose only case fails where anything is worse.
+/// The XML file. A comparison adds a suite, whose only case fails if anything is worse.
 ///
 /// # Errors
 /// One line: the XML could not be written.
-pub fn junit(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
+pub fn junit(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, String> {
     let mut report = Report::new("echolume verify");
     report.timestamp = run.date.parse().ok();
     report.time = duration(run.seconds);
@@ -24,12 +24,12 @@ pub fn junit(run: &Run, compared: Option<&Compared>) -> Result<String, String> {
     report.to_string().map_err(|e| format!("JUnit XML: {}", escaped(&e.to_string())))
 }
 
-/// None of what is no time.
+/// None if `seconds` is no valid duration.
 fn duration(seconds: f64) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds).ok()
 }
 
-/// An empty suite that says what it ran on: readers show suites by themselves.
+/// An empty suite with the conditions of the run, since readers show suites separately.
 fn suite_on(run: &Run, name: &str) -> TestSuite {
     let mut suite = TestSuite::new(escaped(name));
     suite.timestamp = run.date.parse().ok();
@@ -63,7 +63,7 @@ fn case(outcome: &Outcome) -> TestCase {
                 0 | 1 => String::new(),
                 count => format!(" (and {} more)", count - 1),
             };
-            status.set_message(first + &more).set_type("failed").set_description(words::failure(outcome));
+            status.set_message(first + &more).set_type("failed").set_description(summary::failure(outcome));
             status
         }
         Verdict::LeftOut => {
@@ -76,8 +76,8 @@ fn case(outcome: &Outcome) -> TestCase {
     let mut case = TestCase::new(escaped(&outcome.name), status);
     case.set_classname(escaped(&outcome.group));
     case.time = duration(outcome.seconds);
-    let figures = outcome.figures.iter().map(|f| format!("{}: {}", escaped(&f.what), of_allowed(f)));
-    // The notes of what was left out are its message.
+    let figures = outcome.figures.iter().map(|f| format!("{}: {}", escaped(&f.what), value_of_limit(f)));
+    // Notes of a skipped check are its message.
     let notes = outcome.notes.iter().filter(|_| outcome.verdict != Verdict::LeftOut).map(|note| escaped(note));
     let lines: Vec<String> = figures.chain(notes).collect();
     if !lines.is_empty() {
@@ -86,7 +86,7 @@ fn case(outcome: &Outcome) -> TestCase {
     case
 }
 
-fn baseline(run: &Run, compared: &Compared) -> TestSuite {
+fn baseline(run: &Run, compared: &BaselineComparison) -> TestSuite {
     let worse = compared.worse_checks();
     let status = match worse {
         0 => TestCaseStatus::success(),
@@ -97,13 +97,13 @@ fn baseline(run: &Run, compared: &Compared) -> TestSuite {
                 if worse == 1 { "check is" } else { "checks are" },
                 compared.baseline
             );
-            status.set_message(message).set_type("worse").set_description(words::comparison(compared));
+            status.set_message(message).set_type("worse").set_description(summary::comparison(compared));
             status
         }
     };
     let mut case = TestCase::new("nothing is worse than before", status);
     case.set_classname("baseline").set_time(Duration::ZERO);
-    case.set_system_out(words::comparison(compared));
+    case.set_system_out(summary::comparison(compared));
     let mut suite = suite_on(run, "baseline");
     suite.set_time(Duration::ZERO).add_test_case(case);
     suite

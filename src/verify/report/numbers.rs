@@ -1,13 +1,13 @@
-//! Numbers and texts as they are shown: as many digits as a reader can use, and on one line.
+//! Formatting of numbers with units, with as many digits as a reader needs.
 
 use super::{Figure, Unit};
 
 /// Significant digits.
 const DIGITS: usize = 3;
-/// With so many every f64 is told from its neighbour.
-const MOST_DIGITS: usize = 17;
+/// Significant digits that distinguish all f64.
+const MAX_DIGITS: usize = 17;
 
-/// To three significant digits; very large and very small ones with a power of ten.
+/// Three significant digits; scientific notation for very large and very small numbers.
 pub fn number(value: f64) -> String {
     to_digits(value, DIGITS)
 }
@@ -38,7 +38,7 @@ fn to_digits(value: f64, digits: usize) -> String {
     }
 }
 
-/// By what a unit is shown: a factor on the value, and a word behind it.
+/// The factor and the suffix with which values of a unit are printed.
 fn scale(unit: Unit, largest: f64) -> (f64, &'static str) {
     match unit {
         Unit::Value | Unit::Count => (1.0, ""),
@@ -52,7 +52,7 @@ fn scale(unit: Unit, largest: f64) -> (f64, &'static str) {
     }
 }
 
-/// In a unit whose factor is given, with so many digits; counts whole, every digit counts.
+/// A value times a factor with this many significant digits; counts with all digits.
 fn shown(value: f64, unit: Unit, factor: f64, digits: usize) -> String {
     match unit {
         Unit::Count if value.fract() == 0.0 && value.abs() < 1e15 => format!("{value:.0}"),
@@ -69,34 +69,34 @@ pub fn amount(value: f64, unit: Unit) -> String {
     }
 }
 
-/// Two values with as many digits as tell them apart, and the unit of both.
-fn apart(values: [f64; 2], unit: Unit) -> ([String; 2], &'static str) {
+/// Two values with enough digits to distinguish them, and their unit.
+fn distinguishable(values: [f64; 2], unit: Unit) -> ([String; 2], &'static str) {
     let (factor, word) = scale(unit, values[0].abs().max(values[1].abs()));
     let with = |digits| values.map(|v| shown(v, unit, factor, digits));
-    let told = (DIGITS..=MOST_DIGITS).map(with).find(|[a, b]| a != b || values[0] == values[1]);
-    (told.unwrap_or_else(|| with(DIGITS)), word)
+    let texts = (DIGITS..=MAX_DIGITS).map(with).find(|[a, b]| a != b || values[0] == values[1]);
+    (texts.unwrap_or_else(|| with(DIGITS)), word)
 }
 
-/// What was expected and what was got, with as many digits as tell them apart.
+/// Expected and actual value with enough digits to distinguish them.
 pub fn expected_and_got(expected: f64, got: f64) -> [String; 2] {
-    apart([expected, got], Unit::Value).0
+    distinguishable([expected, got], Unit::Value).0
 }
 
 /// Two values and their unit: `0.8 -> 1.9 levels`.
 pub fn change(old: f64, new: f64, unit: Unit) -> String {
-    let ([old, new], word) = apart([old, new], unit);
+    let ([old, new], word) = distinguishable([old, new], unit);
     format!("{old} -> {new}{word}")
 }
 
-/// A figure's value, and what is allowed of it: `0.8 of 2 levels`.
-pub fn of_allowed(figure: &Figure) -> String {
+/// A figure's value and its limit: `0.8 of 2 levels`.
+pub fn value_of_limit(figure: &Figure) -> String {
     let Some(allowed) = figure.allowed else { return amount(figure.value, figure.unit) };
-    let ([value, allowed], word) = apart([figure.value, allowed], figure.unit);
+    let ([value, allowed], word) = distinguishable([figure.value, allowed], figure.unit);
     let word = if allowed == "1" && figure.unit == Unit::Levels { " level" } else { word };
     format!("{value} of {allowed}{word}")
 }
 
-/// A share of one in whole percent; never 100 for what is below it, nor for what is beyond.
+/// A share in integer percent; 100 only if exactly 1.
 pub fn percent(share: f64) -> String {
     match share {
         s if !s.is_finite() || s >= 100.0 => "over 9999 %".into(),
@@ -107,7 +107,7 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// A stretch of time, s.
+/// A duration, given in s.
 pub fn seconds(s: f64) -> String {
     match s {
         s if s >= 3600.0 => format!("{} h {} min", (s / 3600.0) as u64, ((s % 3600.0) / 60.0) as u64),

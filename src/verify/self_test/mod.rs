@@ -1,44 +1,49 @@
-//! Whether the checks notice anything: faults are planted on the device's side one at a time, and each must be caught by one of the
-//! checks that `echolume verify` runs. The same check with nothing planted must pass, or it says nothing.
+//! Group "self-test": fault injection. Faults are injected on the device's side one at a time, and one of the checks of `echolume verify`
+//! must detect each. The same check must pass without the fault, otherwise it proves nothing.
 
-mod dropped;
-mod list;
-mod rays;
+mod injected_faults;
 
-use super::{Bench, Check, Found, known_answers, passes};
-use crate::gpu::{ContextOptions, GpuError};
+use super::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
+use crate::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
 use crate::passes::fault_injection::InjectedFault;
-use crate::passes::{PASSES, is_hit};
+use crate::passes::{PASSES, Texels, is_hit};
+use crate::probe::Geometry;
+use crate::queues::oracle::SubmissionLog;
+use crate::scene::Scene;
+use crate::verify::check::{Check, DeviceUnderTest, Findings, credible_messages};
+use crate::verify::render;
 use crate::verify::report::{Fault, Level, Outcome, Verdict};
+use crate::verify::{known_answers, passes};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
-/// Scenes of a pass that are looked at before the next pass is.
+/// Maximum number of scenes in which each pass is checked.
 const SCENES: usize = 6;
 
-/// A fault, and which check noticed it.
+/// An injected fault, and the check that detected it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Caught {
+pub struct Detection {
     pub fault: String,
-    /// What it stands for.
+    /// The kind of defect it stands for.
     pub what: String,
-    /// Group and name of the check; none: nothing noticed.
+    /// Group and name of the check; None if undetected.
     pub by: Option<String>,
-    /// What the check said, or why nothing did.
-    pub found: String,
-    /// Nobody looked.
+    /// Message of the check, or why nothing detected the fault.
+    pub message: String,
+    /// Not tested.
     pub left_out: bool,
-    /// s, host's clock.
+    /// Duration by the clock of the host, s.
     pub seconds: f64,
 }
 
-impl Caught {
-    /// As the other checks report: an uncaught fault is a failure.
+impl Detection {
+    /// The outcome as of other checks: an undetected fault is a failure.
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
-            _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.found.clone())),
-            Some(by) => (Verdict::Passed, Vec::new(), Some(format!("caught by {by}: {}", self.found))),
-            None => (Verdict::Failed, vec![Fault::new(format!("not caught: {}", self.found))], None),
+            _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.message.clone())),
+            Some(by) => (Verdict::Passed, Vec::new(), Some(format!("detection by {by}: {}", self.message))),
+            None => (Verdict::Failed, vec![Fault::new(format!("not detection: {}", self.message))], None),
         };
         Outcome {
             group: "self-test".into(),
@@ -53,123 +58,123 @@ impl Caught {
     }
 }
 
-/// Every fault that is planted, in running order; barriers are dropped besides.
+/// All faults to inject, in running order. Dropped barriers are tested in addition.
 pub fn faults() -> impl Iterator<Item = &'static InjectedFault> {
-    list::FAULTS.iter().chain(rays::FAULTS)
+    injected_faults::FAULTS.iter()
 }
 
-/// Plants every fault, drops every barrier; `tell` hears of each. What is told last is whether the checks that caught something pass with
-/// nothing planted.
+/// Injects every fault and drops every barrier; calls `tell` after each. The last detection states whether the checks that detected
+/// faults pass without any.
 ///
 /// # Errors
-/// A device that fails with nothing planted.
-pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Caught)) -> Result<Vec<Caught>, GpuError> {
+/// The device fails without a fault.
+pub fn run(options: &ContextOptions, mut tell: impl FnMut(&Detection)) -> Result<Vec<Detection>, GpuError> {
     let mut all = Vec::new();
-    for caught in dropped::all(options)? {
-        tell(&caught);
-        all.push(caught);
+    for detection in dropped_barriers(options)? {
+        tell(&detection);
+        all.push(detection);
     }
-    all.extend(planted(options, faults(), tell)?);
+    all.extend(run_faults(options, faults(), tell)?);
     Ok(all)
 }
 
-/// The same of faults of the caller's, with no barrier dropped.
+/// Like [`run`] for the given faults, without dropping barriers.
 ///
 /// # Errors
 /// As of [`run`].
-pub fn planted<'a>(
+pub fn run_faults<'a>(
     options: &ContextOptions,
     faults: impl Iterator<Item = &'a InjectedFault>,
-    mut tell: impl FnMut(&Caught),
-) -> Result<Vec<Caught>, GpuError> {
-    // A layer that watches has nothing to do with what is computed, and takes most of the time.
+    mut tell: impl FnMut(&Detection),
+) -> Result<Vec<Detection>, GpuError> {
+    // Validation does not affect results, and would take most of the time.
     let options = ContextOptions { validation: false, ..options.clone() };
-    let sound = Bench::new(&options, Level::Quick)?;
-    let mut search = Search { sound, answers: known_answers::checks(Level::Quick), alarms: BTreeMap::new() };
+    let sound = DeviceUnderTest::new(&options, Level::Quick)?;
+    let mut search = DetectionSearch { sound, answers: known_answers::checks(Level::Quick), alarms: BTreeMap::new() };
     let mut all = Vec::new();
     for fault in faults {
-        let caught = search.caught(fault)?;
-        tell(&caught);
-        all.push(caught);
+        let detection = search.detection(fault)?;
+        tell(&detection);
+        all.push(detection);
     }
-    let caught = search.nothing();
-    tell(&caught);
-    all.push(caught);
+    let detection = search.without_faults();
+    tell(&detection);
+    all.push(detection);
     Ok(all)
 }
 
-struct Search {
-    /// With nothing planted.
-    sound: Bench,
+struct DetectionSearch {
+    /// The device without faults.
+    sound: DeviceUnderTest,
     answers: Vec<Check>,
-    /// What checks found with nothing planted.
+    /// Faults that checks report without an injected fault, by check.
     alarms: BTreeMap<String, Option<String>>,
 }
 
-impl Search {
-    fn caught(&mut self, planted: &InjectedFault) -> Result<Caught, GpuError> {
-        let (begun, mut bench) = (Instant::now(), self.sound.planted(planted.change)?);
-        let looked = self.look(planted, &mut bench);
-        let struck = bench.context.faults.change_count();
-        let (by, found) = match looked {
-            Ok((by, found)) => (Some(by), found),
+impl DetectionSearch {
+    fn detection(&mut self, fault: &InjectedFault) -> Result<Detection, GpuError> {
+        let (begun, mut dut) = (Instant::now(), self.sound.with_fault(fault.change)?);
+        let looked = self.look(fault, &mut dut);
+        let struck = dut.context.faults.change_count();
+        let (by, message) = match looked {
+            Ok((by, message)) => (Some(by), message),
             Err(Some(error)) => (None, format!("the device refused it, and no check compared anything: {error}")),
             Err(None) if struck == 0 => (None, "nothing that a check runs is changed by it".into()),
             Err(None) => (None, format!("{struck} changes, and every check passes")),
         };
         let seconds = begun.elapsed().as_secs_f64();
-        Ok(Caught { fault: planted.name.into(), what: planted.what.into(), by, found, left_out: false, seconds })
+        Ok(Detection { fault: fault.name.into(), what: fault.what.into(), by, message, left_out: false, seconds })
     }
 
-    /// The first check that notices, and does not without the fault; else what the device said, if it did not do as it was told: that is
-    /// no comparison, and notices nothing.
-    fn look(&mut self, planted: &InjectedFault, bench: &mut Bench) -> Result<(String, String), Option<String>> {
-        let (scenes, mut refused) = (bench.scenes(), None);
+    /// The first check that fails with the fault and passes without it. Otherwise the error of the device, if any: an error is no
+    /// comparison, so it detects nothing.
+    fn look(&mut self, fault: &InjectedFault, dut: &mut DeviceUnderTest) -> Result<(String, String), Option<String>> {
+        let (scenes, mut refused) = (dut.scenes(), None);
         for (n, pass) in PASSES.iter().enumerate() {
-            let concerned = (0..scenes.len()).filter(|s| planted.change.concerns(pass, &scenes[*s].1));
+            let concerned = (0..scenes.len()).filter(|s| fault.change.concerns(pass, &scenes[*s].1));
             for s in concerned.take(SCENES) {
-                let Some(found) = alarm(passes::in_scene(bench, n, s), &mut refused) else { continue };
+                let Some(message) = alarm(passes::in_scene(dut, n, s), &mut refused) else { continue };
                 let (by, sound) = (format!("passes, {}", pass.name), &mut self.sound);
                 let alarms = self.alarms.entry(format!("{by}, '{}'", scenes[s].0));
                 if alarms.or_insert_with(|| sound_alarm(passes::in_scene(sound, n, s))).is_none() {
-                    return Ok((by, found));
+                    return Ok((by, message));
                 }
             }
         }
         for check in &self.answers {
-            let Some(found) = alarm(check.found(bench), &mut refused) else { continue };
+            let Some(message) = alarm(check.findings(dut), &mut refused) else { continue };
             let (by, sound) = (format!("{}, {}", check.group, check.name), &mut self.sound);
-            if self.alarms.entry(by.clone()).or_insert_with(|| sound_alarm(check.found(sound))).is_none() {
-                return Ok((by, found));
+            if self.alarms.entry(by.clone()).or_insert_with(|| sound_alarm(check.findings(sound))).is_none() {
+                return Ok((by, message));
             }
         }
         Err(refused)
     }
 
-    /// Whether what caught something passes with nothing planted.
-    fn nothing(&self) -> Caught {
-        let alarm = self.alarms.iter().find_map(|(check, found)| Some(format!("{check}: {}", found.as_ref()?)));
-        Caught {
+    /// Whether the checks that detected faults pass without any.
+    fn without_faults(&self) -> Detection {
+        let alarm = self.alarms.iter().find_map(|(check, message)| Some(format!("{check}: {}", message.as_ref()?)));
+        Detection {
             fault: "nothing".into(),
             what: "a check that fails with nothing planted proves nothing".into(),
             by: alarm.is_none().then(|| "no check".into()),
-            found: alarm.unwrap_or_else(|| format!("{} checks pass", self.alarms.len())),
+            message: alarm.unwrap_or_else(|| format!("{} checks pass", self.alarms.len())),
             left_out: false,
             seconds: 0.0,
         }
     }
 }
 
-/// The first thing that is wrong, in a line. An error of the device is kept aside.
-fn alarm(found: Result<Found, GpuError>, refused: &mut Option<String>) -> Option<String> {
-    let found = found.map_err(|error| refused.get_or_insert(error.to_string()).clone()).ok()?;
-    found.faults.first().map(line)
+/// The first fault as one line. An error of the device is stored in `refused`.
+fn alarm(findings: Result<Findings, GpuError>, refused: &mut Option<String>) -> Option<String> {
+    let findings = findings.map_err(|error| refused.get_or_insert(error.to_string()).clone()).ok()?;
+    findings.faults.first().map(line)
 }
 
-/// The same with nothing planted: there an error is an alarm, too.
-fn sound_alarm(found: Result<Found, GpuError>) -> Option<String> {
+/// The same without an injected fault: there an error of the device counts as a fault, too.
+fn sound_alarm(findings: Result<Findings, GpuError>) -> Option<String> {
     let mut refused = None;
-    alarm(found, &mut refused).or(refused)
+    alarm(findings, &mut refused).or(refused)
 }
 
 fn number(value: f64) -> String {
@@ -182,4 +187,143 @@ fn line(fault: &Fault) -> String {
         format!(": {} at {:?} is {} instead of {}", w.output, w.at, number(w.got), number(w.expected))
     });
     format!("{}{worst}{input}", fault.what).replace('\n', ", ")
+}
+
+/// Number of contexts with validation, each with one barrier left out.
+const WATCHED: usize = 6;
+
+const SMALL: &str = "picture = { size = [12, 9] }\nslices = { pixels = 12 }";
+
+/// Scenes to record: name, settings, and numbers of queues.
+fn scenes() -> Vec<(&'static str, String, Vec<usize>)> {
+    let of = |mode: &str, rest: &str| format!("mode = '{mode}'\n{rest}\n{SMALL}");
+    vec![
+        ("surface", of("sr", "light = { shadow = {}, occlusion = {} }\ndistance = { median = 3 }"), vec![1, 2, 3]),
+        ("volume", of("vr", ""), vec![1, 3]),
+        ("lit volume", of("vr", "volume = { shading = 'first-hit' }"), vec![1]),
+        ("projection", of("mip", ""), vec![1, 2]),
+        ("mixed", of("mixed", ""), vec![1]),
+        ("plane", of("plane", ""), vec![1]),
+        ("orthogonal", of("orthogonal", "post = { floats = true }"), vec![1]),
+        ("tomography", of("tomography", ""), vec![1]),
+        ("cube", of("cube", ""), vec![1]),
+        ("4-up", of("vr", "layout = 'four'"), vec![1]),
+        ("every filter", format!("mode = 'sr'\n{ALL_FILTERS}"), vec![1, 3]),
+    ]
+}
+
+/// Leaves out barriers and waits, one at a time. The barrier oracle must detect each; synchronization validation, if its layer is
+/// installed, must detect some. The recording renders two volume images, one while the other is filled.
+///
+/// # Errors
+/// The device fails.
+fn dropped_barriers(options: &ContextOptions) -> Result<Vec<Detection>, GpuError> {
+    Ok(vec![by_oracle(options)?, by_layer(options)?])
+}
+
+fn made(toml: &str) -> Result<(Scene, Vec<Texels>), GpuError> {
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml).map_err(GpuError::Broken)?;
+    let frames = frames(&scene, |[x, y, z]| ((7 * x + 3 * y + 11 * z) % 32) as f64 / 31.0);
+    Ok((scene, frames))
+}
+
+/// Sends volumes while the one before is rendered.
+fn streamed(renderer: &mut Renderer, frames: &[Texels]) -> Result<(), GpuError> {
+    render::send(renderer, frames, 0)?;
+    renderer.begin_picture()?;
+    render::send(renderer, frames, 1)?;
+    renderer.end_picture()?;
+    renderer.begin_picture()?;
+    render::send(renderer, frames, 0)?;
+    renderer.end_picture()?;
+    renderer.picture().map(|_| ())
+}
+
+fn logged(context: &Arc<Context>, toml: &str, queues: usize) -> Result<(Scene, SubmissionLog), GpuError> {
+    let (scene, frames) = made(toml)?;
+    let options = RendererOptions { volume_images: 2, queues: Some(queues), log: true, ..RendererOptions::default() };
+    let mut renderer = Renderer::new(context, scene, &options)?;
+    streamed(&mut renderer, &frames)?;
+    let log = renderer.log().cloned().unwrap_or_default();
+    Ok((renderer.scene().clone(), log))
+}
+
+fn by_oracle(options: &ContextOptions) -> Result<Detection, GpuError> {
+    let begun = Instant::now();
+    let context = Context::new(&ContextOptions { validation: false, ..options.clone() })?;
+    let (mut barriers, mut waits, mut runs, mut implied, mut missed) = (0, 0, 0, 0, None);
+    for (name, toml, counts) in scenes() {
+        for queues in counts {
+            let (scene, log) = logged(&context, &toml, queues)?;
+            let of = |what: String| format!("{name}, {queues} queues: {what}");
+            if let Some(hazard) = log.find_hazard(&scene) {
+                missed.get_or_insert(of(format!("nothing is left out, and {hazard:?}")));
+            }
+            for barrier in log.barriers() {
+                let unseen = log.without_barrier(barrier).find_hazard(&scene).is_none();
+                // A semaphore wait of the submission may already imply this barrier.
+                let may_be = !log.submissions[barrier.0].waits.is_empty();
+                implied += usize::from(unseen && may_be);
+                if unseen && !may_be {
+                    missed.get_or_insert(of(format!("barrier {barrier:?} is not missed")));
+                }
+            }
+            let unseen = |wait: &(usize, usize)| log.without_wait(*wait).find_hazard(&scene).is_none();
+            missed = missed.or(log.waits().into_iter().find(unseen).map(|w| of(format!("wait {w:?} is not missed"))));
+            (barriers, waits, runs) = (barriers + log.barriers().len(), waits + log.waits().len(), runs + 1);
+        }
+    }
+    Ok(Detection {
+        fault: "dropped barrier".into(),
+        what: "every barrier and every wait for another queue is left out once".into(),
+        by: missed.is_none().then(|| "the barrier oracle".into()),
+        message: missed.unwrap_or_else(|| {
+            let missed = barriers - implied;
+            format!("{missed} of {barriers} barriers and {waits} of {waits} waits in {runs} recordings; the rest stand where a queue waits for another")
+        }),
+        left_out: false,
+        seconds: begun.elapsed().as_secs_f64(),
+    })
+}
+
+/// Synchronization validation on one scene: no message with all barriers, some messages with one left out. It does not detect every one,
+/// since it ignores write-after-write hazards through storage images.
+fn by_layer(options: &ContextOptions) -> Result<Detection, GpuError> {
+    let begun = Instant::now();
+    let toml = format!("mode = 'mip'\n{SMALL}");
+    let detection = |by: Option<&str>, message: String| Detection {
+        fault: "dropped barrier, watched".into(),
+        what: "barriers are left out while synchronization validation looks on".into(),
+        by: by.map(String::from),
+        message,
+        left_out: false,
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    let recorded = |dropped: Option<u32>| -> Result<(u32, Vec<String>), GpuError> {
+        let context = Context::new(options)?;
+        let (scene, frames) = made(&toml)?;
+        let mut renderer = Renderer::new(&context, scene, &RendererOptions::default())?;
+        dropped.iter().for_each(|n| renderer.drop_barrier(*n));
+        render::send(&mut renderer, &frames, 0)?;
+        renderer.picture()?;
+        let barriers = renderer.barriers();
+        drop(renderer);
+        Ok((barriers, credible_messages(&context, context.messages(), true)))
+    };
+    if !options.validation {
+        let why = "the validation layer does not watch".to_string();
+        return Ok(Detection { left_out: true, ..detection(None, why) });
+    }
+    let (barriers, messages) = recorded(None)?;
+    if let Some(message) = messages.first() {
+        return Ok(detection(None, format!("nothing is left out, and validation says {message}")));
+    }
+    let mut detected = 0;
+    for n in 0..WATCHED {
+        let dropped = 1 + n as u32 * barriers / WATCHED as u32;
+        let (_, messages) = recorded(Some(dropped))?;
+        detected += usize::from(messages.iter().any(|m| m.contains("SYNC-HAZARD")));
+    }
+    let by = (detected > 0).then_some("synchronization validation");
+    Ok(detection(by, format!("{detected} of {WATCHED} that were left out, of {barriers}")))
 }

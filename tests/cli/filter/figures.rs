@@ -1,9 +1,11 @@
-//! What `echolume filter` computes and measures: every filter against its f64 reference, ratios of regions, growth of windows.
+//! Results of `echolume filter`: every filter against its f64 reference, figures of regions, growth of windows.
 
 use super::*;
+use crate::common::probes::voxels;
+use crate::common::scenes::scene;
 
 #[test]
-fn ratios_of_regions_are_those_of_the_files() {
+fn figures_of_regions_equal_those_of_the_files() {
     let folder = Folder::new("ratios");
     let picture = |x: u32, y: u32| noise(x, y) / if x < 32 { 4 } else { 2 } + if x < 32 { 40_000 } else { 1000 };
     let file = folder.write("in.pgm", pgm(64, 48, true, picture));
@@ -34,7 +36,7 @@ fn ratios_of_regions_are_those_of_the_files() {
             assert!(off < 2e-3, "{when}: {got:?} is not {expected:?}");
         }
     }
-    // Smoothing takes noise away: otherwise the two lines are of the same picture.
+    // Smoothing removes noise: otherwise the two lines are of the same picture.
     let snr = |when: &str| {
         let line = said.lines().find_map(|l| l.strip_prefix(&format!("region {when}"))).expect("a line");
         line.split_whitespace().nth(2).and_then(|w| w.parse::<f64>().ok()).expect("a ratio")
@@ -45,7 +47,7 @@ fn ratios_of_regions_are_those_of_the_files() {
 
 /// Every filter of the command line, against the f64 reference of the same slice.
 #[test]
-fn every_filter_by_its_name_is_the_one_of_the_settings() {
+fn every_filter_name_gives_the_filter_of_the_settings() {
     let folder = Folder::new("names");
     let file =
         folder.write("in.pgm", pgm(45, 37, true, |x, y| 20_000 + noise(x, y) / 8 + if x > 20 { 20_000 } else { 0 }));
@@ -77,18 +79,16 @@ fn every_filter_by_its_name_is_the_one_of_the_settings() {
     }
 }
 
-/// Every slot of a picture's way through stage 1, in f64.
+/// Every slot of stage 1 for a picture, in f64.
 fn reference(
     grey: &Grey,
     slices: &str,
 ) -> std::collections::BTreeMap<echolume::passes::Slot, echolume::passes::Texels> {
-    use echolume::probe::{Geometry, Grid};
     let size = [grey.width as usize, grey.height as usize, 1];
-    let grid = Geometry::Cartesian(Grid { size, spacing: [1.0; 3], origin: [0.0; 3] });
     let stored = if grey.sixteen { echolume::source::StoredType::U16 } else { echolume::source::StoredType::U8 };
     let input = echolume::scene::Input { stored, range: [0.0, grey.white()] };
     let toml = format!("mode = 'plane'\npicture = {{ size = [1, 1] }}\nslices = {{ format = 'r32f', {slices} }}");
-    let scene = echolume::scene::Scene::new(grid, input, toml::from_str(&toml).expect("settings")).expect("scene");
+    let scene = scene(voxels(size), input, &toml);
     let frame = echolume::passes::Texels { size, channels: 1, values: grey.shares() };
     echolume::reference::render(&scene, &[frame])
 }

@@ -1,4 +1,4 @@
-//! `echolume filter` as a user meets it: ordinary pictures in, filtered pictures and figures out, and what it says to wrong
+//! `echolume filter` as a user sees it: ordinary pictures in, filtered pictures and figures out, and its answers to wrong
 //! files and flags.
 
 mod figures;
@@ -14,7 +14,7 @@ fn run(arguments: &[&str]) -> Ran {
     program::run(&[&["filter"], arguments].concat())
 }
 
-/// Runs with validation what has to work, and gives what it prints.
+/// Runs with validation; it must succeed. Returns its standard output.
 fn done(arguments: &[&str]) -> String {
     program::done(&[&["filter"], arguments, &["--validate"]].concat())
 }
@@ -39,7 +39,7 @@ fn filtered(input: &str, output: &str, filters: &[&str]) -> Grey {
     Grey::load(output.as_ref()).expect("the written picture")
 }
 
-/// Without a pattern in which two windows look the same.
+/// Noise without a pattern, so that no two windows are equal.
 fn noise(x: u32, y: u32) -> u16 {
     let mixed = (x ^ (y << 12)).wrapping_add(1).wrapping_mul(0x9e37_79b9);
     let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b);
@@ -72,14 +72,14 @@ fn a_gaussian_spreads_a_point_by_its_kernel() {
         let expected = 65535.0 * kernel(1.5, x) * kernel(2.5, y);
         assert!((f64::from(*value) - expected).abs() < 0.6, "{x}, {y}: {value} is not {expected}");
     }
-    // A median has no use for one hot pixel, in either order of the flags.
+    // A median removes one hot pixel, in either order of the flags.
     for filters in [["median", "gaussian:depth=1"], ["gaussian:depth=1", "median"]] {
         assert!(filtered(&file, &folder.path("out.png"), &filters).values.iter().all(|v| *v == 0));
     }
 }
 
 #[test]
-fn colours_become_grey_by_rec_709_and_that_is_said() {
+fn colours_become_grey_by_rec_709_with_a_note() {
     let folder = Folder::new("colour");
     let ppm = [b"P6 4 1 255\n".as_slice(), &[255, 0, 0, 0, 255, 0, 0, 0, 255, 77, 77, 77]].concat();
     let file = folder.write("in.ppm", ppm);
@@ -100,7 +100,7 @@ fn png_jpeg_pnm_and_bmp_are_read() {
         ("a.jpg", image::ImageFormat::Jpeg, 4),
         ("a.pgm", image::ImageFormat::Pnm, 0),
         ("a.bmp", image::ImageFormat::Bmp, 0),
-        // What it is decides, not what it is called.
+        // The content decides, not the name.
         ("a.txt", image::ImageFormat::Png, 0),
     ] {
         let file = folder.path(name);

@@ -1,9 +1,9 @@
-//! What `echolume filter` says to wrong files and flags, and that it leaves nothing behind.
+//! Answers of `echolume filter` to wrong files and flags; it leaves no file behind.
 
 use super::*;
 
 #[test]
-fn no_wrong_file_is_met_with_a_panic_or_a_picture() {
+fn wrong_files_cause_neither_a_panic_nor_a_picture() {
     let folder = Folder::new("files");
     let good = folder.write("good.pgm", pgm(30, 20, false, |x, _| x as u16));
     let mut png = std::io::Cursor::new(Vec::new());
@@ -47,7 +47,7 @@ fn no_wrong_file_is_met_with_a_panic_or_a_picture() {
 }
 
 #[test]
-fn nothing_is_written_over_the_input_or_where_it_cannot_be() {
+fn inputs_are_not_overwritten_and_bad_targets_are_refused() {
     let folder = Folder::new("targets");
     let input = folder.write("in.pgm", pgm(9, 9, false, |x, y| (x * y) as u16));
     let bytes = fs::read(&input).expect("input");
@@ -100,7 +100,7 @@ fn no_wrong_flag_is_taken_for_a_default() {
         refused(&[&[&input, "-o", &output, "--filter", "median"], &flags[..]].concat(), 2, &[named]);
     }
     assert_eq!(folder.names().len(), 1, "something was written");
-    // What clap refuses shows the usage.
+    // Refusals of clap show the usage.
     for arguments in [
         vec![],
         vec![&*input, "--filter", "median"],

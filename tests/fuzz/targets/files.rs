@@ -5,10 +5,10 @@ use echolume::source::recorder::Reader;
 use echolume::source::{InputError, Recording, Source};
 use std::path::Path;
 
-/// What is read of an input that goes on: a few bytes of zlib make a thousand times as many.
+/// Bytes read at most: a few bytes of zlib expand to a thousand times as many.
 const MOST_READ: usize = 8 << 20;
 
-/// A probe that fits most frames, for sweeps that bring none.
+/// A probe that fits most frames, for sweeps without one.
 const PROBE: &[u8] = b"[array]\nkind = 'curved'\nradius_mm = 40\n[lines]\nsector_angle_deg = 70\n[depth]\nend_mm = 120\n\
                        [motion]\nkind = 'fan'\nwobble_radius_mm = 25\nfan_angle_deg = 60\nspeed_ratio = 0.4\nboth_ways = true\n";
 
@@ -48,7 +48,7 @@ pub fn kretz(bytes: &[u8]) -> String {
     recording(&written("input.vol", bytes), None)
 }
 
-/// A file of frames as it came, and with checksums that let its words through.
+/// A file of frames, unchanged and with checksums that make its contents valid.
 pub fn frames(bytes: &[u8]) -> String {
     let once = |bytes: &[u8]| {
         let path = written("input.frames", bytes);
@@ -62,7 +62,7 @@ pub fn frames(bytes: &[u8]) -> String {
     once(bytes) + &once(&right)
 }
 
-/// Sets the header's length and checksum, and those of the frames behind it as long as one leads to the next. None where there is no room.
+/// Sets the length and checksum of the header, and those of the frames after it as far as they are linked. None if the file is too short.
 fn mend(bytes: &mut [u8]) -> Option<()> {
     // The header is JSON: it ends with the brace before the first frame.
     let frame = bytes.windows(4).position(|w| w == b"FRAM").unwrap_or(bytes.len());
@@ -76,7 +76,7 @@ fn mend(bytes: &mut [u8]) -> Option<()> {
     None
 }
 
-/// Writes the CRC-32 of a range behind it, and says where that ends.
+/// Writes the CRC-32 of a range after it. Returns where the checksum ends.
 fn sum(bytes: &mut [u8], from: usize, to: usize) -> Option<usize> {
     let crc = bytes.get(from..to)?.iter().fold(u32::MAX, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })

@@ -1,11 +1,11 @@
-//! The configuration of a cart, and what is taken out of the text of logs.
+//! The configuration of a cart, and the redaction of logs.
 
 use super::told;
 use echolume::kiosk::config::Config;
 use echolume::kiosk::redaction::Redactor;
 use std::path::Path;
 
-/// What is taken is written out and read back, makes arguments, and layers.
+/// An accepted configuration round-trips, and gives arguments and layers.
 pub fn configuration(bytes: &[u8]) -> String {
     let path = Path::new("echolume.toml");
     let config = match Config::parse(&String::from_utf8_lossy(bytes), path) {
@@ -21,7 +21,7 @@ pub fn configuration(bytes: &[u8]) -> String {
     told(config.flag_error(&arguments.join(" ")))
 }
 
-/// What follows a name that nobody knows stays, and so do lines.
+/// Text after an unknown name is kept, and so are lines.
 pub fn redacted(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let mut redactor = Redactor::new();

@@ -1,5 +1,5 @@
-//! Everything that reads what comes from outside, as functions of any bytes. Each must come to an end without a panic; it says in words
-//! what became of the bytes, so that inputs with a new outcome can be told from more of the same.
+//! All parsers of external input, as functions of any bytes. Each must terminate without a panic. It returns a text that classifies
+//! the outcome, so that the fuzzer recognises inputs with a new outcome.
 //!
 //! `tests/fuzz` runs them with mutated seeds, `tools/fuzz` under libFuzzer.
 
@@ -22,11 +22,11 @@ pub struct Target {
     pub run: fn(&[u8]) -> String,
     /// Seeds are lines of text: numbers and words are exchanged too.
     pub text: bool,
-    /// Memory that it may take beside its input, bytes.
+    /// Memory that it may use in addition to its input, bytes.
     pub memory: usize,
-    /// Times that it is run within the tests: about one and a half seconds.
+    /// Number of inputs within the tests: about one and a half seconds.
     pub rounds: u32,
-    /// Seeds beside those in `tests/fuzz/seeds/<name>`: files and folders from the top.
+    /// More seeds than those in `tests/fuzz/seeds/<name>`: files and folders from the top of the repository.
     pub also: &'static [&'static str],
 }
 
@@ -107,12 +107,12 @@ pub const TARGETS: &[Target] = &[
     },
     Target { name: "report", run: reports::error_report, text: true, memory: 64 * MIB, rounds: 150_000, also: &[] },
     Target { name: "profile", run: reports::profile, text: true, memory: 64 * MIB, rounds: 100_000, also: &[] },
-    // A header of some bytes may ask for 512 MiB, which the system gives when they are written.
+    // A header of some bytes may claim 512 MiB, which the system provides when they are written.
     Target { name: "picture", run: reports::picture, text: false, memory: 2048 * MIB, rounds: 5_000, also: &[] },
     Target { name: "compounder", run: voxels::compounder, text: false, memory: 64 * MIB, rounds: 12_000, also: &[] },
 ];
 
-/// Writes what is to be read from a file, and gives its path: in a folder of this process, the same for every input.
+/// Writes bytes to a file and returns its path, in a folder of this process; the same for every input.
 fn written(name: &str, bytes: &[u8]) -> PathBuf {
     let folder = folder();
     std::fs::create_dir_all(&folder).expect("a folder for inputs");
@@ -121,7 +121,7 @@ fn written(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Where inputs that must be files lie: FUZZ_FOLDER, or a folder of this process in memory where the system has one.
+/// The folder for inputs that must be files: FUZZ_FOLDER, or a folder of this process in memory if the system has one.
 pub fn folder() -> PathBuf {
     if let Some(folder) = std::env::var_os("FUZZ_FOLDER") {
         return folder.into();
@@ -131,7 +131,7 @@ pub fn folder() -> PathBuf {
     under.join(format!("echolume-fuzz-{}", std::process::id()))
 }
 
-/// What an error must be: one line of bounded length that cannot write to a terminal.
+/// An error must be one line of bounded length without control characters.
 fn told(error: impl std::fmt::Display) -> String {
     let line = error.to_string();
     assert!(!line.chars().any(char::is_control), "{line:?}");
@@ -139,7 +139,7 @@ fn told(error: impl std::fmt::Display) -> String {
     line
 }
 
-/// Bytes taken one after the other as whatever is needed; 0 behind the last.
+/// Bytes consumed in order as values of any type; 0 after the last.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {
@@ -153,14 +153,14 @@ impl Bytes<'_> {
         self.0.is_empty()
     }
 
-    /// At most this many: none behind the last.
+    /// At most this many: none after the last.
     fn take(&mut self, count: usize) -> &[u8] {
         let (taken, rest) = self.0.split_at(count.min(self.0.len()));
         self.0 = rest;
         taken
     }
 
-    /// Mostly a number as they occur, now and then one that does not.
+    /// Mostly a realistic number, sometimes an extreme one.
     fn number(&mut self) -> f64 {
         const EXTREME: [f64; 12] = [
             0.0,

@@ -1,4 +1,4 @@
-//! Probe files, their motor, and what the motor says.
+//! Probe files, their `[motor]` table, and replies of the motor.
 
 use super::{Bytes, told, written};
 use echolume::probe::motor::tmcl::{LENGTH, Reply, Request, axis, status_words, version_text};
@@ -6,7 +6,7 @@ use echolume::probe::motor::{MotorTable, Sweep};
 use echolume::probe::{Indices, Probe, ProbeFile};
 use std::time::Duration;
 
-/// The geometry of a probe file that is right, for the motor behind it.
+/// The geometry of a valid probe file, for its motor.
 const GEOMETRY: &[u8] =
     b"array = { kind = 'curved', radius_mm = 40 }\nlines = { sector_angle_deg = 70 }\ndepth = { end_mm = 120 }\n\
                           motion = { kind = 'fan', wobble_radius_mm = 25, fan_angle_deg = 60 }\n[motor]\n";
@@ -32,7 +32,7 @@ pub fn probe_file(bytes: &[u8]) -> String {
     outcome
 }
 
-/// What was checked has a finite place for every sample, and a box around all.
+/// A checked geometry has a finite position for every sample, and a box around all.
 fn places(probe: &Probe) {
     probe.check().expect("was checked");
     let last = [probe.samples - 1, probe.lines.len() - 1, probe.slices.len() - 1].map(|n| n as f64);
@@ -55,7 +55,7 @@ pub fn motor_table(bytes: &[u8]) -> String {
     }
 }
 
-/// What was checked makes finite numbers of any angle, and a speed that is within it of any sweep that it allows.
+/// A checked table gives finite numbers for any angle, and allowed sweeps are within its speed.
 fn turns(table: &MotorTable) -> String {
     for angle in [0.0, -180.0, 180.0, table.largest_angle_deg / 2.0] {
         let back = table.angle(table.position(angle));
@@ -72,7 +72,7 @@ fn turns(table: &MotorTable) -> String {
             let Ok(speed) = sweep.speed(table, Duration::from_millis(20)) else { continue };
             allowed += 1;
             assert!(speed > 0.0 && speed <= table.largest_speed_deg_per_s, "{speed} deg/s for {sweep:?}");
-            // How long a pass may take is made of this.
+            // The time limit of a pass follows from this.
             let longest = angle / speed + speed / table.acceleration_deg_per_s2;
             assert!(longest < 1e9, "{longest} s for {sweep:?}");
         }

@@ -1,4 +1,4 @@
-//! What comes over the network and through pipes.
+//! Input from the network and from pipes.
 
 use super::{Bytes, told};
 use echolume::source::igtl::{
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 const LIMIT: usize = 1 << 20;
 
-/// OpenIGTLink as it came, and with the size and checksum that let the body through.
+/// OpenIGTLink, unchanged and with the size and checksum that make the body valid.
 pub fn messages(bytes: &[u8]) -> String {
     let mut right = bytes.to_vec();
     if let Some((head, body)) = right.split_at_mut_checked(HEADER) {
@@ -48,14 +48,14 @@ fn stream(mut bytes: &[u8]) -> String {
 
 fn round_trip(message: &Message) {
     for version in [Version::V1, Version::V2] {
-        // What the format cannot hold was longer before it was read as text.
+        // A text beyond the format's length was longer before it was decoded.
         let Ok(bytes) = encode(message, version) else { continue };
         let again = decode(&bytes, 4 * LIMIT);
         assert_eq!(again, Ok(Decoded::Message { message: message.clone(), length: bytes.len() }));
     }
 }
 
-/// Poses and frames of any time in any order: each frame is settled once.
+/// Poses and frames of any time in any order: each frame is paired or dropped once.
 pub fn pairing(bytes: &[u8]) -> String {
     let mut bytes = Bytes(bytes);
     let name = |n: u8| ["Probe", "Reference", ""][usize::from(n % 3)].to_string();

@@ -1,4 +1,4 @@
-//! What an earlier run wrote, and ordinary pictures.
+//! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
 use echolume::error_report::{Measure, Report, choose, export as error_export};
@@ -6,7 +6,7 @@ use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
 use echolume::ui::quality_ladder;
-use echolume::verify::report::{baseline, html as page, json as verified, junit, words};
+use echolume::verify::report::{self, baseline, html as page, junit, summary};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -18,8 +18,8 @@ pub fn error_report(bytes: &[u8]) -> String {
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
         error_export::summary_table(&report, measure);
-        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.say(measure));
-        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.say(measure));
+        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.describe(measure));
+        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.describe(measure));
     }
     #[cfg(not(feature = "view"))]
     let rungs = 0;
@@ -55,18 +55,18 @@ pub fn picture(bytes: &[u8]) -> String {
     }
 }
 
-/// What is taken is written out and read back, does not differ from itself, and makes reports.
+/// An accepted run round-trips, does not differ from itself, and makes reports.
 pub fn verification(bytes: &[u8]) -> String {
-    let run = match verified::from_json(&String::from_utf8_lossy(bytes)) {
+    let run = match report::from_json(&String::from_utf8_lossy(bytes)) {
         Ok(run) => run,
         Err(error) => return told(error),
     };
-    let written = verified::to_json(&run).expect("JSON");
-    let again = verified::from_json(&written).expect("what was written out is right");
-    assert_eq!(verified::to_json(&again).expect("JSON"), written);
-    let compared = baseline::compare(&run, &again, &baseline::Options::default());
+    let written = report::to_json(&run).expect("JSON");
+    let again = report::from_json(&written).expect("what was written out is right");
+    assert_eq!(report::to_json(&again).expect("JSON"), written);
+    let compared = baseline::compare(&run, &again, &baseline::BaselineOptions::default());
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
     page::html(&run, Some(&compared)).expect("a page");
-    told(words::summary(&run))
+    told(summary::summary(&run))
 }

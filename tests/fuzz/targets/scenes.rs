@@ -60,7 +60,7 @@ pub fn assignments(bytes: &[u8]) -> String {
     for line in text.lines().take(32) {
         layers.has(line);
         let mut next = layers.clone();
-        // The command line ends at the first that is wrong; here the rest is tried as well.
+        // The command line ends at the first wrong one; here the others are tried as well.
         match next.set(line) {
             Ok(()) => layers = next,
             Err(error) => outcome += &error.to_string(),

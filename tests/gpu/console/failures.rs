@@ -1,18 +1,18 @@
-//! Sources and devices that go away under a console, and the ways out of it.
+//! Lost sources and devices of a console, and how to exit it.
 
 use super::*;
 use ash::vk;
 use echolume::gpu::faults::InjectionPoint;
 
-/// Prevents a console that ends with its probe, or needs to be told that it is back.
+/// Prevents a console that ends with its probe, or does not find it again by itself.
 #[test]
-fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
+fn a_lost_source_is_awaited_and_the_picture_stays() {
     let device = Device::new();
     let sources = Arc::new(Mutex::new(Vec::new()));
     let mut options = options();
     options.retry = Some(Duration::from_millis(20));
     let mut desk = Desk::of(&device, options, sources.clone());
-    // Nothing is there at first.
+    // No source at first.
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_millis(60) {
         let next = desk.tick(Instant::now());
@@ -31,14 +31,14 @@ fn a_source_that_goes_away_is_waited_for_and_what_was_shown_stays() {
         assert!(desk.picture() == picture, "what was shown stays");
         last = Some(picture);
     }
-    // A hand turns what is shown, source or not.
+    // A drag rotates the picture, with or without a source.
     desk.console.execute(&Command::Rotate([20.0, 5.0]), Instant::now());
     desk.rest();
     assert!(last.as_ref() != Some(&desk.picture()));
     assert_eq!(desk.console.stream().cine().volumes().len(), 3, "volumes of three sources");
 }
 
-/// Prevents a sleeve from ending a kiosk, and a kiosk that cannot be ended.
+/// Prevents an accidental touch from ending a kiosk, and a kiosk that cannot be ended.
 #[test]
 fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
     let device = Device::new();
@@ -63,9 +63,9 @@ fn a_kiosk_is_left_by_its_chord_alone_and_a_window_by_escape() {
     }
 }
 
-/// Prevents a console that goes down with its device, or shows something else on the next one.
+/// Prevents a console that ends with its device, or shows something else on the next one.
 #[test]
-fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
+fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
     for (seam, is_frozen) in
         [(InjectionPoint::Submit, true), (InjectionPoint::Submit, false), (InjectionPoint::Wait, true)]
     {
@@ -95,9 +95,9 @@ fn a_device_that_is_lost_is_said_and_the_next_one_shows_the_same() {
     }
 }
 
-/// Prevents a console that is black for ever because memory ran out at the wrong moment.
+/// Prevents a console that stays black because memory ran out at the wrong moment.
 #[test]
-fn memory_that_runs_out_anywhere_is_got_over() {
+fn running_out_of_memory_anywhere_is_recovered() {
     let device = Device::new();
     let mut reached = 0;
     for n in (0..60).step_by(8) {
@@ -105,7 +105,7 @@ fn memory_that_runs_out_anywhere_is_got_over() {
         let mut desk =
             Desk::of(&device, ConsoleOptions { retry: Some(Duration::from_millis(5)), ..options() }, sources.clone());
         device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
-        // What is opened again says all of it again, and none of them ends by itself.
+        // A reopened source sends everything again, and no source ends by itself.
         let mut speak = Vec::new();
         for _ in 0..4 {
             let (say, said) = channel();

@@ -1,11 +1,11 @@
-//! From what hands do to the picture that shows it: the same, byte for byte, as one that is drawn of the same settings by itself.
+//! From input to picture: the same, byte for byte, as one drawn from the same settings by a separate renderer.
 
 use super::*;
 use echolume::source::recorder::Reader;
 
 const SHIFT: Modifiers = Modifiers { shift: true, control: false, alt: false };
 
-/// Prevents a drag that ends elsewhere than where the hand does, and a start that is not found again.
+/// Prevents a drag that ends elsewhere than the pointer, and a reset that does not restore the start.
 #[test]
 fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
     let device = Device::new();
@@ -17,7 +17,7 @@ fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
     for (tool, from, to) in [
         ('t', middle, [60.0, 20.0]),
         ('l', middle, [20.0, 50.0]),
-        // A face from its side, inwards.
+        // A face of the region, dragged inwards.
         ('g', [70.0, 36.0], [36.0, 36.0]),
         ('x', middle, [40.0, 2.0]),
     ] {
@@ -33,14 +33,14 @@ fn a_drag_turns_the_picture_and_a_reset_brings_back_the_first_one() {
     desk.console.input(&Input::Scroll(3.0));
     desk.rest();
     assert!(desk.picture() == headless(&device, &desk.drawn(), &body(0)), "closer");
-    // What a drag does is no setting of the picture.
+    // A drag changes no setting of the picture.
     desk.press(Key::Backspace);
     desk.press(Key::Char('t'));
     desk.rest();
     assert!(desk.picture() == first);
 }
 
-/// Prevents a key that shows something else than its mode, or leaves a part of the mode before.
+/// Prevents a key that shows another mode than its own, or keeps a part of the previous mode.
 #[test]
 fn every_key_of_a_mode_or_layout_shows_what_its_settings_say() {
     let (device, plain) = (Device::new(), Device::new());
@@ -59,7 +59,7 @@ fn every_key_of_a_mode_or_layout_shows_what_its_settings_say() {
     }
 }
 
-/// Prevents volumes that are left out or shown twice by the keys that go through them, and a loop that stands still.
+/// Prevents volumes that the keys of the cine loop skip or show twice, and a loop that does not advance.
 #[test]
 fn the_keys_of_time_freeze_look_back_and_play() {
     let device = Device::new();
@@ -94,7 +94,7 @@ fn the_keys_of_time_freeze_look_back_and_play() {
         let stream = desk.console.stream();
         if stream.is_idle() {
             places.extend(stream.cine_position().filter(|place| places.last() != Some(place)));
-            // The time at which it asks to be asked again comes at once.
+            // The requested wake-up happens at once.
             now = next.wake_at.expect("a loop goes on").max(now);
         }
     }
@@ -105,12 +105,12 @@ fn the_keys_of_time_freeze_look_back_and_play() {
     assert!(desk.live(4) == headless(&device, &desk.drawn(), &body(4)));
 }
 
-/// Prevents a picture that is saved other than it is seen, and a loop that lacks a frame.
+/// Prevents a saved picture that differs from the shown one, and a loop that lacks a frame.
 #[test]
-fn what_is_saved_is_what_is_seen_and_kept() {
+fn exported_files_are_what_was_shown_and_recorded() {
     let (device, folder) = (Device::new(), Folder::new("saved"));
     let mut desk = Desk::new(&device, ConsoleOptions { folder: folder.0.clone(), ..options() });
-    // Nothing to save yet is no fault of anything.
+    // An export without a picture is no fault.
     desk.press(Key::Char('p'));
     desk.press(Key::Char('r'));
     desk.begin();
@@ -135,9 +135,9 @@ fn what_is_saved_is_what_is_seen_and_kept() {
     desk.rest();
 }
 
-/// Prevents panels that keep the picture from being what the settings say, where they lie beside it.
+/// Prevents panels next to the picture from changing it.
 #[test]
-fn panels_take_room_and_nothing_else() {
+fn panels_take_space_and_change_nothing_else() {
     let device = Device::new();
     let mut desk = Desk::new(&device, ConsoleOptions { panels: true, scale: 0.5, ..options() });
     desk.begin();

@@ -1,10 +1,10 @@
-//! A console at rest, and how it gets there: nothing runs for nothing, and what stays to be seen has full quality.
+//! An idle console, and how it becomes idle: no unneeded work, and the final picture has full quality.
 
 use super::*;
 
-/// Prevents a kiosk that runs hot all night: nothing is dispatched and nobody woken for a picture that stands still.
+/// Prevents a kiosk that runs hot all night: an unchanging picture causes no dispatch and no wake-up.
 #[test]
-fn a_console_at_rest_does_nothing_and_wants_nothing() {
+fn an_idle_console_dispatches_nothing_and_asks_for_no_wake_up() {
     let device = Device::new();
     for (overlay, panels, hud) in [(true, false, false), (false, false, false), (true, true, true)] {
         let mut desk = Desk::new(&device, ConsoleOptions { overlay, panels, scale: 0.5, ..options() });
@@ -18,7 +18,7 @@ fn a_console_at_rest_does_nothing_and_wants_nothing() {
         desk.rest();
         let dispatches = desk.console.stream().dispatches();
         let (mut now, mut woken) = (Instant::now() + LATER, 0);
-        // Ten minutes, of which each moment is skipped at which nothing is asked for.
+        // Ten minutes of simulated time, from one requested wake-up to the next.
         let end = now + Duration::from_secs(600);
         while now < end {
             let next = desk.tick(now);
@@ -31,7 +31,7 @@ fn a_console_at_rest_does_nothing_and_wants_nothing() {
                 }
             }
         }
-        // The display of times looks once a second; a note goes, and that nothing is heard is said.
+        // The display of times updates once a second; a note disappears, and the missing source is reported.
         assert!(woken < if hud { 650 } else { 12 }, "{woken} times: overlay {overlay}, panels {panels}");
         for _ in 0..50 {
             desk.tick(now);
@@ -40,9 +40,9 @@ fn a_console_at_rest_does_nothing_and_wants_nothing() {
     }
 }
 
-/// Prevents a view that stays coarse, and one that is slow under a hand for being fine.
+/// Prevents a view that stays coarse, and one that is slow during a drag because it is fine.
 #[test]
-fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() {
+fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
     let device = Device::new();
     let mut settings = plain();
     settings.light.shadow = Some(Default::default());
@@ -55,11 +55,11 @@ fn a_budget_that_cannot_be_held_costs_quality_under_the_hand_and_none_at_rest() 
     desk.console.input(&Input::Moved([40.0, 36.0]));
     desk.console.input(&Input::Button { button: Button::Left, pressed: true });
     for n in 0..60 {
-        // Not later than the hand moved, however slow the machine is.
+        // The time of the input, however slow the machine is.
         let now = Instant::now();
         desk.console.input(&Input::Moved([40.0 + f64::from(n % 20), 36.0 - f64::from(n % 13)]));
         desk.tick(now);
-        // The hand goes off a click's reach first, and the first picture tells how long they take.
+        // The pointer first leaves the range of a click, and the first picture measures the time.
         assert!(n < 12 || desk.console.rung() == last, "{n}: rung {}", desk.console.rung());
         let begun = Instant::now();
         while desk.console.stream().is_drawing() && begun.elapsed() < BOUND {

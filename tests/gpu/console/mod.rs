@@ -1,4 +1,4 @@
-//! The console without a screen: what hands do on one side, pictures on the other, and whatever goes wrong in between.
+//! The console without a screen: input, pictures, and faults.
 
 mod failures;
 mod gestures;
@@ -7,6 +7,7 @@ mod monkey;
 mod shaders;
 
 use crate::common::gpu::*;
+use crate::common::scenes::settings;
 use crate::live::header;
 use crate::live_control::{BOUND, Fed, ROOM};
 use echolume::gpu::{self, Context, Renderer};
@@ -26,11 +27,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 pub const SIZE: [u32; 2] = [80, 72];
-/// Longer than a view is taken to move after a hand did.
+/// Longer than a view counts as moving after an input.
 const LATER: Duration = Duration::from_millis(300);
 
 pub fn plain() -> Settings {
-    toml::from_str("mode = 'sr'\nslices = { pixels = 40, format = 'r8' }").expect("settings")
+    settings("mode = 'sr'\nslices = { pixels = 40, format = 'r8' }")
 }
 
 /// Without a screen, a budget or a second source.
@@ -58,7 +59,7 @@ pub fn options() -> ConsoleOptions {
 }
 
 impl Folder {
-    /// The first file with this ending, once it can be read.
+    /// Waits for the first readable file with this ending.
     pub fn wait<T>(&self, ending: &str, mut read: impl FnMut(&std::path::Path) -> Option<T>) -> T {
         let begun = Instant::now();
         loop {
@@ -72,7 +73,7 @@ impl Folder {
     }
 }
 
-/// A body with a round front that is another one in every volume.
+/// A body with a round front that differs in every volume.
 pub fn body(number: u32) -> Vec<Frame> {
     let tilt = number as usize;
     crate::live::volume(number, |slice, i| {
@@ -82,7 +83,7 @@ pub fn body(number: u32) -> Vec<Frame> {
     })
 }
 
-/// A console, and what speaks to it.
+/// A console with its sender of events.
 pub struct Desk {
     pub console: Console,
     pub say: Sender<Event>,
@@ -95,7 +96,7 @@ impl Desk {
         Desk { say, ..desk }
     }
 
-    /// Its sources are taken from the end of these; where there is none it cannot be opened.
+    /// Its sources are taken from the end of `sources`; opening fails if there is none.
     pub fn of(device: &Arc<Context>, options: ConsoleOptions, sources: Arc<Mutex<Vec<Receiver<Event>>>>) -> Desk {
         let open: OpenSource = Arc::new(move || match sources.lock().expect("lock").pop() {
             Some(said) => Ok(Box::new(Fed(said)) as Box<dyn Live>),
@@ -116,21 +117,21 @@ impl Desk {
         self.console.update(now).expect("the device is there")
     }
 
-    /// The settings as they are drawn at rest.
+    /// The settings of the idle picture.
     pub fn drawn(&self) -> Settings {
         let mut settings = self.console.controls().settings().clone();
         settings.slices.everything |= matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
         settings
     }
 
-    /// Ticks until all that was said and done is drawn, at a time at which no hand moves any more.
+    /// Ticks until all events and inputs are drawn, at a time after any movement.
     pub fn rest(&mut self) -> LoopRequest {
         self.rest_or_lost().expect("the device is there")
     }
 
     pub fn rest_or_lost(&mut self) -> Result<LoopRequest, ConsoleError> {
         let begun = Instant::now();
-        // What the source was sent takes a moment to arrive, and says nothing of itself.
+        // Sent events take a moment to arrive, without a notification.
         let mut still = 0;
         loop {
             assert!(begun.elapsed() < BOUND, "it does not come to rest");
@@ -148,7 +149,7 @@ impl Desk {
         }
     }
 
-    /// The volume with this number, sent and drawn.
+    /// Sends the volume with this number, and returns its picture.
     pub fn live(&mut self, number: u32) -> Picture {
         let before = self.console.stream().volumes_shown();
         self.frames(body(number));
@@ -178,7 +179,7 @@ impl Desk {
         self.console.input(&Input::Modifiers(Modifiers::default()));
     }
 
-    /// A drag with the left button, the picture following it.
+    /// Drags with the left button; the picture follows.
     pub fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.console.input(&Input::Moved(from));
         self.console.input(&Input::Button { button: Button::Left, pressed: true });
@@ -191,7 +192,7 @@ impl Desk {
     }
 }
 
-/// A volume as a renderer of its own draws it.
+/// A volume drawn by a separate renderer.
 pub fn headless(device: &Arc<Context>, settings: &Settings, frames: &[Frame]) -> Picture {
     let views = Views::new(&header(0.3), settings, Update::Whole).expect("views");
     let scene = views.of(&vec![frames[0].backward; frames.len()]).into_owned();

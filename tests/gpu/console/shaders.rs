@@ -132,7 +132,7 @@ fn every_compiler_of_the_system_draws_what_the_embedded_shaders_draw() {
         renderer.show(0).expect("show");
         renderer.picture().expect("picture")
     };
-    let embedded = draw(gpu::pipelines::embedded());
+    let embedded = draw(gpu::RendererOptions::default().shaders);
     for compiler in [glslc, glslang, slower] {
         let name = compiler.name();
         let folder = ShaderFolder::open_with(Path::new(&repository("glsl")), compiler).expect("shaders");

@@ -1,4 +1,4 @@
-//! Settings whose pipelines are made beside the drawing, and those that the device cannot draw.
+//! Settings whose pipelines compile in the background, and those that the device cannot draw.
 
 use super::*;
 use ash::vk;
@@ -19,10 +19,10 @@ fn waking() -> (Arc<AtomicU64>, live::StreamOptions) {
     (woken, live::StreamOptions { wake: Some(wake), ..kept(Update::Whole) })
 }
 
-/// Prevents a view that stands still while shaders compile, whichever way the volumes are swept that come meanwhile.
+/// Prevents a view that stalls while shaders compile, for both sweep directions of the volumes that arrive meanwhile.
 #[test]
-fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
-    // What is expected is drawn elsewhere, so that every pipeline here is the stream's.
+fn a_new_mode_compiles_in_the_background_while_pictures_continue() {
+    // Expected pictures are drawn on another device, so that every pipeline here belongs to the stream.
     let (device, plain) = (Device::new(), Device::new());
     let (woken, options) = waking();
     let mut now = "mode = 'mip'";
@@ -31,7 +31,7 @@ fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
     (0..2).for_each(|number| drop(bench.live(number)));
     let (waited, mut number) = (waited_for(&device), 2);
     for next in ["mode = 'sr'\nslices.median = true", "mode = 'orthogonal'", "mode = 'vr'\nlayout = 'four'"] {
-        // A whole volume waits to be shown when the settings come, so that one picture is certain to be of those before.
+        // A complete volume waits to be shown when the settings arrive, so that one picture is certain to have the previous ones.
         let frames = bench.stream.frames();
         bench.frames(speckled(number));
         while bench.stream.frames() < frames + 9 {
@@ -48,7 +48,7 @@ fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
             assert!(begun.elapsed() < BOUND, "{next} never comes");
             bench.stream.step(Duration::from_millis(1)).expect("step");
         }
-        // Both ways of the sweep.
+        // Both directions of the sweep.
         for _ in 0..2 {
             assert!(bench.live(number) == of(&plain, next, number), "{next}: volume {number}");
             number += 1;
@@ -58,9 +58,9 @@ fn another_mode_compiles_beside_and_pictures_go_on_until_then() {
     }
 }
 
-/// Prevents a stream that ends, or goes black, for settings that are beyond the device; and that they come back with another device.
+/// Prevents a stream that ends or goes black because settings exceed the device; and that they return with another device.
 #[test]
-fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
+fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
     let (device, other) = (Device::new(), Device::new());
     let (_, options) = waking();
     let toml = "mode = 'mip'";
@@ -81,7 +81,7 @@ fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
     let mut large = settings("mode = 'sr'");
     large.slices.pixels = 4096;
     large.slices.format = VolumeFormat::R32f;
-    // Nothing of it may be made, or the machine would have to hold it.
+    // None of it may be allocated, or the machine would have to hold it.
     let scene = Scene::new(geometry, BYTES, large.clone()).expect("another device might hold it");
     let most = Plan::new(&scene).slots.iter().map(|slot| slot.bytes(&scene)).max().expect("slots");
     assert!(most > device.candidate.max_bytes, "{most} of {}", device.candidate.max_bytes);
@@ -97,9 +97,9 @@ fn settings_that_the_device_cannot_hold_are_said_and_what_was_drawn_stays() {
     assert!(bench.picture() == (0, expected[0].clone()));
 }
 
-/// Prevents a stream that never draws again because memory ran out once, wherever that was: what was drawn before is drawn anew.
+/// Prevents a stream that never draws again because memory ran out once, anywhere: the previous settings are drawn again.
 #[test]
-fn memory_that_runs_out_while_settings_change_costs_the_settings_and_not_the_stream() {
+fn running_out_of_memory_rejects_the_settings_and_keeps_the_stream() {
     let (device, plain) = (Device::new(), Device::new());
     let (before, after) = ("mode = 'mip'", "mode = 'sr'\nslices.median = true");
     let (old, new) = (of(&plain, before, 1), of(&plain, after, 1));
@@ -112,7 +112,7 @@ fn memory_that_runs_out_while_settings_change_costs_the_settings_and_not_the_str
         device.faults.inject(InjectionPoint::Allocate, n, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
         bench.stream.change(settings(after)).expect("change");
         let picture = bench.settle().pop();
-        // One that was not reached is none any more.
+        // An injected fault that was not reached is removed.
         device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         match bench.faults.pop() {
             None => {

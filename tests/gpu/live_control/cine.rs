@@ -1,12 +1,12 @@
-//! Freezing, the cine loop, and settings that change while nothing comes.
+//! Freezing, the cine loop, and settings that change while no frames arrive.
 
 use super::*;
 use echolume::source::recorder::Reader;
 
-/// Prevents a frozen picture that changes, work for frames that nobody sees, a recording with a gap, and a volume of which the first
-/// frames came while frozen from being shown as if it were whole.
+/// Prevents a frozen picture that changes, work for frames that are not shown, a recording with a gap, and a volume whose first
+/// frames arrived while frozen from being shown as complete.
 #[test]
-fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
+fn frames_received_while_frozen_are_recorded_and_change_no_picture() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let folder = Folder::new("frozen");
@@ -37,9 +37,9 @@ fn frames_that_come_while_frozen_are_recorded_and_change_nothing() {
     }
 }
 
-/// Prevents a look back at something else than what was seen, volumes that are counted twice, and a place that points at another volume.
+/// Prevents a replay of something that was not shown, volumes that are counted twice, and a cine position that points at another volume.
 #[test]
-fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
+fn a_replayed_volume_is_identical_to_the_live_picture() {
     let device = Device::new();
     for (update, toml) in [
         (Update::Whole, "mode = 'vr'\nslices.smooth = { elevation = 1.0 }"),
@@ -53,7 +53,7 @@ fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
         for (n, place) in [3usize, 0, 2, 2, 1].into_iter().enumerate() {
             bench.stream.show_cine_volume(place);
             assert_eq!(bench.stream.cine_position(), Some(place));
-            // Frozen, but the probe goes on.
+            // Frozen, but the probe continues.
             bench.frames(speckled(4 + n as u32));
             let (volume, picture) = bench.picture();
             assert!(volume == place as u32 && picture == seen[place], "{update:?}: {toml}: {place}");
@@ -68,9 +68,9 @@ fn a_volume_that_is_shown_again_is_what_was_seen_byte_for_byte() {
     }
 }
 
-/// Prevents a look back that tears the volume that is arriving meanwhile, or is torn by it, with no image to spare and with one.
+/// Prevents a replay from mixing with the volume that is arriving meanwhile, without a spare image and with one.
 #[test]
-fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
+fn cine_replay_and_arriving_frames_do_not_mix() {
     let device = Device::new();
     let toml = "mode = 'mip'\nslices.everything = true";
     for images in [2, 3] {
@@ -83,7 +83,7 @@ fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
             bench.settle();
             let place = number as usize % 3;
             bench.stream.show_cine_volume(place);
-            // Both are under way now.
+            // Both are in progress now.
             bench.frames(speckled(number).drain(5..));
             for shown in bench.settle() {
                 let expected = seen.get(shown.volume as usize).cloned();
@@ -98,9 +98,9 @@ fn looking_back_and_frames_that_arrive_leave_one_another_whole() {
     }
 }
 
-/// Prevents frozen pictures of which a part is of the settings before, and frames that are sent again for nothing.
+/// Prevents frozen pictures with parts of the previous settings, and frames that are sent again without a need.
 #[test]
-fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
+fn settings_changed_while_frozen_redraw_the_same_volume() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
@@ -137,10 +137,10 @@ fn settings_that_change_while_frozen_are_drawn_of_the_same_volume() {
     }
 }
 
-/// Prevents a volume of slices with and without a filter, where settings change twice before it has come again; and that another
-/// volume is shown than the one that was asked for last.
+/// Prevents a volume of slices with and without a filter if settings change twice during its replay; and that another
+/// volume is shown than the last requested one.
 #[test]
-fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginning() {
+fn settings_changed_during_a_replay_restart_the_replay() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         for asked in [None, Some(0)] {
@@ -158,7 +158,7 @@ fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginni
                 bench.stream.step(Duration::from_millis(1)).expect("step");
                 assert!(begun.elapsed() < BOUND);
             }
-            // All but the last frame are there now.
+            // All but the last frame have arrived.
             bench.stream.step(Duration::ZERO).expect("step");
             let toml = "mode = 'mip'\nslices.sigma = {}";
             bench.stream.change(settings(toml)).expect("change");
@@ -171,9 +171,9 @@ fn settings_that_change_while_a_volume_comes_again_make_it_come_from_the_beginni
     }
 }
 
-/// Prevents a stream that waits for ever for frames that nobody kept.
+/// Prevents a stream that waits for ever for frames that were not kept.
 #[test]
-fn without_a_cine_loop_other_settings_wait_for_the_next_volume_and_nothing_else_does() {
+fn without_a_cine_loop_only_changed_settings_wait_for_the_next_volume() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let options = live::StreamOptions { update, ..live::StreamOptions::default() };

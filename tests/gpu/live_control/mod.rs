@@ -1,4 +1,4 @@
-//! Streams that are frozen, looked back on, and told of other settings, sources and devices: what is shown is what was sent.
+//! Streams under control: freezing, the cine loop, other settings, sources and devices. Pictures show exactly the sent frames.
 
 mod async_compilation;
 mod cine;
@@ -19,12 +19,12 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
-/// Nothing here takes nearly so long.
+/// A limit far above the duration of any step here.
 pub const BOUND: Duration = Duration::from_secs(120);
 pub const ROOM: CineLimits = CineLimits { volumes: 8, bytes: 1 << 24 };
 const MARK: &str = "so far";
 
-/// A source that says what it is sent, when it is sent.
+/// A source that yields the events that it is sent.
 pub struct Fed(pub Receiver<Event>);
 
 impl Live for Fed {
@@ -46,7 +46,7 @@ pub fn fed(record: Option<&Path>) -> (Sender<Event>, Feed) {
     (say, Feed::new(Box::new(Fed(said)), record).expect("thread"))
 }
 
-/// A stream, and what speaks to it.
+/// A stream with its sender of events.
 struct Bench {
     stream: Stream,
     say: Sender<Event>,
@@ -71,7 +71,7 @@ impl Bench {
         frames.into_iter().for_each(|frame| self.say.send(Event::Frame(frame)).expect("listens"));
     }
 
-    /// All that was said is looked at, and all that follows from it is done.
+    /// Steps until all sent events are handled and the stream is idle. Returns the pictures.
     fn settle(&mut self) -> Vec<FinishedPicture> {
         self.say.send(Event::Fault(MARK.into())).expect("listens");
         let (mut shown, mut is_marked, begun) = (Vec::new(), false, Instant::now());
@@ -88,13 +88,13 @@ impl Bench {
         shown
     }
 
-    /// The last picture after all that was said, and its volume.
+    /// The last picture after all sent events, and its volume.
     fn picture(&mut self) -> (u32, Picture) {
         let last = self.settle().pop().expect("a picture");
         (last.volume, last.picture.expect("brought back"))
     }
 
-    /// A volume shown live, and its picture.
+    /// Sends a volume, and returns its picture.
     fn live(&mut self, number: u32) -> Picture {
         self.frames(speckled(number));
         let (volume, picture) = self.picture();
@@ -111,7 +111,7 @@ fn kept(update: Update) -> live::StreamOptions {
     live::StreamOptions { update, cine: ROOM, ..live::StreamOptions::default() }
 }
 
-/// A volume as a renderer of its own draws it.
+/// A volume drawn by a separate renderer.
 fn fresh(device: &Device, toml: &str, header: &Header, update: Update, frames: &[Frame]) -> Picture {
     let views = Views::new(header, &settings(toml), update).expect("views");
     let backward = vec![frames[0].backward; frames.len()];
@@ -126,7 +126,7 @@ fn of(device: &Device, toml: &str, number: u32) -> Picture {
     fresh(device, toml, &header(0.3), Update::Whole, &speckled(number))
 }
 
-/// Pipelines that were made while whoever draws waited for them.
+/// Pipelines that were compiled while drawing waited for them.
 fn waited_for(device: &Device) -> u64 {
     let counts = &device.counts;
     counts.pipelines.load(Ordering::Relaxed) - counts.async_pipelines.load(Ordering::Relaxed)

@@ -1,4 +1,4 @@
-//! Sources and devices that take the place of others while something is looked at, and streams that have nothing to do.
+//! Sources and devices that are replaced during viewing, and idle streams.
 
 use super::*;
 use echolume::probe::Geometry;
@@ -13,15 +13,15 @@ fn other() -> (Header, Vec<Frame>) {
     (Header { forward: geometry.clone(), backward: geometry, ..header(0.0) }, (0..7).map(frame).collect())
 }
 
-/// Prevents a source that is taken for late because it counts from nought, and volumes of two sources that are taken for one another.
+/// Prevents a new source from being treated as late because it counts from zero, and volumes of two sources from being confused.
 #[test]
-fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() {
+fn a_new_source_that_counts_from_zero_continues_with_its_own_volumes() {
     let device = Device::new();
     for update in [Update::Whole, Update::Rolling] {
         let mut bench = Bench::new(&device, "mode = 'mip'", kept(update));
         bench.begin(header(0.3));
         let mut seen: Vec<_> = (0..3).map(|number| bench.live(number)).collect();
-        // It ended in the middle of a volume.
+        // The first source ended in the middle of a volume.
         bench.frames(speckled(3).drain(..4));
         bench.settle();
         let (say, feed) = fed(None);
@@ -29,7 +29,7 @@ fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() 
         bench.say = say;
         bench.begin(header(0.3));
         for number in [0, 1] {
-            // Swept as its number says, and otherwise unlike the first source's.
+            // Swept in the direction of its number, but unlike that of the first source.
             let frames = volume(number, |slice, i| (slice * 29 + i * 7 + number as usize * 101) as u8);
             bench.frames(frames);
             seen.push(bench.picture().1);
@@ -40,7 +40,7 @@ fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() 
             bench.stream.show_cine_volume(place);
             assert!(bench.picture().1 == seen[place], "{update:?}: {place}");
             assert_eq!(bench.stream.cine_position(), Some(place), "{update:?}");
-            // Found again where stage 1 is another, too.
+            // Found again if stage 1 has changed, too.
             bench.stream.change(settings("mode = 'mip'\nslices.median = true")).expect("change");
             bench.settle();
             assert_eq!(bench.stream.cine_position(), Some(place), "{update:?}");
@@ -54,7 +54,7 @@ fn another_source_that_counts_from_nought_goes_on_and_its_volumes_are_its_own() 
     }
 }
 
-/// Prevents a device that is opened anew from showing another volume than the one that was looked at, or nothing.
+/// Prevents a reopened device from showing another volume than the one being viewed, or nothing.
 #[test]
 fn a_frozen_volume_outlives_its_device() {
     let (device, other, third) = (Device::new(), Device::new(), Device::new());
@@ -68,7 +68,7 @@ fn a_frozen_volume_outlives_its_device() {
         bench.stream.show_cine_volume(1);
         assert!(bench.picture() == (1, seen[1].clone()), "{update:?}");
         bench.stream.show_cine_volume(2);
-        // What was asked for and did not come any more.
+        // A requested volume that did not arrive any more.
         bench.stream.revive(&third).expect("made anew");
         assert!(bench.picture() == (2, seen[2].clone()), "{update:?}");
         bench.stream.freeze(false);
@@ -76,9 +76,9 @@ fn a_frozen_volume_outlives_its_device() {
     }
 }
 
-/// Prevents what is looked at from vanishing because a cable was changed, and a probe that is never shown.
+/// Prevents the viewed volume from vanishing because a cable was changed, and a probe that is never shown.
 #[test]
-fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
+fn a_geometry_change_while_frozen_waits_until_the_stream_resumes() {
     let device = Device::new();
     let mut bench = Bench::new(&device, "mode = 'mip'", kept(Update::Whole));
     bench.begin(header(0.3));
@@ -108,7 +108,7 @@ fn a_geometry_that_begins_while_frozen_waits_until_it_goes_on() {
 
 /// Prevents a device that runs hot for a picture that stands still.
 #[test]
-fn a_stream_that_has_nothing_to_do_says_so_and_does_nothing() {
+fn an_idle_stream_reports_it_and_does_nothing() {
     let device = Device::new();
     let mut bench = Bench::new(&device, "mode = 'sr'", kept(Update::Whole));
     assert!(bench.stream.is_idle(), "before anything came");
@@ -123,7 +123,7 @@ fn a_stream_that_has_nothing_to_do_says_so_and_does_nothing() {
             assert!(matches!(bench.stream.step(Duration::from_millis(1)), Ok(Step::Progress)));
         }
         assert_eq!(bench.dispatches(), dispatches);
-        // The same settings once more are no others.
+        // The same settings again are no change.
         bench.stream.change(settings("mode = 'sr'")).expect("change");
         bench.settle();
     }

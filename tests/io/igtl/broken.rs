@@ -1,6 +1,6 @@
 //! Any bytes give a message, a number of missing bytes, or one line that names the fault.
 //!
-//! These properties are the harness of a fuzzer in small: `total` is the target that one would drive, from the same starts.
+//! These properties are a small fuzzing harness: `total` is its target.
 
 use super::messages::*;
 use proptest::collection::vec;
@@ -46,7 +46,7 @@ fn an_absurd_claim_is_refused_from_its_header_alone() {
             error.to_string(),
             format!("IMAGE from 'Image_Motor': body size: is {claim} bytes, must be at most 268435456")
         );
-        // Without a limit of one's own, nothing overflows.
+        // Nothing overflows without a limit of the caller.
         let _ = total(&header, usize::MAX);
     }
     let mut header = stored("Image_Motor_v1.bin")[..HEADER].to_vec();
@@ -126,7 +126,7 @@ fn bodies_that_cannot_be_true_are_refused_by_name() {
 }
 
 #[test]
-fn a_peer_cannot_break_the_line_or_drive_the_terminal() {
+fn a_peer_cannot_break_lines_or_control_the_terminal() {
     let mut bytes = raw(1, "TRANS\n\x1b[2J", &[0; 47]);
     bytes[14..20].copy_from_slice(b"\r\n\x1b[2J");
     bytes[1] = 9;
@@ -146,7 +146,7 @@ fn texts_in_latin_1_are_read() {
     assert_eq!(text(3, b"gr\xfcn"), "gr\u{fffd}n");
 }
 
-/// Whatever was read can be written again and is then the same, unless bytes that are no UTF-8 outgrew their field.
+/// A decoded message encodes to the same bytes, unless bytes that are not UTF-8 outgrew their field.
 fn read_hostile(bytes: &[u8]) {
     let limit = 1 << 16;
     let Ok(Decoded::Message { message, .. }) = total(bytes, limit) else { return };

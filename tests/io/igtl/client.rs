@@ -1,4 +1,4 @@
-//! The client against servers of these tests' own, on the loopback interface.
+//! The client against servers of the tests on the loopback interface.
 
 use super::messages::*;
 use std::io::{Read, Write};
@@ -6,7 +6,7 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc;
 use std::thread;
 
-/// What a server does with one connection.
+/// The script of a server for one connection.
 pub type Script = Box<dyn FnOnce(TcpStream) + Send>;
 
 /// A server that plays one script per connection, one after the other; its address.
@@ -32,7 +32,7 @@ pub fn send(bytes: Vec<u8>) -> Script {
     Box::new(move |mut stream| stream.write_all(&bytes).unwrap())
 }
 
-/// Sends and stays until the client goes.
+/// Sends and waits until the client closes.
 pub fn send_and_stay(bytes: Vec<u8>) -> Script {
     Box::new(move |mut stream| {
         stream.write_all(&bytes).unwrap();
@@ -181,7 +181,7 @@ fn the_queue_is_bounded_in_bytes_as_well() {
 }
 
 #[test]
-fn a_peer_that_stands_still_is_given_up() {
+fn a_stalled_peer_is_given_up() {
     let half = stored("Image_Motor_v1.bin")[..90].to_vec();
     let whole = bytes(&transform("Probe", 1.0, 1.0));
     let scripts = vec![send_and_stay(half), send_and_stay(whole.clone()), send_and_stay(whole)];
@@ -191,7 +191,7 @@ fn a_peer_that_stands_still_is_given_up() {
     take(&client);
     let error = client.last_error().unwrap();
     assert_eq!(error, "nothing came for 300 ms");
-    // And again without having begun a message.
+    // And again before a message has begun.
     take(&client);
     assert_eq!(client.last_error().unwrap(), "nothing came for 600 ms");
     assert_eq!(client.statistics().cut_short, 1);
@@ -243,7 +243,7 @@ fn dropping_ends_the_thread_in_every_state() {
         until(&client, |s| s.connected && s.bytes == cut as u64);
         gone(client);
     }
-    // Waiting to try again, and with an address that is none.
+    // Waiting to retry, and with an invalid address.
     for address in [nowhere().as_str(), "not an address", "", "127.0.0.1:99999"] {
         let client = Client::connect(address, ClientOptions::default()).unwrap();
         let started = Instant::now();

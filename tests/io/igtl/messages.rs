@@ -1,4 +1,4 @@
-//! Messages made on the spot.
+//! Messages built by the tests.
 
 use crate::common::files::data;
 pub use echolume::source::igtl::*;
@@ -24,7 +24,7 @@ pub fn raw(version: u16, kind: &str, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The same message with some of its body changed and the checksum made right again.
+/// The same message with a changed body and a correct checksum.
 pub fn changed(message: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut body = message[HEADER..].to_vec();
     change(&mut body);
@@ -35,7 +35,7 @@ pub fn changed(message: &[u8], change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     bytes
 }
 
-/// The message that all of these bytes are.
+/// Decodes bytes that must be exactly one message.
 pub fn whole(bytes: &[u8]) -> Message {
     match decode(bytes, BODY_LIMIT) {
         Ok(Decoded::Message { message, length }) if length == bytes.len() => message,
@@ -43,7 +43,7 @@ pub fn whole(bytes: &[u8]) -> Message {
     }
 }
 
-/// What any bytes must give: a message, a number of missing bytes, or one line that fits on a screen.
+/// Any bytes must give a message, a number of missing bytes, or one line that fits on a screen.
 pub fn total(bytes: &[u8], limit: usize) -> Result<Decoded, DecodeError> {
     let decoded = decode(bytes, limit);
     match &decoded {

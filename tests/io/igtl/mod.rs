@@ -1,4 +1,4 @@
-//! OpenIGTLink: stored messages, messages of every kind there and back, bytes that are none, a client and a live source against
+//! OpenIGTLink: stored messages, round trips of every kind of message, invalid bytes, a client and a live source against
 //! servers on the loopback interface. Needs no GPU.
 
 mod broken;

@@ -1,4 +1,4 @@
-//! OpenIGTLink as a live source: volumes and freehand frames with known values, and what is amiss.
+//! OpenIGTLink as a live source: volumes and freehand frames with known values, and faults.
 
 use super::client::*;
 use super::messages::*;
@@ -17,7 +17,7 @@ fn connect(messages: Vec<u8>, options: NetworkOptions) -> Network {
     Network::connect(&serve(vec![send_and_stay(messages)]), options).unwrap()
 }
 
-/// Events until one is what was waited for, 10 s at most.
+/// Events up to the awaited one, for 10 s at most.
 fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> {
     let (mut events, started) = (Vec::new(), Instant::now());
     while !events.last().is_some_and(&is_last) {
@@ -29,7 +29,7 @@ fn until(network: &mut Network, is_last: impl Fn(&Event) -> bool) -> Vec<Event> 
     events
 }
 
-/// Waits until so many messages have come, 10 s at most.
+/// Waits for so many messages, for 10 s at most.
 fn received(network: &Network, messages: u64) {
     let started = Instant::now();
     while network.statistics().messages < messages && started.elapsed() < Duration::from_secs(10) {
@@ -41,7 +41,7 @@ fn is_fault(named: &str) -> impl Fn(&Event) -> bool + use<'_> {
     move |event| matches!(event, Event::Fault(fault) if fault.contains(named))
 }
 
-/// The next volume: what it began with, if it did, and its frames.
+/// The next volume: its header, if it begins a stream, and its frames.
 fn volume(network: &mut Network, slices: usize) -> (Option<Header>, Vec<Frame>) {
     let events = until(network, |e| matches!(e, Event::Frame(frame) if frame.slice + 1 == slices));
     let (mut header, mut frames) = (None, Vec::new());
@@ -71,7 +71,7 @@ fn all(frames: &[Frame]) -> Vec<u8> {
 }
 
 #[test]
-fn volumes_keep_their_values_and_begin_anew_only_when_they_are_others() {
+fn volumes_keep_their_values_and_only_a_changed_geometry_begins_a_new_stream() {
     let first = image(5.0, [4, 3, 2]);
     let second = Image { bytes: vec![9; 24], time: 6.0, ..first.clone() };
     let turned = Image { axes: [[0.0, 0.3, 0.4], [0.25, 0.0, 0.0], [0.0, 0.8, -0.6]], ..second.clone() };
@@ -106,7 +106,7 @@ fn volumes_keep_their_values_and_begin_anew_only_when_they_are_others() {
 }
 
 #[test]
-fn whole_slices_go_into_their_place_and_lesser_parts_are_refused() {
+fn complete_slices_are_placed_and_smaller_parts_are_refused() {
     let whole = image(1.0, [4, 3, 4]);
     let part = |offset: [u16; 3], size: [u16; 3], value: u8| Image {
         region: Region { offset, size },
@@ -190,7 +190,7 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
         let expected = [0, 0, 10, 15, 20, 25, 30, 35, 40, 45, 50, 0, 0];
         assert_eq!(middles(&grid, &frames), expected, "{poses:?}");
         assert_eq!((frames[0].bytes[0], frames[0].volume), (0, 0));
-        // At 9 mm there is no volume; the one at 3 mm replaces nothing but what was bridged.
+        // There is no volume at 9 mm; the frame at 3 mm replaces only bridged voxels.
         let events = until(&mut network, |e| matches!(e, Event::Frame(frame) if frame.slice == 12));
         assert!(events.iter().any(is_fault("frames outside of the volume")), "{events:?}");
         let frames: Vec<Frame> =
@@ -200,10 +200,10 @@ fn tracked_frames_become_a_volume_that_goes_on_growing() {
 }
 
 #[test]
-fn frames_without_a_pose_are_told_and_a_few_frames_do_not_wait_for_ever() {
+fn frames_without_a_pose_are_reported_and_do_not_wait_for_ever() {
     let early = |k: u8| bytes(&Message::Image(tracked(k)));
     let messages = [early(1), early(20), bytes(&moved(20)), early(30), bytes(&moved(30)), bytes(&moved(31))].concat();
-    // Two have a pose, four are waited for.
+    // Two have a pose, four are awaited.
     let mut network = connect(messages, sweep_options());
     until(&mut network, is_fault("frames without a pose left out: no pose came near their time"));
     let started = Instant::now();
@@ -228,7 +228,7 @@ fn poses_without_end_do_not_use_up_more_than_the_patience() {
 }
 
 #[test]
-fn a_killed_peer_is_told_and_frames_come_again() {
+fn a_killed_peer_is_reported_and_frames_resume() {
     let good = bytes(&Message::Image(image(1.0, [4, 3, 2])));
     let cut = [good.clone(), good[..100].to_vec()].concat();
     let mut network = Network::connect(&serve(vec![send(cut), send_and_stay(good)]), options()).unwrap();
@@ -243,7 +243,7 @@ fn a_killed_peer_is_told_and_frames_come_again() {
 }
 
 #[test]
-fn damaged_messages_are_told_once_a_second_with_their_number() {
+fn damaged_messages_are_counted_and_reported_once_a_second() {
     let good = bytes(&Message::Image(image(1.0, [4, 3, 2])));
     let mut damaged = good.clone();
     damaged[120] ^= 1;
@@ -259,7 +259,7 @@ fn damaged_messages_are_told_once_a_second_with_their_number() {
 }
 
 #[test]
-fn what_is_not_taken_is_dropped_by_whole_messages_and_told() {
+fn unread_messages_are_dropped_completely_and_reported() {
     let image = |n: u8| Image { bytes: vec![n; 24], ..image(f64::from(n) + 1.0, [4, 3, 2]) };
     let messages = (0..50).flat_map(|n| bytes(&Message::Image(image(n)))).collect();
     let mut client = quick();
@@ -279,7 +279,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_message_is_met_with_a_panic(
+    fn no_message_causes_a_panic(
         size in prop::array::uniform3(1u16..5),
         numbers in prop::collection::vec(prop_oneof![-3.0f32..3.0, Just(0.0), Just(1e30), Just(-1e-30)], 12),
         scalar in prop::sample::select(vec![Scalar::I8, Scalar::U16, Scalar::I32, Scalar::F32, Scalar::F64]),

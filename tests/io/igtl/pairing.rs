@@ -13,7 +13,7 @@ fn frame(time: f64) -> Message {
     Message::Image(image(time, [2, 3, 1]))
 }
 
-/// Turned about z, x mm along.
+/// Rotated about z, moved by x mm.
 fn turned(device: &str, time: f64, angle: f64, x: f32) -> Message {
     let (sine, cosine) = (angle.sin() as f32, angle.cos() as f32);
     let matrix = [[cosine, -sine, 0.0, x], [sine, cosine, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -25,7 +25,7 @@ fn push_all(pairing: &mut Pairing, messages: Vec<Message>) -> Vec<PairedFrame> {
 }
 
 #[test]
-fn a_pose_of_the_same_time_is_taken_as_it_is_in_either_order() {
+fn a_pose_of_the_same_time_is_taken_unchanged_in_either_order() {
     for first in [true, false] {
         let mut messages = vec![transform("Probe", 10.0, 7.0), frame(10.0)];
         if !first {
@@ -52,7 +52,7 @@ fn between_two_poses_both_parts_are_interpolated() {
 }
 
 #[test]
-fn the_turn_takes_the_shorter_way() {
+fn rotations_are_interpolated_the_shorter_way() {
     let messages = vec![turned("P", 1.0, 3.0, 0.0), frame(1.02), turned("P", 1.04, -3.0, 0.0)];
     let paired = push_all(&mut pairing(None), messages);
     assert!(paired[0].pose.matrix3.x_axis.x < -0.999_999, "{}", paired[0].pose);
@@ -95,7 +95,7 @@ fn poses_of_two_devices_are_not_mixed() {
 }
 
 #[test]
-fn a_matrix_that_is_no_rotation_is_not_turned() {
+fn a_matrix_without_a_rotation_is_not_interpolated() {
     let scaled = Transform { device: "P".into(), time: 1.0, matrix: IDENTITY.map(|row| row.map(|v| v * 2.0)) };
     let messages = vec![Message::Transform(scaled), frame(1.01), transform("P", 1.04, 2.0)];
     let paired = push_all(&mut pairing(None), messages);
@@ -153,7 +153,7 @@ proptest! {
         }
         paired.extend(pairing.finish());
         prop_assert!(paired.iter().all(|p| p.lag.abs() <= TOLERANCE));
-        // The pose is a function of time: here, an angle. Between two poses it is exact, next to one it is as far off in time.
+        // The pose is a function of time, here an angle. Between two poses it is exact; next to one it is off by the time difference.
         for p in &paired {
             let x = p.pose.matrix3.x_axis;
             let angle = if p.interpolated { p.image.time } else { p.image.time - p.lag };

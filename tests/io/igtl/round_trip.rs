@@ -1,4 +1,4 @@
-//! What is written is read again as it was.
+//! Encoded messages decode to the same values.
 
 use super::messages::*;
 use proptest::collection::vec;
@@ -12,7 +12,7 @@ fn matrix() -> impl Strategy<Value = [[f32; 4]; 3]> {
     proptest::array::uniform3(proptest::array::uniform4(number()))
 }
 
-/// Exactly what a stamp and an f64 can both hold.
+/// Times that both a time stamp and an f64 hold exactly.
 fn time() -> impl Strategy<Value = f64> {
     (any::<u32>(), 0u32..1 << 20).prop_map(|(s, f)| f64::from(s) + f64::from(f) / f64::from(1 << 20))
 }
@@ -78,10 +78,10 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_message_survives_the_way_there_and_back(message in message(), second in any::<bool>(), more in vec(any::<u8>(), 0..70)) {
+    fn every_message_round_trips(message in message(), second in any::<bool>(), more in vec(any::<u8>(), 0..70)) {
         let bytes = encode(&message, if second { Version::V2 } else { Version::V1 }).unwrap();
         prop_assert_eq!(&whole(&bytes), &message);
-        // What stands behind it is the next one's.
+        // The bytes after it belong to the next message.
         let expected = Ok(Decoded::Message { message, length: bytes.len() });
         prop_assert_eq!(decode(&[&bytes[..], &more].concat(), BODY_LIMIT), expected);
         for cut in 0..bytes.len() {
@@ -120,7 +120,7 @@ fn the_two_coordinate_systems_are_half_a_turn_apart() {
 }
 
 #[test]
-fn what_the_format_cannot_hold_is_not_written() {
+fn values_beyond_the_format_are_refused() {
     let error = |message| encode(&message, Version::V1).unwrap_err().to_string();
     for (time, said) in [(-1.0, "-1 s"), (f64::NAN, "NaN s"), (4_294_967_296.0, "4294967296 s")] {
         assert!(error(transform("a", time, 0.0)).contains(&format!("time stamp: is {said}")));

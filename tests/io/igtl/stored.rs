@@ -1,4 +1,4 @@
-//! The stored messages give what stands in their bytes; the numbers here were read from hex dumps.
+//! The stored messages decode to the values in their bytes; the numbers here were read from hex dumps.
 
 use super::messages::*;
 

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const SWEEP: Sweep = Sweep { angle: 24.0, rate: 4.0, volumes: Some(3) };
 
 #[test]
-fn status_tells_what_is_there_and_moves_nothing() {
+fn status_describes_the_module_and_moves_nothing() {
     let simulator = simulated(None);
     let status = Drive::open(&settings(&simulator, 2000), &table()).expect("opened").status().expect("answered");
     assert_eq!(status.module, "TMCM-1140 firmware 1.16");
@@ -32,7 +32,7 @@ fn home_is_where_the_switch_is_however_it_is_looked_for() {
         drive.home().expect("found");
         let status = drive.status().expect("answered");
         assert_eq!(status.speed, 0.0);
-        // The module now counts from where the shaft really is, and not from where it began, 7 deg away. Only as exactly as
+        // The module now counts from the real position of the shaft, not from its start, 7 deg away. It is only as exact as
         // the switch is polled, which on a busy machine is seldom.
         let off = (status.angle - simulator.angle()).abs();
         assert!(off < 0.5, "{home:?} {home_direction:?} {reversed}: {off} deg beside it");
@@ -69,11 +69,11 @@ fn a_sweep_covers_its_angle_in_order_of_time_and_places_frames() {
         matches!(track.at((first + last) / 2.0), ArrayState::Sweeping { .. } | ArrayState::Reversing { .. }),
         "{count}"
     );
-    // At rest where it was sent: nothing to stop.
+    // The motor has reached its target: nothing to stop.
     let before = simulator.received().len();
     drop(drive);
     assert_eq!(simulator.received().len(), before);
-    assert!(!simulator.turning() && (simulator.angle() - 12.0).abs() < 0.02);
+    assert!(!simulator.is_moving() && (simulator.angle() - 12.0).abs() < 0.02);
 }
 
 #[test]
@@ -114,7 +114,7 @@ fn a_panic_in_the_caller_and_an_early_drop_stop_the_motor() {
     }));
     assert!(panicked.is_err());
     assert!(stopped_at_last(&simulator.received()));
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
     assert!(simulator.angle() < 19.0, "long before the end of the pass");
 }
 
@@ -147,7 +147,7 @@ fn the_watchdog_is_written_only_when_it_differs_and_only_where_there_is_one() {
 }
 
 #[test]
-fn what_moves_is_sent_once_and_what_asks_again() {
+fn moving_requests_are_sent_once_and_queries_are_repeated() {
     let simulator = simulated(Some("mute@0"));
     let mut drive = Drive::open(&settings(&simulator, 300), &table()).expect("opened");
     drive.home().expect("home");

@@ -1,4 +1,4 @@
-//! `echolume probe` over the simulated module: what it says and how it ends, fault by fault.
+//! `echolume probe` over the simulated module: messages and exit codes, fault by fault.
 
 use crate::common::files::{Folder, MOTOR_PROBE, data};
 use crate::common::motor::{simulated, stopped_at_last};
@@ -36,19 +36,19 @@ fn signal(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).expect("send a signal");
 }
 
-/// A sweep whose pass takes ten seconds, as it is being done.
+/// A sweep in progress whose pass takes ten seconds.
 fn long_sweep(simulator: &Simulator, more: &[&str]) -> Child {
     let arguments = ["--angle", "40", "--rate", "0.1", "--timeout", "2000"];
     let child = probe(simulator, "sweep", &[&arguments, more].concat()).spawn().expect("start the program");
     let moves = || simulator.received().iter().filter(|r| r.command == command::MOVE_TO).count();
-    assert!(eventually(|| moves() == 2 && simulator.turning()), "the pass begins");
+    assert!(eventually(|| moves() == 2 && simulator.is_moving()), "the pass begins");
     child
 }
 
 #[test]
 fn the_fault_matrix() {
     let sweep = ["--angle", "24", "--rate", "4", "--volumes", "8", "--timeout"];
-    // Fault, time-out in ms, exit code, what is said, whether the module gets MST.
+    // Fault, time-out in ms, exit code, message, whether the module receives a stop (MST).
     let matrix: &[(&str, &str, i32, &[&str], bool)] = &[
         ("mute", "300", 1, &["open: no reply", "power, the cable", "told to stop but has not confirmed"], true),
         ("mute@0.3", "500", 1, &["sweep: no reply to", "told to stop but has not confirmed"], true),
@@ -87,7 +87,7 @@ fn the_fault_matrix() {
             };
             assert!(if *told { eventually(stopped) } else { !stopped() }, "{said}: {:?}", simulator.received());
             if *told {
-                assert!(eventually(|| !simulator.turning()), "{said}");
+                assert!(eventually(|| !simulator.is_moving()), "{said}");
             }
         }
     };
@@ -137,7 +137,7 @@ fn a_stop_that_is_not_confirmed_is_no_success() {
         code == Some(1) && out.is_empty() && err.contains("has not confirmed") && err.contains("power"),
         "{out}{err}"
     );
-    // At once, before anything is asked.
+    // At once, before the first request.
     let stops = vec![Request::stop(1, 0); 3];
     assert!(eventually(|| simulator.received() == stops), "{:?}", simulator.received());
 }
@@ -151,7 +151,7 @@ fn a_signal_stops_the_motor() {
         let (code, _, err) = finish(child);
         assert!(code == Some(1) && err.contains(&format!("interrupted by {name}. The motor was stopped")), "{err}");
         assert!(stopped_at_last(&simulator.received()));
-        assert!(eventually(|| !simulator.turning()) && simulator.angle() < 19.0);
+        assert!(eventually(|| !simulator.is_moving()) && simulator.angle() < 19.0);
     };
     std::thread::scope(|scope| {
         for (wanted, name) in [(Signal::INT, "SIGINT"), (Signal::TERM, "SIGTERM"), (Signal::HUP, "SIGHUP")] {
@@ -177,7 +177,7 @@ fn a_killed_sweep_is_stopped_by_the_watchdog_and_the_port_is_free_again() {
     signal(&child, Signal::KILL);
     finish(child);
     assert!(!stopped_at_last(&simulator.received()), "nobody was left to");
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
     assert!(simulator.angle() < 19.0, "the watchdog, and not the end of the pass");
     let (code, out, err) = run(&mut probe(&simulator, "status", &["--timeout", "2000"]));
     assert_eq!(code, Some(0), "{out}{err}");

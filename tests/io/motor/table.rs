@@ -26,7 +26,7 @@ proptest! {
 }
 
 #[test]
-fn a_degree_is_what_steps_and_gear_make_of_it() {
+fn steps_per_degree_follow_from_steps_and_gear() {
     let table = table();
     // 200 full steps of 16 microsteps, 12 turns for one.
     assert!((table.steps_per_degree() - 200.0 * 16.0 * 12.0 / 360.0).abs() < 1e-9);
@@ -70,7 +70,7 @@ fn a_pass_takes_the_time_that_its_rate_leaves() {
     let trip = Duration::from_millis(20);
     let speed = |angle, rate, volumes| Sweep { angle, rate, volumes }.speed(&table(), trip);
     let v = speed(61.0, 2.0, None).expect("the thesis' sweep");
-    // Way over speed, and one ramp's time: what a trapezoid takes.
+    // Distance over speed, plus the time of one ramp: the duration of a trapezoidal profile.
     assert!((61.0 / v + v / 8000.0 - (0.5 - 2.5 * 0.02)).abs() < 1e-9);
     for (angle, rate, volumes, named) in [
         (85.1, 1.0, None, "--angle"),
@@ -78,7 +78,7 @@ fn a_pass_takes_the_time_that_its_rate_leaves() {
         (f64::NAN, 1.0, None, "--angle"),
         (61.0, 5.1, None, "--rate"),
         (61.0, -1.0, None, "--rate"),
-        // The speed would be lost in rounding, and the time of a pass no time.
+        // The speed would round to 0, and the time of a pass would be infinite.
         (61.0, 1e-9, None, "--rate"),
         (1e-300, 1.0, None, "--angle"),
         (61.0, f64::INFINITY, None, "--rate"),
@@ -135,7 +135,7 @@ fn frames_get_the_angle_and_direction_of_their_time() {
 }
 
 #[test]
-fn what_was_not_seen_has_no_angle() {
+fn times_outside_the_track_have_no_angle() {
     let at = |time, angle| Position { time, angle, direction: Direction::Forward, pass: 0 };
     let track = Track::new(vec![at(1.0, 0.0), at(1.05, 1.0), at(3.0, 2.0), at(3.05, 2.0)], 0.1).expect("in order");
     for time in [0.9, 3.1, 2.0, f64::NAN, f64::INFINITY] {

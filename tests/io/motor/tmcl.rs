@@ -10,7 +10,7 @@ fn requests_are_the_bytes_of_the_manuals() {
         (Request::rotate_left(1, 0, 1200), [1, 2, 0, 0, 0, 0, 0x04, 0xb0, 0xb7], "ROL 0, 1200"),
         (Request::stop(1, 0), [1, 3, 0, 0, 0, 0, 0, 0, 4], "MST 0"),
         (Request::move_to(1, 0, 800), [1, 4, 0, 0, 0, 0, 0x03, 0x20, 0x28], "MVP 0, 0, 800"),
-        // The rest by the rule: -1000 is ff ff fc 18.
+        // The others by the same rule: -1000 is ff ff fc 18.
         (Request::move_by(1, 0, -1000), [1, 4, 1, 0, 0xff, 0xff, 0xfc, 0x18, 0x18], "MVP 1, 0, -1000"),
         (Request::set_axis(1, 0, axis::LARGEST_SPEED, 1000), [1, 5, 4, 0, 0, 0, 0x03, 0xe8, 0xf5], "SAP 4, 0, 1000"),
         (Request::get_axis(1, 0, axis::POSITION), [1, 6, 1, 0, 0, 0, 0, 0, 8], "GAP 1, 0"),
@@ -43,7 +43,7 @@ fn replies_are_read_out_of_the_bytes_of_the_manuals() {
 }
 
 #[test]
-fn only_what_does_no_harm_twice_is_sent_twice() {
+fn only_idempotent_requests_are_sent_twice() {
     let all = [
         Request::rotate_right(1, 0, 1),
         Request::rotate_left(1, 0, 1),
@@ -83,7 +83,7 @@ proptest! {
         let request = Request::get_axis(7, 2, 1);
         let reply = Reply { host: 2, module: 7, status, command: 6, value };
         let found = Reply::find(&[noise.as_slice(), &reply.bytes(), &more].concat(), &request);
-        // Noise that is a reply itself cannot be told from one; it is rare enough not to be met here.
+        // Noise that forms a valid reply is indistinguishable from one; it is too rare to occur here.
         prop_assert!(found.is_some_and(|f| f.module == 7 && f.command == 6));
         if Reply::find(&noise, &request).is_none() && noise.len() < 8 {
             prop_assert!(found.is_some());

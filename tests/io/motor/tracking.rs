@@ -1,4 +1,4 @@
-//! Frames that come without a place, and get it from the simulated motor: each carries the angle that the array really had.
+//! Frames without a position get one from the simulated motor: each carries the true angle of the array.
 
 use crate::common::motor::{settings, simulated, stopped_at_last, table};
 use crate::common::probes::wobbler;
@@ -43,7 +43,7 @@ fn header(probe: Probe) -> Header {
 struct Free {
     simulator: Arc<Simulator>,
     header: Option<Header>,
-    /// The frame that is being taken: when its first line was, and where the array was then.
+    /// The frame in progress: the time of its first line, and the angle of the array then.
     taking: Option<(Instant, SystemTime, f64)>,
     pieces: bool,
     /// The second half of a frame that comes in pieces.
@@ -102,7 +102,7 @@ fn swept(simulator: &Arc<Simulator>, source: Free, clock: Clock) -> MotorTracked
 
 const ARRIVAL: Clock = Clock::Arrival { delay: 0.0 };
 
-/// Frames until so many volumes are whole, or the end.
+/// Frames until so many volumes are complete, or the end.
 fn frames(swept: &mut MotorTracked, volumes: u64) -> (Vec<Frame>, Option<Option<String>>) {
     let (mut frames, begun) = (Vec::new(), Instant::now());
     while swept.counts().whole < volumes && begun.elapsed() < Duration::from_secs(120) {
@@ -120,7 +120,7 @@ fn angle_of(frame: &Frame) -> f64 {
     f64::from_le_bytes(*frame.bytes.first_chunk().expect("at least an angle"))
 }
 
-/// Most frames show what lies at their slice, swept their way, and there is no lag between forth and back.
+/// Most frames show their own slice, in their own direction, and forward and backward sweeps have no lag.
 fn hold_against_the_truth(frames: &[Frame], filled: u64) {
     let middle = |frame: &Frame| (frame.slice as f64 - (SLICES as f64 - 1.0) / 2.0) * PITCH;
     let off = |frame: &Frame| angle_of(frame) - middle(frame);
@@ -140,7 +140,7 @@ fn hold_against_the_truth(frames: &[Frame], filled: u64) {
 }
 
 #[test]
-fn volumes_come_out_whole_with_the_slices_and_directions_of_the_array() {
+fn volumes_are_complete_with_the_slices_and_directions_of_the_array() {
     let one = |pieces: bool, clock: Clock| {
         let simulator = Arc::new(simulated(None));
         let mut swept = swept(&simulator, Free { pieces, ..Free::new(&simulator) }, clock);
@@ -158,7 +158,7 @@ fn volumes_come_out_whole_with_the_slices_and_directions_of_the_array() {
         assert!(of_first.is_sorted());
         drop(swept);
         assert!(stopped_at_last(&simulator.received()));
-        assert!(eventually(|| !simulator.turning()));
+        assert!(eventually(|| !simulator.is_moving()));
     };
     std::thread::scope(|scope| {
         scope.spawn(|| one(false, ARRIVAL));
@@ -178,7 +178,7 @@ fn a_fault_of_the_motor_ends_the_stream_with_the_motor_stopped() {
         assert!(matches!(swept.next(Duration::ZERO), Event::End(Some(again)) if again == why));
         if told {
             assert!(stopped_at_last(&simulator.received()), "{fault}");
-            assert!(eventually(|| !simulator.turning()), "{fault}");
+            assert!(eventually(|| !simulator.is_moving()), "{fault}");
         }
     };
     std::thread::scope(|scope| {
@@ -193,18 +193,18 @@ fn a_fault_of_the_motor_ends_the_stream_with_the_motor_stopped() {
 fn dropping_the_source_stops_the_motor_while_it_looks_for_home_too() {
     let simulator = Arc::new(simulated(None));
     let mut source = swept(&simulator, Free::new(&simulator), ARRIVAL);
-    assert!(eventually(|| simulator.turning()), "it looks for home");
+    assert!(eventually(|| simulator.is_moving()), "it looks for home");
     assert!(matches!(source.next(Duration::ZERO), Event::Begin(_)));
     drop(source);
     assert!(stopped_at_last(&simulator.received()));
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
 }
 
 #[test]
-fn what_the_motor_cannot_place_is_told_at_once() {
+fn frames_without_a_motor_position_are_reported_at_once() {
     let simulator = Arc::new(simulated(None));
     for (motion, named) in
-        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be whole")]
+        [(Motion::Translated, "kind = 'fan'"), (Motion::Fan { wobble_radius: 25.0 }, "no volume will be complete")]
     {
         let wide = Axis::centred(20f64.to_radians(), 9);
         let header = header(Probe { motion, slices: wide, ..probe() });
@@ -215,19 +215,19 @@ fn what_the_motor_cannot_place_is_told_at_once() {
         });
         assert!(said.as_ref().is_some_and(|s| s.contains(named)), "{said:?}");
     }
-    assert!(eventually(|| !simulator.turning()));
+    assert!(eventually(|| !simulator.is_moving()));
 }
 
-/// The demonstration: the phantom's frames have no place of their own, and come back to it.
+/// The frames of the phantom lose their positions and are put back in place.
 #[test]
-fn the_phantom_on_a_free_running_array_is_put_together_again() {
+fn the_phantom_on_a_free_running_array_is_reassembled() {
     let simulator = simulated(None);
     let sweep = Sweep { angle: 64.0, rate: 0.5, volumes: None };
     let motor = turning(&simulator, sweep);
     let options = phantom::PhantomOptions { volumes: 2, lines: 64, samples: 32, ..phantom::PhantomOptions::default() };
     let whole = FreeRunning::phantom(options.clone(), motor.speed()).expect("a phantom");
     let known: Vec<Vec<Frame>> = (0..2).map(|volume| whole.volume(volume)).collect();
-    let source = FreeRunning::new(whole, motor.watch().clone());
+    let source = FreeRunning::new(whole, motor.positions().clone());
     let mut swept = MotorTracked::new(Box::new(source), motor, MotorTrackingOptions { clock: ARRIVAL, holds: false });
     let (frames, end) = frames(&mut swept, 2);
     assert_eq!(end, None);
@@ -236,6 +236,6 @@ fn the_phantom_on_a_free_running_array_is_put_together_again() {
         wanted.is_some_and(|w| w.bytes == frame.bytes && w.backward == frame.backward)
     };
     let (right, all) = (frames.iter().filter(right).count(), frames.len());
-    // A frame whose first line fell between two slices may go to the other one.
+    // A frame whose first line is between two slices may be put into the other one.
     assert!(all >= 74 && right * 5 >= all * 4, "{right} of {all} are where they were taken");
 }

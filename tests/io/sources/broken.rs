@@ -42,7 +42,7 @@ fn a_damaged_compressed_stream_is_named() {
         let path = folder.write("d.mha", image("64 8 8", "MET_UCHAR", "CompressedData = True\n", &damaged));
         match total(&path) {
             Err(error) => assert!(error.contains("data: "), "{error}"),
-            // A few bits between the last code and the checksum mean nothing.
+            // A few bits between the last code and the checksum have no meaning.
             Ok(read) => assert!(read == data && at + 5 >= packed.len(), "byte {at} of {} went unnoticed", packed.len()),
         }
     }
@@ -107,7 +107,7 @@ fn damaged(mut whole: Vec<u8>, changes: &[(usize, u8)], cut: usize) -> Vec<u8> {
     whole
 }
 
-/// Reads the bytes under both endings and checks that what came out can have been in them.
+/// Reads the bytes under both file endings and checks that no more frames come out than the bytes can hold.
 fn read_hostile(folder: &Folder, bytes: &[u8]) {
     for name in ["x.mha", "x.vol"] {
         if let Ok(read) = total(&folder.write(name, bytes)) {

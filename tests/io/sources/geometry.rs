@@ -1,11 +1,11 @@
-//! Sweeps both ways, and which geometry wins.
+//! Sweeps in both directions, and which geometry has precedence.
 
 use super::recordings::*;
 const TABLE: &str = "[array]\nkind = 'linear'\n[lines]\nwidth_mm = 20\n[depth]\nend_mm = 3\n[motion]\nkind = 'translated'\n\
                      frame_positions_mm = [0, 1, 3]\nframes_per_volume = 3\nboth_ways = true\nspeed_ratio = 0.5\n";
 
 #[test]
-fn sweeps_there_and_back_keep_their_slices_in_geometric_order() {
+fn forward_and_backward_sweeps_keep_their_slices_in_geometric_order() {
     let folder = Folder::new("there-and-back");
     let data: Vec<u8> = (0..7).flat_map(|frame| [frame; 8]).collect();
     folder.write("s.probe.toml", TABLE);
@@ -41,7 +41,7 @@ fn a_given_probe_file_wins_over_one_beside_and_that_over_the_header() {
 }
 
 #[test]
-fn lines_stored_from_last_to_first_are_turned_round() {
+fn lines_stored_in_reverse_are_put_in_order() {
     let folder = Folder::new("turned");
     folder.write("probe.toml", TABLE.replace("frames_per_volume = 3", ""));
     let data: Vec<u8> = (0..24).collect();

@@ -1,4 +1,4 @@
-//! Recorded files: the same frames and places whatever they are stored as, and one clear line for every fault.
+//! Recorded files: the same frames and positions in every format, and one clear line for every fault.
 
 mod broken;
 mod geometry;

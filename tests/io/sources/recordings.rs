@@ -1,4 +1,4 @@
-//! Recordings made on the spot.
+//! Recordings built by the tests.
 
 pub use crate::common::files::{Folder, SWEEP, data as stored};
 pub use echolume::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
@@ -27,7 +27,7 @@ pub fn all_bytes(path: impl AsRef<Path>) -> Result<Vec<u8>, InputError> {
     Ok(all_frames(&mut recording)?.into_iter().flat_map(|f| f.bytes).collect())
 }
 
-/// What any bytes must give: frames, or one line that fits on a screen.
+/// Any bytes must give frames, or one line that fits on a screen.
 pub fn total(path: impl AsRef<Path>) -> Result<Vec<u8>, String> {
     all_bytes(path).map_err(|error| {
         let line = error.to_string();

@@ -1,4 +1,4 @@
-//! Frames hold what the file holds, whatever its type, order and compression.
+//! Frames hold the values of the file, whatever its type, byte order and compression.
 
 use super::recordings::*;
 #[test]
@@ -77,7 +77,7 @@ fn a_compressed_file_holds_the_same_frames_as_its_raw_bytes() {
         let path = folder.write("zlib.mha", image("3640 96 5", "MET_UCHAR", &more, &packed));
         assert_eq!(all_bytes(&path).unwrap(), data);
     }
-    // Going to a volume gives the frame that reading up to it gives, back and forth.
+    // Seeking to a volume gives the same frames as reading up to it, forwards and backwards.
     for volume in [3, 1, 1, 4, 0] {
         compressed.skip_to_volume(volume).unwrap();
         assert_eq!(compressed.next_frame().unwrap().as_ref(), Some(&frames[volume]));
@@ -162,7 +162,7 @@ fn uneven_kretz_tables_stay_uneven() {
 }
 
 #[test]
-fn what_a_kretz_file_cannot_give_is_said() {
+fn missing_parts_of_a_kretz_file_are_named() {
     let folder = Folder::new("kretz");
     let wavelet = folder.write("w.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(2, 0x1100, b"xy")));
     assert!(total(&wavelet).unwrap_err().contains("wavelet"));

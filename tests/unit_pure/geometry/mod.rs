@@ -1,5 +1,5 @@
-//! Known answers of the maps between indices and space, worked out by hand; bounds against every place that they have to hold; and
-//! what no map can place, at its very limits. Needs no GPU.
+//! Known answers of the maps between indices and space, worked out by hand; bounds against all points that they must contain; and
+//! refused geometries at their limits. Needs no GPU.
 
 mod refused;
 
@@ -64,7 +64,7 @@ fn samples_lie_where_trigonometry_puts_them() {
     let (x, y) = fan().plane_point(1.0, 0.0);
     assert!(near(x, -16.25) && near(y, 16.25 * s), "{x}, {y}");
     assert_eq!(linear().plane_point(3.0, 0.5), (-1.5, 3.5));
-    // 14 mm beyond the axis, turned by 30 deg about it.
+    // 14 mm beyond the axis, rotated by 30 deg about it.
     assert!(is_at(fan().to_space(at(4.0, 1.0, 4.0)), [0.0, 20.0 + 7.0 * s, 7.0]));
     assert!(is_at(fan().to_space(at(4.0, 1.0, 0.0)), [0.0, 20.0 + 7.0 * s, -7.0]));
     assert!(is_at(linear().to_space(at(3.0, 2.0, 3.0)), [3.0, 3.5, 4.0]));
@@ -72,7 +72,7 @@ fn samples_lie_where_trigonometry_puts_them() {
 }
 
 #[test]
-fn a_place_is_unswept_to_where_it_was_swept_from() {
+fn unsweeping_a_point_inverts_the_sweep() {
     let s = 3.0f64.sqrt();
     let (x, y, position) = fan().inverse_sweep_map(DVec3::new(-4.0, 20.0 + 7.0 * s, 7.0));
     assert!(near(x, -4.0) && near(y, 34.0) && near(position, PI / 6.0), "{x}, {y}, {position}");
@@ -80,7 +80,7 @@ fn a_place_is_unswept_to_where_it_was_swept_from() {
     assert_eq!(still().inverse_sweep_map(DVec3::new(1.0, 2.0, 0.7)), (1.0, 2.0, 0.0));
 }
 
-/// Each way of the motor, on even slices and on uneven ones.
+/// Each kind of advance, on uniform and non-uniform slices.
 fn ways(probe: &Probe) -> Vec<Probe> {
     let n = probe.slices.len();
     let pitch = probe.slices.pitch();
@@ -95,7 +95,7 @@ fn ways(probe: &Probe) -> Vec<Probe> {
 }
 
 #[test]
-fn indices_come_back_from_space_for_every_array_motion_and_way_of_the_motor() {
+fn indices_round_trip_through_space_for_every_array_motion_and_advance() {
     let two = Probe { slices: Axis::Even { first: -1.0, pitch: 2.0, count: 2 }, ..linear() };
     let seven = Probe { slices: Axis::Even { first: -4.0, pitch: 2.0, count: 7 }, ..linear() };
     for probe in [fan(), linear(), two, seven].iter().flat_map(ways) {
@@ -114,9 +114,9 @@ fn indices_come_back_from_space_for_every_array_motion_and_way_of_the_motor() {
     assert!(near(back.sample, 3.0) && near(back.line, 0.5) && back.slice == 0.0, "{back:?}");
 }
 
-/// A line of three is taken a third of the frame's time after the one before.
+/// Each of three lines is acquired a third of the frame time after the previous one.
 #[test]
-fn the_motor_goes_on_while_the_lines_of_a_frame_are_taken() {
+fn the_motor_moves_while_a_frame_is_acquired() {
     let moving = |advance| Probe { advance, ..linear() };
     assert_eq!(moving(Advance::None).slice_position(2.0, 1.0), 0.0);
     assert!(near(moving(Advance::Same(0.9)).slice_position(2.0, 1.0), 0.6));
@@ -139,7 +139,7 @@ fn the_motor_goes_on_while_the_lines_of_a_frame_are_taken() {
     assert!(near(one.slice_position(2.0, 0.0), 0.4) && one.slice_index(5.0, 2.0) == 0.0);
 }
 
-/// Lines or slices to both sides, to one, and from straight ahead on.
+/// Lines or slices on both sides, on one side, and from the centre on.
 fn turned(pitch: f64) -> [Axis; 5] {
     [-2.0, -6.0, 2.0, -4.0, 0.0].map(|first| Axis::Even { first: first * pitch, pitch, count: 5 })
 }
@@ -190,7 +190,7 @@ fn the_box_touches_all_that_the_rectangle_sweeps_over() {
     assert!(near(low.z, -1.5) && near(high.z, 1.5) && near(high.y, 34.0) && near(low.x, -17.0), "{low}, {high}");
 }
 
-/// The last of three lines is taken after two thirds of the way.
+/// The last of three lines is acquired after two thirds of the advance.
 #[test]
 fn slice_bounds_hold_the_last_line_swept_either_way() {
     assert_eq!(linear().slice_bounds(), (-2.0, 4.0));

@@ -1,10 +1,10 @@
-//! What no map can place, and what just so can be.
+//! Geometries that are refused, and those just within the limits.
 
 use super::{fan, linear, still};
 use echolume::probe::{Advance, Array, Axis, Motion, Probe};
 use std::f64::consts::FRAC_PI_2;
 
-/// Refused by this field, in words that say all of these.
+/// Refused with this field, in a message that contains all of these words.
 fn refused(probe: &Probe, field: &str, words: &[&str]) {
     let error = probe.check().expect_err(field);
     assert_eq!(error.field, field, "{error}");
@@ -20,7 +20,7 @@ fn even(first: f64, pitch: f64, count: usize) -> Axis {
 }
 
 #[test]
-fn numbers_beyond_their_limits_are_refused_and_told_shortly() {
+fn numbers_beyond_their_limits_are_refused_in_a_short_message() {
     [fan(), linear(), still()].iter().for_each(taken);
     let pitch = |sample_pitch| Probe { sample_pitch, ..fan() };
     refused(&pitch(0.0), "sample pitch", &["is 0, must lie in 1e-6..=1e6"]);
@@ -79,9 +79,9 @@ fn a_sector_and_a_fan_stay_in_front_of_the_probe() {
     refused(&sector(1.6), "sector angle", &["91.7 deg"]);
     refused(&Probe { lines: even(-1.6, 1.6, 2), ..sector(1.0) }, "sector angle", &["91.7 deg"]);
     taken(&sector(1.57));
-    // A linear array's lines are places: 3 mm are no angle. Nor are the slices of an array that is moved sideways.
+    // The lines of a linear array are positions: 3 mm are no angle. The same holds for the slices of a translated array.
     taken(&linear());
-    // Beyond the wobble axis: the whole sector lies in front of the apex.
+    // Beyond the wobble axis: the complete sector is in front of the apex.
     let wide = |first: f64, widest: f64| Probe {
         motion: Motion::Fan { wobble_radius: 30.5 },
         lines: even(-0.1, 0.1, 3),
@@ -106,14 +106,14 @@ fn the_sector_lies_beyond_the_wobble_axis() {
     refused(&probe(10.0), "wobble radius", &["y = 16.00 mm", "20.00 mm"]);
     refused(&probe(13.9), "wobble radius", &["16.10 mm"]);
     taken(&probe(14.1));
-    // Just at the axis: lines straight ahead begin at 30 mm, as the axis does that lies in the face.
+    // Just at the axis: central lines begin at 30 mm, where the axis is too.
     let straight = Probe { lines: even(0.0, 0.1, 2), ..probe(0.0) };
     let at_axis = Probe { array: Array::Linear, start_depth: 0.0, lines: even(0.0, 1.0, 2), ..straight };
     refused(&at_axis, "wobble radius", &["y = 0.00 mm", "0.00 mm"]);
 }
 
 #[test]
-fn the_motor_s_way_is_finite_and_one_a_slice() {
+fn the_advance_of_the_motor_is_finite_and_one_per_slice() {
     let with = |advance| Probe { advance, ..linear() };
     refused(&with(Advance::Same(f64::NAN)), "motion", &["one finite advance a slice"]);
     refused(&with(Advance::Each(vec![0.1; 3])), "motion", &["one finite advance a slice"]);
@@ -123,7 +123,7 @@ fn the_motor_s_way_is_finite_and_one_a_slice() {
     taken(&with(Advance::Each(vec![0.1, -0.1, 0.1, 0.1])));
 }
 
-/// The last of two lines is taken after half of the way: slices 1 mm apart meet where each goes a whole one towards the other.
+/// The last of two lines is acquired after half of the advance: slices 1 mm apart meet if each advances 1 mm towards the other.
 #[test]
 fn neighbouring_slices_do_not_cross() {
     let towards = |way: f64| Probe {

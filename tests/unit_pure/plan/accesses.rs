@@ -1,4 +1,4 @@
-//! What a dispatch touches, by its pass, its turn and the part of each slot that it binds.
+//! The accesses of a dispatch, from its pass, its arguments and the part of each slot that it binds.
 
 use super::{FILTERED, scene};
 use crate::common::probes::voxels;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Slot, volume image, and parts.
 type Touched = Vec<(Slot, u32, Range<u32>)>;
 
-/// What it reads and what it writes.
+/// Its reads and its writes.
 fn touched(name: &str, args: DispatchArgs) -> (Touched, Touched) {
     let scene = scene(voxels([6, 8, 5]), FILTERED);
     let all = accesses(&scene, by_name(name).expect("pass"), &args);
@@ -49,7 +49,7 @@ fn a_pass_over_the_volume_reads_as_far_around_its_slices_as_there_are_any() {
 }
 
 #[test]
-fn a_set_of_workers_lacks_what_was_taken_out_of_it() {
+fn a_set_of_stages_lacks_what_was_removed() {
     assert!(PipelineStages::DEVICE.has(PipelineStage::Compute) && PipelineStages::DEVICE.has(PipelineStage::Copy));
     assert!(!PipelineStages::DEVICE.has(PipelineStage::Host));
     let copies = PipelineStages::DEVICE.without(PipelineStage::Compute);

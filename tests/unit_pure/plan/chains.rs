@@ -1,7 +1,8 @@
-//! Which slots the filters of a chain take turns with, and how much of a slice each of them makes.
+//! The slots that the filters of a chain alternate between, and how much of a slice each of them writes.
 
 use super::{fan, scene};
 use crate::common::probes::voxels;
+use crate::common::scenes;
 use echolume::passes::chain::{
     copied, distance_end, distance_link, picture_end, picture_link, rectangle, rendered, slice_link,
 };
@@ -15,14 +16,14 @@ fn args(iteration: u32) -> DispatchArgs {
 }
 
 #[test]
-fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() {
+fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
     let filters = "slices = { median = true, sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }";
     let frames = scene(voxels([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
     let link = |name: &str, iteration| slice_link(&frames, name, &args(iteration));
     assert_eq!(link("load_slice", 0), (Slot::Frames, Slot::SliceA));
     assert_eq!(link("median_slice", 0), (Slot::SliceA, Slot::SliceB));
     assert_eq!(link("sigma_slice", 0), (Slot::SliceB, Slot::SliceA));
-    // Four dispatches are one step and one link.
+    // Four dispatches are one step and one filter of the chain.
     for iteration in 0..4 {
         assert_eq!(link("aos_slice", iteration), (Slot::SliceA, Slot::SliceB));
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
@@ -32,7 +33,7 @@ fn filters_take_turns_with_two_slots_and_the_last_writes_where_the_chain_ends() 
 }
 
 #[test]
-fn a_chain_of_no_filter_ends_where_it_begins() {
+fn an_empty_chain_leaves_its_slot_unchanged() {
     let plain = scene(voxels([8, 8, 5]), "mode = 'sr'");
     assert_eq!((distance_end(&plain), picture_end(&plain)), (Slot::Distance, Slot::Picture));
     let filtered = scene(
@@ -48,11 +49,8 @@ fn a_chain_of_no_filter_ends_where_it_begins() {
 }
 
 #[test]
-fn frames_are_copied_where_the_volume_stores_what_they_hold() {
-    let of = |stored, range, toml: &str| {
-        let settings = toml::from_str(toml).expect("settings");
-        copied(&Scene::new(voxels([8, 8, 5]), Input { stored, range }, settings).expect("scene"))
-    };
+fn frames_are_copied_where_the_volume_has_their_format() {
+    let of = |stored, range, toml: &str| copied(&scenes::scene(voxels([8, 8, 5]), Input { stored, range }, toml));
     let (bytes, words) = ([0.0, 255.0], [0.0, 65535.0]);
     let format = |format: &str| format!("slices = {{ format = '{format}' }}");
     assert_eq!(of(StoredType::U8, bytes, &format("r8")), Some(Slot::Volume));
@@ -69,7 +67,7 @@ fn frames_are_copied_where_the_volume_stores_what_they_hold() {
 }
 
 #[test]
-fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
+fn renderings_with_several_rays_or_planes_use_an_intermediate_slot() {
     let of = |toml: &str| rendered(&scene(voxels([8, 8, 5]), toml));
     assert_eq!(of("mode = 'vr'"), Slot::Picture);
     assert_eq!(of("mode = 'vr'\nray = { rays = 2 }"), Slot::Rendered);
@@ -78,13 +76,13 @@ fn a_pixel_of_several_rays_or_beside_planes_is_rendered_elsewhere_first() {
     assert_eq!(of("mode = 'plane'\nray = { rays = 2 }"), Slot::Picture, "planes cast no rays");
 }
 
-/// A slice of 400 x 400 of which columns and rows from `low` up to `high` are seen.
+/// A slice of 400 x 400 of which columns and rows from `low` up to `high` are visible.
 fn seen(filters: &str, low: u32, high: u32) -> Scene {
     let scene = scene(voxels([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
     Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..scene }
 }
 
-/// How many columns and rows around what is seen a pass makes, by when it takes whole workgroups of 32 more: to the left and right, above
+/// How many columns and rows around the visible bounds a pass writes, from where complete workgroups of 32 are added: to the left and right, above
 /// and below.
 fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
     let whole = seen(filters, 192, 224);
@@ -101,7 +99,7 @@ fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
 }
 
 #[test]
-fn each_filter_makes_as_much_more_as_those_behind_it_look_at() {
+fn each_filter_covers_the_reach_of_the_filters_after_it() {
     let all = "median = true, estimator = 'nagao-matsuyama', sigma = { window = 9 }, enhanced_sigma = { window = 5, largest = 11 }, \
                perona_malik = { repeat = 3 }, smooth = { lateral = 2.0, depth = 1.0, elevation = 1.0 }";
     // Reaches: 1, 2, 4, 5, 1 a step, then 6 columns and 3 rows; across slices none in a plane.

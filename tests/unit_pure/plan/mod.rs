@@ -1,5 +1,5 @@
-//! Plans and what follows from them, without a GPU: which steps and slots, what runs again after a change, what a dispatch touches,
-//! which slots the filters of a chain take turns with.
+//! Plans, without a GPU: steps and slots, what runs again after a change, the accesses of a dispatch,
+//! the slots that the filters of a chain alternate between.
 
 mod accesses;
 mod chains;
@@ -30,7 +30,7 @@ const FILTERED: &str = "mode = 'mip'
     slices = { median = true, perona_malik = { scheme = 'aos', repeat = 2 }, smooth = { elevation = 1.0 } }";
 
 #[test]
-fn steps_are_told_apart_by_what_makes_them_run() {
+fn steps_are_sorted_by_their_frequency() {
     let plan = Plan::new(&scene(voxels([6, 8, 5]), FILTERED));
     let names = |when| plan.steps_of(when).map(|(i, s)| (i, s.pass.name, s.iteration)).collect::<Vec<_>>();
     let frame = names(Frequency::Frame);
@@ -62,8 +62,8 @@ fn a_step_reaches_as_many_slices_as_its_gaussian() {
     assert_eq!(step(&plan, "median_slice").reach(&scene(voxels([6, 8, 5]), FILTERED)), 0);
 }
 
-/// Frames of 6x8 bytes, four on their way; two spare slices, the shares of an elimination and what it passes on, rows, all of f32; two
-/// volumes of 6x8x5 in R16F; a picture of 5x4 in RGBA16F and one of bytes; and what the pass over the volume looks up.
+/// Frames of 6x8 bytes, four in flight; two spare slices, the three slots of an elimination, all of f32; two
+/// volumes of 6x8x5 in R16F; a picture of 5x4 in RGBA16F and one of bytes.
 #[test]
 fn a_plan_counts_the_bytes_of_its_slots() {
     let scene = scene(voxels([6, 8, 5]), FILTERED);
@@ -92,15 +92,15 @@ fn a_plan_explains_itself() {
     assert_eq!(line("+ aos_slice"), "+ aos_slice 8 x 1 x 1, each frame, 8 times: asked for");
     assert_eq!(line("+ tone"), "+ tone 5 x 4 x 1, each picture: every picture ends in 8 bits");
     assert_eq!(line("- sigma_slice"), "- sigma_slice not asked for");
-    // Eight dispatches of three shaders, each told once.
+    // Eight dispatches of three shaders, each listed once.
     assert_eq!(line("filter/aos_forward.plane"), "filter/aos_forward.plane: slice_b -> slice_shares, slice_forward");
     assert_eq!(line("filter/aos_backward.rows"), "filter/aos_backward.rows: slice_shares, slice_forward -> slice_rows");
     assert!(line("samples of the volume").contains("fastest"));
     assert_eq!(
-        line("seen"),
-        "seen: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
+        line("visible"),
+        "visible: columns 0..6 of 6, rows 0..8 of 8, slices 0..5 of 5: 100.0 % of the volume; frames 0..5"
     );
-    assert_eq!(line("in all"), "in all 2352 bytes");
+    assert_eq!(line("total"), "total 2352 bytes");
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn runs_of_slices_end_where_the_volume_does() {
     assert_eq!(affected(&changed(&[1]), 3), vec![0..5; 1]);
     assert_eq!(affected(&changed(&[4]), 3), vec![1..6; 1]);
     assert_eq!(affected(&changed(&[0, 2, 5]), 0), [0..1, 2..3, 5..6]);
-    // Side by side and not upon one another: one run all the same.
+    // Adjacent without an overlap: one run all the same.
     assert_eq!(affected(&changed(&[0, 3]), 1), vec![0..5; 1]);
     assert_eq!(affected(&changed(&[1, 2]), 0), vec![1..3; 1]);
 }

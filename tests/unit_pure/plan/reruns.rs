@@ -1,4 +1,4 @@
-//! What runs again after a change: the least that makes the picture right, and what a filter's lost input takes with it.
+//! What runs again after a change: the least that makes the picture right, and the filters that must rerun for a lost input.
 
 use super::{FILTERED, fan, scene};
 use crate::common::probes::voxels;
@@ -19,7 +19,7 @@ fn rerun(old: &Scene, new: &Scene) -> Rerun {
     Plan::new(new).rerun(old, new)
 }
 
-/// The passes that run again, each once, and the slots that are made anew.
+/// The passes that run again, each once, and the slots that are created again.
 fn again(old: &Scene, new: &Scene) -> (String, String) {
     let plan = Plan::new(new);
     match plan.rerun(old, new) {
@@ -50,7 +50,7 @@ fn a_change_of_nothing_runs_nothing() {
 }
 
 #[test]
-fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
+fn only_readers_of_a_changed_slot_run_again() {
     let lit = "light tone";
     assert_eq!(passes(&with(""), &with("light = { direction = [1.0, 0.0, 0.5] }")), lit);
     assert_eq!(passes(&with(""), &with("post = { gamma = 2.0 }")), "tone");
@@ -60,12 +60,12 @@ fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
         passes(&with(""), &with("surface = { threshold = 0.3 }")),
         format!("classify_surface leap_surface raycast_surface {filtered}")
     );
-    // Another window of the median is a constant of its pipeline, and shadow a pass more whose slot the light reads.
+    // Another median window is a constant of its pipeline; shadow is one more pass, whose slot the light reads.
     let wider = scene(fan(Advance::None), &SURFACE.replace("median = 3", "median = 5"));
     assert_eq!(passes(&with(""), &wider), filtered);
     assert_eq!(passes(&with(""), &with("light = { shadow = {} }")), "shadow light tone");
     assert_eq!(passes(&with("light = { shadow = {} }"), &with("")), lit);
-    // One repetition less: what is left has been made already, but the light reads the other of the two slots.
+    // One repetition less: the remaining ones have run already, but the light reads the other of the two slots.
     let shorter = scene(fan(Advance::None), &SURFACE.replace("repeat = 3", "repeat = 2"));
     assert_eq!(passes(&with(""), &shorter), lit);
     let Rerun::Steps { steps, .. } = rerun(&shorter, &with("")) else { panic!("the volume stays") };
@@ -75,41 +75,41 @@ fn what_reads_a_changed_slot_runs_and_what_does_not_stays() {
 }
 
 #[test]
-fn stage_1_runs_again_where_its_own_numbers_change() {
+fn stage_1_runs_again_when_its_parameters_change() {
     let sharper = |settings: &str| scene(voxels([6, 8, 5]), &FILTERED.replace("median = true", settings));
     let before = sharper("sigma = { sigma = 0.1 }");
     assert_eq!(rerun(&before, &sharper("sigma = { sigma = 0.2 }")), Rerun::Frames);
-    // Across slices the volume before smoothing is still there.
+    // The volume before smoothing across slices still exists.
     let wider = scene(voxels([6, 8, 5]), &FILTERED.replace("elevation = 1.0", "elevation = 1.2"));
     let plain = scene(voxels([6, 8, 5]), FILTERED);
     assert_eq!(passes(&plain, &wider), "gaussian_elevation raycast_projection tone");
-    // The gain by depth is made anew, for the frames that come again.
+    // The gain curve is computed again, for the frames that are sent again.
     let gain = |gain: f64| with(&format!("conditioning = {{ tgc = [{{ depth = 5, gain = {gain} }}] }}"));
     assert_eq!(rerun(&gain(1.0), &gain(2.0)), Rerun::Frames);
 }
 
 #[test]
-fn slots_of_another_shape_format_or_meaning_begin_anew() {
+fn slots_of_another_shape_format_or_meaning_are_created_again() {
     let stored =
         |format: &str| scene(fan(Advance::None), &SURFACE.replace("median = true", &format!("format = '{format}'")));
     assert_eq!(rerun(&stored("r16f"), &stored("r8")), Rerun::Everything);
     let pixels = scene(fan(Advance::None), &SURFACE.replace("pixels = 96", "pixels = 97"));
     assert_eq!(rerun(&with(""), &pixels), Rerun::Everything);
-    // Another speed of sound changes no slot and no number of a pass, but the frames are those of another probe.
+    // Another speed of sound changes no slot and no parameter, but the frames belong to another probe.
     let Geometry::Sweep(mut probe) = fan(Advance::None) else { panic!("a sweep") };
     probe.sound_speed = 1500.0;
     assert_eq!(rerun(&with(""), &scene(Geometry::Sweep(probe), SURFACE)), Rerun::Everything);
     let input = Input { range: [0.0, 200.0], ..with("").input };
     let brighter = Scene::new(fan(Advance::None), input, with("").settings).expect("scene");
     assert_eq!(rerun(&with(""), &brighter), Rerun::Everything);
-    // Frames that are copied as they are leave no pass behind that could tell.
+    // Frames that are only copied have no pass that could show the change.
     let copied = |format: &str| scene(voxels([6, 8, 5]), &format!("mode = 'mip'\nslices = {{ format = '{format}' }}"));
     assert_eq!(rerun(&copied("r8"), &copied("r16f")), Rerun::Everything);
 }
 
-/// Less of a region that is large enough for several workgroups, and more of it again.
+/// A region of several workgroups shrinks and grows again.
 #[test]
-fn less_to_be_seen_keeps_the_volume_and_more_needs_frames() {
+fn smaller_visible_bounds_keep_the_volume_and_larger_ones_need_frames() {
     let (all, less) = (with(""), with("region = { depth = [10, 20] }"));
     assert!(all.seen.holds(&less.seen) && all.seen != less.seen);
     assert_eq!(passes(&all, &less), "raycast_surface median_distance bilateral_distance light tone");
@@ -117,7 +117,7 @@ fn less_to_be_seen_keeps_the_volume_and_more_needs_frames() {
 }
 
 #[test]
-fn tables_are_made_anew_where_what_they_follow_from_changes() {
+fn lookup_tables_are_built_again_when_their_inputs_change() {
     let volume =
         |way: Advance, more: &str| scene(fan(way), &format!("mode = 'vr'\nslices = {{ pixels = 40 }}\n{more}"));
     let still = |more: &str| volume(Advance::None, more);
@@ -132,7 +132,7 @@ fn tables_are_made_anew_where_what_they_follow_from_changes() {
     assert_eq!(rerun(&entries(1025), &entries(513)), Rerun::Frames, "of all tables alike");
     let (run, made) = again(&still("ray = { brick = 8 }"), &still("ray = { brick = 16 }"));
     assert!(run.starts_with("brick_ranges classify_volume") && made == "brick_table", "{run}: {made}");
-    // The motor goes another way, or further, during a frame: the tables of the sweep follow, the lines of a frame lie as before.
+    // The motor moves in the other direction, or further, during a frame: the tables of the sweep change, the lines of a frame do not.
     let [forth, back, fast] = [0.02, -0.02, 0.03].map(|way| volume(Advance::Same(way), ""));
     assert_eq!(again(&forth, &back).1, "");
     assert_eq!(again(&forth, &fast).1, "brick_table sweep_lut");
@@ -156,9 +156,9 @@ fn tiles_and_blocks_follow_from_their_planes() {
     assert_eq!(again(&cube(1.0), &cube(5.0)).1, "block");
 }
 
-/// The filters of the distance map take turns with two slots: median writes A, the bilateral B, A and B again.
+/// The filters of the distance map alternate between two slots: median writes A, the bilateral B, A and B again.
 #[test]
-fn a_filter_whose_input_was_overwritten_takes_those_before_it_along() {
+fn a_filter_with_an_overwritten_input_reruns_the_filters_before_it() {
     let scene = with("");
     let plan = Plan::new(&scene);
     let stale_after = |which: &[(&str, u32)], contents: &Contents| {
@@ -166,7 +166,7 @@ fn a_filter_whose_input_was_overwritten_takes_those_before_it_along() {
         plan.complete(&scene, &mut stale, contents);
         plan.steps.iter().zip(stale).filter(|(_, s)| *s).map(|(step, _)| step.id()).collect::<Vec<_>>()
     };
-    // As a picture leaves them.
+    // The state after a picture.
     let mut contents = Contents::new();
     for step in plan.steps.iter().filter(|s| s.pass.frequency != echolume::passes::Frequency::Frame) {
         contents.extend(step.writes(&scene).into_iter().map(|slot| (slot, step.id())));
@@ -175,12 +175,12 @@ fn a_filter_whose_input_was_overwritten_takes_those_before_it_along() {
     let tail = [("light", 0), ("tone", 0)];
     assert_eq!(stale_after(&tail, &contents), tail, "what they read is there");
     assert_eq!(stale_after(&[], &contents), []);
-    // The second reads what the third has written over since, so the first runs, which reads what the second wrote over.
+    // The third has overwritten the input of the second, so the first runs; the second has overwritten its input.
     let all = [("median_distance", 0), bilateral(0), bilateral(1)];
     assert_eq!(stale_after(&[bilateral(1)], &contents), all);
     assert_eq!(stale_after(&[bilateral(2)], &contents), [bilateral(2)], "the second's result is still in A");
     assert_eq!(stale_after(&[("median_distance", 0)], &contents), [("median_distance", 0)]);
-    // What stage 1 leaves is never taken for lost; what no one has made yet is.
+    // Results of stage 1 never count as lost; slots that were never written do.
     assert_eq!(stale_after(&[("tile_ranges", 0)], &Contents::new()), [("tile_ranges", 0)]);
     let first = [("tile_ranges", 0), ("brick_ranges", 0)];
     assert_eq!(stale_after(&[("brick_ranges", 0)], &Contents::new()), first);

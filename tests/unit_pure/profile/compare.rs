@@ -15,7 +15,7 @@ fn line<'a>(comparison: &'a Comparison, name: &str) -> &'a Line {
     comparison.lines.iter().find(|l| l.name == name).expect("line")
 }
 
-/// In how many of the pairs of identical runs anything is called different.
+/// The number of pairs of identical runs in which anything is called different.
 fn false_alarms(seed: u64, noise: Noise) -> u32 {
     let mut random = Random(seed);
     let alarm = |_: &u32| {
@@ -29,7 +29,7 @@ const STEADY: Noise = Noise { spread: 0.03, memory: 0.0, drift: 0.0, own_drift: 
 
 /// 5 % of 400 are 20.
 #[test]
-fn identical_runs_are_rarely_called_different_however_the_machine_behaves() {
+fn identical_runs_are_rarely_called_different_under_any_noise() {
     let kinds = [
         ("independent", STEADY),
         ("outliers", Noise { outliers: 0.05, ..STEADY }),
@@ -76,9 +76,9 @@ fn a_pass_that_is_ten_percent_slower_is_found_and_so_is_a_faster_one() {
     assert!(times * 20 > PAIRS * 19, "{times} of {PAIRS}");
 }
 
-/// Without its second hurdle the test would fail under drift: the simulation can fail.
+/// Without its second criterion the test would fail under drift: the simulation can fail.
 #[test]
-fn the_rank_test_alone_would_not_do() {
+fn the_rank_test_alone_is_not_enough() {
     let mut random = Random(4);
     let noise = Noise { drift: 0.04, ..STEADY };
     let alarm = |_: &u32| {
@@ -135,7 +135,7 @@ fn only_a_pass_or_the_wall_past_the_threshold_is_a_regression() {
 }
 
 #[test]
-fn what_only_one_run_has_is_new_or_gone() {
+fn lines_of_only_one_run_are_new_or_removed() {
     let mut random = Random(41);
     let mut old = run(&mut random, 3, 30, STEADY);
     let mut new = run(&mut random, 3, 30, STEADY);
@@ -151,7 +151,7 @@ fn what_only_one_run_has_is_new_or_gone() {
 }
 
 #[test]
-fn what_cannot_be_told_apart_says_why() {
+fn indistinguishable_runs_say_why() {
     let mut random = Random(51);
     let few = run(&mut random, 3, 5, STEADY);
     let comparison = compared(&few, &few);
@@ -213,13 +213,13 @@ fn different_work_is_refused_by_name_unless_forced() {
 }
 
 #[test]
-fn other_devices_and_programs_are_compared_and_said() {
+fn other_devices_and_programs_are_compared_with_a_warning() {
     let old = profile(30);
     let mut new = old.clone();
     new.device.name = "another".into();
     new.device.clocks = None;
     new.program = "echolume 0.2.0, release".into();
-    // The same settings, written otherwise.
+    // The same settings, written differently.
     new.scene = format!("# resolved\n{}", old.scene);
     let notes = compared(&old, &new).notes;
     assert_eq!(
@@ -234,7 +234,7 @@ fn other_devices_and_programs_are_compared_and_said() {
 
 /// A lower clock slows every pass by the same factor: no pass is to blame.
 #[test]
-fn a_shift_of_all_passes_is_pointed_out() {
+fn a_shift_of_all_passes_is_reported() {
     let mut random = Random(61);
     let noise = Noise { spread: 0.005, ..STEADY };
     let old = run(&mut random, 6, 30, noise);
@@ -248,7 +248,7 @@ fn a_shift_of_all_passes_is_pointed_out() {
 }
 
 #[test]
-fn thresholds_that_are_none_and_broken_profiles_are_refused() {
+fn invalid_thresholds_and_broken_profiles_are_refused() {
     let good = profile(30);
     let with = |threshold: f64| compare(&good, &good, &CompareOptions { threshold, ..CompareOptions::default() });
     assert!(with(f64::NAN).is_err() && with(1.0).is_ok());

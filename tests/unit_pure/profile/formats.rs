@@ -19,10 +19,10 @@ fn without_stamps() -> Profile {
 }
 
 #[test]
-fn json_comes_back_as_it_went() {
+fn json_round_trips_without_a_change() {
     let mut random = Random(82);
     let mut odd = measured();
-    // Fractions that are off by one bit when a reader rounds carelessly.
+    // Fractions that are off by one bit if a reader rounds carelessly.
     odd.passes[0].samples_ns.iter_mut().for_each(|ns| *ns = random.between(0.0, 1e7));
     odd.passes[1].filtered = None;
     odd.cpu_ns = Vec::new();
@@ -65,9 +65,9 @@ fn other_versions_other_files_and_contradictions_are_refused() {
     assert!(broken(|p| p.ceilings.as_mut().unwrap().fetch.low = f64::INFINITY).starts_with("fetch: ceiling"));
 }
 
-/// A file of the version before has neither CPU time nor a camera that turns.
+/// A file of the previous version has neither CPU time nor a rotating camera.
 #[test]
-fn a_profile_of_the_version_before_is_read() {
+fn a_profile_of_the_previous_version_is_read() {
     let mut before = measured();
     before.cpu_ns.clear();
     let text = before.to_json().expect("JSON").replace("echolume-profile-2", "echolume-profile-1");
@@ -127,7 +127,7 @@ fn without_time_stamps_no_pass_has_a_time_and_the_host_still_has() {
 }
 
 #[test]
-fn what_is_not_known_or_too_little_is_said() {
+fn unknown_values_and_too_few_repeats_are_reported() {
     let mut profile = run(&mut Random(83), 2, 3, Noise { spread: 0.01, ..Noise::default() });
     profile.device.clocks = None;
     profile.device.is_software = true;
@@ -184,7 +184,7 @@ fn csv_has_as_many_fields_as_its_head_and_the_tables_numbers() {
 }
 
 #[test]
-fn the_nearest_roof_is_the_one_that_counts() {
+fn the_nearest_roofline_limits_a_pass() {
     let ceilings = profile(1).ceilings.expect("ceilings");
     // In 1 ms: 4 MB are 1 % of 4e11 B/s.
     let mut pass = pass("a", vec![1e6]);

@@ -1,4 +1,4 @@
-//! What is made of measured times: statistics against known values, comparisons against simulated runs, formats against their
+//! Evaluation of measured times: statistics against known values, comparisons against simulated runs, formats against their
 //! rules. Needs no GPU.
 
 mod compare;

@@ -1,4 +1,4 @@
-//! Runs whose truth is known.
+//! Simulated runs with a known truth.
 
 use echolume::machine::Device;
 use echolume::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
@@ -25,16 +25,16 @@ impl Random {
     }
 }
 
-/// How times depart from their median, as logarithms.
+/// How times deviate from their median, as logarithms.
 #[derive(Clone, Copy, Default)]
 pub struct Noise {
     /// Standard deviation of one repeat.
     pub spread: f64,
     /// Correlation of neighbouring repeats, 0..1.
     pub memory: f64,
-    /// Largest drift from the first repeat to the last, either way, of all passes together.
+    /// Largest drift from the first repeat to the last, in either direction, common to all passes.
     pub drift: f64,
-    /// The same of each pass by itself.
+    /// The same for each pass separately.
     pub own_drift: f64,
     /// Standard deviation that a random walk of all passes reaches at the end.
     pub walk: f64,

@@ -56,7 +56,7 @@ fn too_few_samples_say_how_little_their_range_covers() {
 }
 
 #[test]
-fn nothing_and_what_is_no_number_are_refused() {
+fn empty_and_non_finite_samples_are_refused() {
     assert_eq!(Sample::new(&[]), Err(SampleError::Empty));
     let Err(SampleError::NotFinite { at: 1, .. }) = Sample::new(&[1.0, f64::NAN]) else { panic!("NaN was ordered") };
     assert_eq!(
@@ -125,11 +125,11 @@ fn the_shift_is_the_median_of_all_differences_and_its_interval_inverts_the_test(
     {
         close(got, expected, 1e-12);
     }
-    // What lies inside is not refused, what lies outside is.
+    // Shifts inside the interval are not rejected, shifts outside are.
     let p = |by: f64| mann_whitney(&a.map(|v| v + by), &b).expect("a test").p;
     assert!(p(shift.low + 1e-6) > 0.05 && p(shift.low - 1e-6) < 0.05);
     assert!(p(shift.high - 1e-6) > 0.05 && p(shift.high + 1e-6) < 0.05);
-    // The same where the normal approximation stands in.
+    // The same with the normal approximation.
     let (a, b) = waves();
     let shift = hodges_lehmann(&a, &b, 0.95).expect("a shift");
     close(shift.estimate, 0.9118975155802413, 1e-12);

@@ -1,4 +1,4 @@
-//! Traces by the rules of the Trace Event Format.
+//! Traces obey the rules of the Trace Event Format.
 
 use super::simulated::{Random, pass, profile};
 use echolume::profile::Profile;
@@ -18,7 +18,7 @@ fn events(profile: &Profile, spans: &[Span]) -> Vec<Value> {
     trace["traceEvents"].as_array().expect("events").clone()
 }
 
-/// Whole ns of a number of microseconds, as Perfetto reads it; it must hold them exactly.
+/// Integer ns from a number of microseconds, as Perfetto reads it; they must be exact.
 fn ns(value: &Value) -> i64 {
     let us = value.as_f64().expect("a number");
     let ns = (us * 1e3).round();
@@ -129,7 +129,7 @@ fn a_clock_that_is_not_tied_is_named() {
 }
 
 #[test]
-fn what_is_no_stretch_of_time_is_refused() {
+fn invalid_time_spans_are_refused() {
     for (begin, end) in [(5.0, 4.0), (f64::NAN, 1.0), (0.0, f64::INFINITY), (-1e300, 0.0)] {
         let error = chrome(&profile(1), &[span("bad", Track::Host, begin, end)]).expect_err("refused").to_string();
         assert!(error.starts_with("span \"bad\" of repeat 0: from "), "{error}");

@@ -1,10 +1,10 @@
-//! What the passes of the filters say of themselves beside their references: when they are needed, with which shader, slots, numbers
-//! and constants. tests/unit_pure/rules.rs holds the names to the shaders'; here is what they mean.
+//! The declarations of the filters' passes: when they are needed, and with which shader, slots, parameters
+//! and constants. tests/unit_pure/rules.rs compares the names with the shaders; these tests check their meaning.
 
 use super::*;
 use echolume::passes::{Slot, Value};
 
-/// A dispatch in words: shader, slots read and written, invocations.
+/// A dispatch as text: shader, slots read and written, invocations.
 fn told(scene: &Scene, name: &str, iteration: u32) -> String {
     let (pass, args) = (pass(name), DispatchArgs { iteration, slice: 1, slices: 2, ..DispatchArgs::default() });
     assert_eq!(pass.name, name);
@@ -104,7 +104,7 @@ fn elimination_goes_forth_and_back_along_rows_and_then_columns() {
 }
 
 #[test]
-fn filters_that_were_not_asked_for_or_change_nothing_are_not_needed_and_say_why() {
+fn filters_that_are_off_or_change_nothing_are_skipped_and_explained() {
     let plain = slices([8, 8], "");
     let flat = scene([8; 3], "mode = 'mip'");
     for name in ["median", "estimator", "sigma", "enhanced_sigma", "growth", "perona_malik", "aos"] {
@@ -141,7 +141,7 @@ fn filters_that_were_not_asked_for_or_change_nothing_are_not_needed_and_say_why(
 }
 
 #[test]
-fn filters_of_distance_maps_take_turns() {
+fn filters_of_distance_maps_alternate_between_two_slots() {
     let scene = distances(
         [21, 10],
         "median = 5, bilateral = { pixels = 1.2, distance = 4.0, repeat = 2 }, sigma = {}, enhanced_sigma = {}, perona_malik = {}",
@@ -161,7 +161,7 @@ fn filters_of_distance_maps_take_turns() {
     let expected =
         [("place_narrowness", f64::from((0.5 / 1.44f64) as f32)), ("distance_narrowness", 0.03125), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "bilateral_distance"), expected);
-    // Unless it is asked for nobody runs it; its numbers are told all the same.
+    // It does not run unless requested; its parameters are defined all the same.
     assert_eq!(constants(&distances([4, 4], ""), "bilateral_distance", 0), [("RADIUS", 2)]);
     let picture = picture([21, 10], "sigma = {}, enhanced_sigma = {}, perona_malik = { repeat = 1 }");
     assert_eq!(told(&picture, "sigma_picture", 0), "filter/sigma.picture: picture -> smooth_picture [21, 3, 1]");
@@ -172,7 +172,7 @@ fn filters_of_distance_maps_take_turns() {
 }
 
 #[test]
-fn shaders_get_the_numbers_that_the_references_go_by() {
+fn shaders_and_references_get_the_same_parameters() {
     let scene = slices(
         [8, 8],
         "sigma = { window = 9, sigma = 0.125, noise = 'multiplicative' },
@@ -201,7 +201,7 @@ fn shaders_get_the_numbers_that_the_references_go_by() {
         let scene = slices([8, 8], &format!("estimator = '{estimator}'"));
         assert_eq!(constants(&scene, "estimator_slice", 0), [("ESTIMATOR", n as i32)]);
     }
-    // A sigma without an end is as far as f32 goes when it is multiplied.
+    // An infinite sigma becomes the largest f32 that can be multiplied.
     let endless = slices([8, 8], "sigma = { window = 3, sigma = inf }");
     assert_eq!(numbers(&endless, "sigma_slice")[..2], [("range", f64::from(1e30f32)), ("few", 1.0)]);
     assert_eq!(Slot::Growth.name(), "growth");

@@ -27,7 +27,7 @@ fn an_explicit_step_by_hand() {
     }
 }
 
-/// Every pixel by itself, from what lies beside it: the reference goes by pairs.
+/// Computes every pixel separately from its neighbours; the reference goes by pairs.
 fn step(source: &Texels, lambda: f64, conducts: impl Fn(f64) -> f64) -> Texels {
     plane([source.size[0], source.size[1]], |x, y| {
         let here = source.one(x, y, 0);
@@ -60,7 +60,7 @@ fn an_explicit_step_moves_each_pixel_towards_its_four_neighbours() {
         &step(&source, 0.2, |g| 0.25 / (0.25 + g * g)),
         "distances",
     );
-    // Heat would carry a miss, far off as it is, to every hit beside it.
+    // Diffusion would carry a miss, which is far away, to every adjacent hit.
     let scene = distances([8, 7], &explicit("quotient", "edge = inf, step = 0.2"));
     same(&filtered(&scene, "perona_malik_distance", &source), &step(&source, 0.2, |_| 1.0), "heat of distances");
 }
@@ -87,7 +87,7 @@ fn an_edge_of_0_keeps_everything_and_equal_neighbours_too() {
     }
 }
 
-/// What the four dispatches of a step leave: rows, and the target.
+/// The result of the four dispatches of a step: rows, and the target.
 fn aos(scene: &Scene, name: &str, source: &Texels) -> (Texels, Texels) {
     let mut held = Arrays::default();
     held.insert("source", source.clone());

@@ -12,7 +12,7 @@ fn is(got: f64, expected: f64) {
     assert!((got - expected).abs() < 1e-12, "{got} in place of {expected}");
 }
 
-/// Four at 0.4 beside and four at 0.7 askew of 0.2.
+/// Four direct neighbours of 0.4 and four diagonal ones of 0.7 around 0.2.
 fn star() -> Texels {
     rows([[0.7, 0.4, 0.7], [0.4, 0.2, 0.4], [0.7, 0.4, 0.7]])
 }
@@ -37,7 +37,7 @@ fn a_perona_malik_estimate_is_a_step_of_a_fifth_towards_four_neighbours() {
     is(at("0.1", &uneven), 0.2 + 0.2 * (0.2 / 5.0 + 0.3 / 10.0));
     is(at("0.2", &star()), 0.2 + 0.2 * 4.0 * 0.2 / 2.0);
     is(at("inf", &star()), 0.2 + 0.2 * 4.0 * 0.2);
-    // No edge at all keeps everything, equal neighbours too.
+    // An edge of 0 keeps everything, also between equal neighbours.
     is(at("0.0", &uneven), 0.2);
     // Each of the four alone.
     for (x, y) in [(1, 0), (0, 1), (2, 1), (1, 2)] {
@@ -46,7 +46,7 @@ fn a_perona_malik_estimate_is_a_step_of_a_fifth_towards_four_neighbours() {
     }
 }
 
-/// Half the pixel, half the eight around it: 20 x 0.4 + 8 x 0.7 by 28; differences under half a level of 255 count as that.
+/// Half the pixel, half its eight neighbours: (20 x 0.4 + 8 x 0.7) / 28; differences below half a level of 255 count as half a level.
 #[test]
 fn a_gradient_inverse_estimate_weighs_by_likeness() {
     let at = |source: &Texels| estimated("estimator = 'gradient-inverse'", source, [1, 1]);
@@ -57,7 +57,7 @@ fn a_gradient_inverse_estimate_weighs_by_likeness() {
     is(at(&plane([3, 3], |_, _| 0.3)), 0.3);
 }
 
-/// Nagao and Matsuyama's nine as they draw them: where one is flat and nothing else is, the pixel takes its value.
+/// Nagao and Matsuyama's nine masks: where only one of them is flat, the pixel takes its value.
 const MASKS: [[&str; 5]; 9] = [
     [".....", ".xxx.", ".xxx.", ".xxx.", "....."],
     [".xxx.", ".xxx.", "..x..", ".....", "....."],
@@ -75,7 +75,7 @@ fn a_nagao_matsuyama_estimate_is_the_mean_of_the_flattest_of_nine_masks() {
     for (n, mask) in MASKS.iter().enumerate() {
         let marked = |x: usize, y: usize| mask[y].as_bytes()[x] == b'x';
         let rough = noise([5, 5], 70 + n);
-        // Nearly flat, so that no other mask is flatter, and a mean that is no pixel's.
+        // Nearly flat, so that no other mask is flatter, with a mean that no pixel has.
         let source =
             plane(
                 [5, 5],

@@ -4,7 +4,7 @@ use super::*;
 use echolume::passes::filter::growth;
 use echolume::probe::{Axis, Motion, Probe};
 
-/// What the filter is to find at a pixel whose centre is known: the rings that its window grows by, and the mean.
+/// The expected result at a pixel with a known centre: the rings that its window grows by, and the mean.
 struct Expected {
     rings: usize,
     mean: Vec<f64>,
@@ -43,7 +43,7 @@ fn expected(source: &Texels, [x, y]: [usize; 2], centre: f64, range: f64, [start
     Expected { rings, mean }
 }
 
-/// The middle one of the hits around a pixel, the lower of two; beyond the border the nearest pixel stands in.
+/// The median of the hits around a pixel, the lower of two; beyond the border the nearest pixel is repeated.
 fn median(source: &Texels, x: usize, y: usize) -> f64 {
     let at = |at: usize, step: i64, count: usize| (at as i64 + step).clamp(0, count as i64 - 1) as usize;
     let nine = (0..9).map(|n| source.get([at(x, n % 3 - 1, source.size[0]), at(y, n / 3 - 1, source.size[1]), 0]));
@@ -89,17 +89,17 @@ fn windows_grow_until_they_hold_as_many_like_the_centre_as_they_began_with() {
 }
 
 #[test]
-fn few_that_are_alike_give_way_to_the_four_neighbours() {
+fn too_few_similar_pixels_fall_back_to_the_four_neighbours() {
     let scene =
         slices([3, 3], "enhanced_sigma = { window = 3, largest = 3, sigma = 0.01, centre = 'gradient-inverse' }");
     // The estimate lies half-way between 0 and its neighbours, where no pixel is.
     let source = rows([[9.0, 1.0, 9.0], [2.0, 0.0, 3.0], [9.0, 4.0, 9.0]]);
     assert_eq!(filtered(&scene, "enhanced_sigma_slice", &source).one(1, 1, 0), 2.5);
-    // Two alike in a picture of two are few, and all that there are.
+    // Two similar pixels in a picture of two are few, but there are no more.
     let two = rows([[0.5, 0.51]]);
     let scene = slices([2, 1], "enhanced_sigma = { window = 5, largest = 5, sigma = 0.1 }");
     assert!((filtered(&scene, "enhanced_sigma_slice", &two).one(0, 0, 0) - 0.505).abs() < 1e-12);
-    // One that is alone in its picture.
+    // A picture of one pixel.
     let one = rows([[0.4]]);
     let scene = slices([1, 1], "enhanced_sigma = { window = 3, largest = 5, sigma = 0.01 }");
     assert_eq!(filtered(&scene, "enhanced_sigma_slice", &one).one(0, 0, 0), 0.4);
@@ -108,7 +108,7 @@ fn few_that_are_alike_give_way_to_the_four_neighbours() {
 /// Slopes whose centre is estimated at 3 + 9/7 along x and at 3 - 9/7 along y, by the first of two masks that are as flat: the pixels
 /// alike are the column at 4, and the row at 2.
 #[test]
-fn a_centre_is_estimated_from_what_lies_that_way() {
+fn a_centre_is_estimated_with_the_chosen_estimator() {
     let scene = slices([7, 7], "enhanced_sigma = { window = 3, largest = 3, sigma = 0.2, centre = 'nagao-matsuyama' }");
     let at = |slope: Texels| filtered(&scene, "enhanced_sigma_slice", &slope).one(3, 3, 0);
     assert_eq!(at(plane([7, 7], |x, _| x as f64)), 4.0);
@@ -143,7 +143,7 @@ fn windows_of_distances_count_hits_only() {
     }
 }
 
-/// Of nine masks those with a miss count nowhere, however flat the rest of them is.
+/// Masks with a miss are ignored, however flat their other pixels are.
 #[test]
 fn a_mask_with_a_miss_is_no_estimate() {
     // Flat below but for a miss in each mask there; a slope above, whose mask ends at 10.
@@ -160,7 +160,7 @@ fn a_mask_with_a_miss_is_no_estimate() {
     assert!((got - 10.1).abs() < 1e-12, "{got}");
 }
 
-/// Colours are alike where their brightness is, and go together.
+/// Colours are similar if their brightness is; all channels are filtered together.
 #[test]
 fn pictures_are_judged_by_brightness() {
     let source = colours([9, 8], 6);
@@ -181,7 +181,7 @@ fn shares_of_growth_count_what_a_line_passes_through_and_sum_to_one() {
     let map = rows([[0.0, 1.0, 1.0, 2.0], [0.0, -1.0, 2.0, 9.0]]);
     assert_eq!(growth::shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
     assert_eq!(growth::shares(&growing("window = 5, largest = 5"), &map), [1.0]);
-    // Of a sector only what lies within it: outside every window would have grown by one.
+    // Only pixels inside the sector: outside, every window would have grown by one.
     let probe = Probe { motion: Motion::Translated, slices: Axis::centred(1.0, 3), ..wobbler() };
     let filters = "slices = { pixels = 40, enhanced_sigma = { window = 3, largest = 7, growth = true } }";
     let scene = scenes::scene(Geometry::Sweep(probe), FLOATS, filters);

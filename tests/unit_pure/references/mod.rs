@@ -1,5 +1,5 @@
-//! The f64 references of the filters, held to answers that owe them nothing: hands, counts, sums that have to stay, equations that have
-//! to be fulfilled. What the shaders do is held to the references (tests/gpu); this is why that proves something. Needs no GPU.
+//! The f64 references of the filters against independent answers: values worked out by hand, counts, sums that must be kept, equations that
+//! must be fulfilled. The tests on a device (tests/gpu) compare the shaders with these references. Needs no GPU.
 
 mod declared;
 mod diffusion;
@@ -17,17 +17,17 @@ fn scene(size: [usize; 3], toml: &str) -> Scene {
     scenes::scene(voxels(size), FLOATS, toml)
 }
 
-/// A scene whose slices go through these filters.
+/// A scene with these filters of slices.
 fn slices(size: [usize; 2], filters: &str) -> Scene {
     scene([size[0], size[1], 3], &format!("slices = {{ {filters} }}"))
 }
 
-/// A scene whose distance map does.
+/// A scene with these filters of the distance map.
 fn distances(size: [usize; 2], filters: &str) -> Scene {
     scene([8; 3], &format!("mode = 'sr'\npicture = {{ size = {size:?} }}\ndistance = {{ {filters} }}"))
 }
 
-/// A scene whose picture does.
+/// A scene with these filters of the picture.
 fn picture(size: [usize; 2], filters: &str) -> Scene {
     scene([8; 3], &format!("mode = 'mip'\npicture = {{ size = {size:?} }}\npost = {{ {filters} }}"))
 }
@@ -36,7 +36,7 @@ fn pass(name: &str) -> &'static Pass {
     by_name(name).unwrap_or_else(|| panic!("no pass {name}"))
 }
 
-/// What one dispatch makes of `source` in a target of so many slices; what it leaves alone is NaN.
+/// The result of one dispatch on `source`, in a target of `depth` slices; texels that it does not write are NaN.
 fn dispatched(scene: &Scene, name: &str, source: &Texels, args: DispatchArgs, depth: usize) -> Texels {
     let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
     reads.insert("source", source.clone());
@@ -45,7 +45,7 @@ fn dispatched(scene: &Scene, name: &str, source: &Texels, args: DispatchArgs, de
     writes.get("target").clone()
 }
 
-/// The first dispatch of a pass, in a plane.
+/// The result of the first dispatch of a pass, in a plane.
 fn filtered(scene: &Scene, name: &str, source: &Texels) -> Texels {
     dispatched(scene, name, source, DispatchArgs::default(), 1)
 }
@@ -54,12 +54,12 @@ fn plane(size: [usize; 2], f: impl Fn(usize, usize) -> f64) -> Texels {
     Texels::from_fn([size[0], size[1], 1], 1, |[x, y, _], _| f(x, y))
 }
 
-/// Rows of numbers, as they are read.
+/// A plane from its rows.
 fn rows<const W: usize, const H: usize>(rows: [[f64; W]; H]) -> Texels {
     plane([W, H], |x, y| rows[y][x])
 }
 
-/// A number in 0..1 that goes with its seed.
+/// A pseudo-random number in 0..1 from a seed.
 fn hash(seed: usize) -> f64 {
     let mut z = (seed as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -71,7 +71,7 @@ fn noise(size: [usize; 2], seed: usize) -> Texels {
     plane(size, |x, y| hash(seed * 10_000 + y * size[0] + x))
 }
 
-/// Distances near 40 mm, and here and there a miss.
+/// Distances near 40 mm with some misses.
 fn holed(size: [usize; 2], seed: usize) -> Texels {
     let rough = noise(size, seed);
     plane(size, |x, y| match rough.one(x, y, 0) {
@@ -80,7 +80,7 @@ fn holed(size: [usize; 2], seed: usize) -> Texels {
     })
 }
 
-/// Values of a picture whose channels have nothing in common.
+/// A picture with independent values in each channel.
 fn colours(size: [usize; 2], seed: usize) -> Texels {
     Texels::from_fn([size[0], size[1], 1], 4, |[x, y, _], c| hash(seed * 10_000 + (y * size[0] + x) * 4 + c))
 }
@@ -113,9 +113,9 @@ fn same(got: &Texels, expected: &Texels, what: &str) {
     }
 }
 
-/// What a pass makes of slice 2 of 3 goes there and nowhere else; into a plane, which has no slices, it goes as well.
+/// The result for slice 2 of 3 is written there and nowhere else; a plane, which has no slices, is written too.
 #[test]
-fn a_filtered_slice_goes_where_it_belongs() {
+fn a_filtered_slice_is_written_to_its_own_layer() {
     let source = noise([6, 5], 1);
     for (name, filter) in [
         ("median_slice", "median = true"),

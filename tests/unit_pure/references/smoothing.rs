@@ -2,14 +2,14 @@
 
 use super::*;
 
-/// A value that is there, with at most so many below it, and more than so many not above it.
+/// True if `value` occurs, at most `below` values are smaller, and more than `below` are not larger.
 fn is_ranked(values: &[f64], rank: usize, value: f64) -> bool {
     let below = values.iter().filter(|v| **v < value).count();
     let not_above = values.iter().filter(|v| **v <= value).count();
     values.contains(&value) && below <= rank && rank < not_above
 }
 
-/// Beyond the border the nearest pixel stands in.
+/// Beyond the border the nearest pixel is repeated.
 fn clamped(source: &Texels, x: usize, y: usize, radius: i64) -> Vec<f64> {
     let (x, y) = (x as i64, y as i64);
     (-radius..=radius)
@@ -31,7 +31,7 @@ fn a_median_has_as_many_below_as_above() {
     assert_eq!((got.one(0, 0, 0), got.one(1, 1, 0), got.one(2, 2, 0)), (2.0, 9.0, 9.0));
 }
 
-/// Of an even number of hits the lower middle one; of a majority of misses a miss.
+/// The median of an even number of hits is the lower of the middle two; a majority of misses gives a miss.
 #[test]
 fn a_median_of_distances_lets_misses_vote_first() {
     for edge in [3, 5] {
@@ -72,7 +72,7 @@ fn a_gaussian_spreads_a_point_by_its_weights_along_its_own_axis() {
         });
         same(&got, &expected, name);
         assert!((got.values.iter().sum::<f64>() - 1.0).abs() < 1e-12, "what there is stays");
-        // A slope stays inside; at the border only what is there is weighed.
+        // A slope is kept inside; at the border only existing pixels are weighted.
         let slope = plane([9, 9], |x, y| if axis == "lateral" { x as f64 } else { y as f64 });
         let got = filtered(&scene, name, &slope);
         let first = (1..4).map(|i| i as f64 * weights()[3 + i]).sum::<f64>() / weights()[3..].iter().sum::<f64>();
@@ -84,7 +84,7 @@ fn a_gaussian_spreads_a_point_by_its_weights_along_its_own_axis() {
 
 /// Pixels of 0.5 mm: a deviation of 1 mm is two of them.
 #[test]
-fn a_gaussian_is_as_wide_as_was_asked_for() {
+fn a_gaussian_has_the_requested_width() {
     let grid = Grid { size: [41, 3, 1], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };
     let scene = scenes::scene(Geometry::Cartesian(grid), FLOATS, "slices = { smooth = { lateral = 1.0 } }");
     let got = filtered(&scene, "gaussian_lateral", &plane([41, 3], |x, _| f64::from(x == 20)));
@@ -95,7 +95,7 @@ fn a_gaussian_is_as_wide_as_was_asked_for() {
 }
 
 #[test]
-fn a_gaussian_across_slices_makes_the_slices_of_its_turn_and_no_others() {
+fn a_gaussian_across_slices_writes_only_the_slices_of_its_dispatch() {
     let scene = scene([2, 2, 9], "slices = { smooth = { elevation = 1.0 } }");
     let source = Texels::from_fn([2, 2, 9], 1, |[x, y, z], _| if z == 4 { 1.0 + (2 * y + x) as f64 } else { 0.0 });
     let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
@@ -113,7 +113,7 @@ fn a_gaussian_across_slices_makes_the_slices_of_its_turn_and_no_others() {
     }
 }
 
-/// Every hit of a window weighs by how near it lies and how alike it is; misses stay and weigh nothing.
+/// Every hit of a window is weighted by its distance and its similarity; misses stay and have no weight.
 #[test]
 fn a_bilateral_filter_weighs_by_place_and_by_distance() {
     let source = holed([9, 8], 7);
@@ -133,7 +133,7 @@ fn a_bilateral_filter_weighs_by_place_and_by_distance() {
         if here < MISS { sum / weights } else { MISS }
     });
     same(&got, &expected, "bilateral");
-    // Two plates further apart than any weight stay what they are.
+    // Two plates further apart than any weight are not changed.
     let plates = plane([6, 4], |x, _| if x < 3 { 20.0 } else { 60.0 });
     same(
         &filtered(&distances([6, 4], "bilateral = { pixels = 1.0, distance = 1.0 }"), "bilateral_distance", &plates),
@@ -142,7 +142,7 @@ fn a_bilateral_filter_weighs_by_place_and_by_distance() {
     );
 }
 
-/// The mean of those in a window that lie within a range; the four neighbours' where no more than K of its pixels do.
+/// The mean of the pixels of a window within the range; the mean of the four neighbours if no more than K pixels are.
 fn lee(source: &Texels, radius: usize, few: usize, range: impl Fn(f64) -> f64) -> (Texels, usize) {
     let lone = std::cell::Cell::new(0);
     let texels = plane([source.size[0], source.size[1]], |x, y| {
@@ -167,7 +167,7 @@ fn lee(source: &Texels, radius: usize, few: usize, range: impl Fn(f64) -> f64) -
 }
 
 #[test]
-fn a_sigma_filter_takes_the_mean_of_its_like() {
+fn a_sigma_filter_averages_only_similar_samples() {
     for (window, few) in [(3, 1), (5, 2), (7, 3)] {
         let source = noise([10, 8], window);
         let got = filtered(
@@ -186,7 +186,7 @@ fn a_sigma_filter_takes_the_mean_of_its_like() {
 }
 
 #[test]
-fn a_sigma_filter_of_distances_leaves_misses_out() {
+fn a_sigma_filter_of_distances_ignores_misses() {
     for seed in 0..4 {
         let source = holed([10, 8], 40 + seed);
         let got = filtered(&distances([10, 8], "sigma = { window = 5, sigma = 0.0625 }"), "sigma_distance", &source);
@@ -194,7 +194,7 @@ fn a_sigma_filter_of_distances_leaves_misses_out() {
         same(&got, &expected, "distances");
         assert!(lone > 0);
     }
-    // A hit between misses, and one whose only like is itself among others: the one stays, the other takes its neighbours'.
+    // A hit between misses is kept; a hit that is similar only to itself takes the mean of its neighbours.
     let lonely = rows([[MISS, MISS, MISS], [MISS, 7.0, MISS], [MISS, MISS, MISS]]);
     let scene = distances([3, 3], "sigma = { window = 3, sigma = 0.1 }");
     same(&filtered(&scene, "sigma_distance", &lonely), &lonely, "a lone hit");
@@ -206,14 +206,14 @@ fn a_sigma_filter_of_distances_leaves_misses_out() {
 
 /// At exactly two sigma a pixel counts.
 #[test]
-fn a_pixel_at_the_very_end_of_the_range_is_alike() {
+fn a_pixel_at_the_end_of_the_range_counts_as_similar() {
     let source = rows([[0.75, 0.25, 0.5], [0.75, 0.5, 0.0], [1.0, 1.0, 1.0]]);
     let got = filtered(&slices([3, 3], "sigma = { window = 3, sigma = 0.125 }"), "sigma_slice", &source);
     assert_eq!(got.one(1, 1, 0), (0.75 + 0.25 + 0.5 + 0.75 + 0.5) / 5.0);
 }
 
 #[test]
-fn a_sigma_filter_of_pictures_takes_each_channel_alone() {
+fn a_sigma_filter_of_pictures_filters_each_channel_separately() {
     let source = colours([7, 6], 5);
     let got = filtered(&picture([7, 6], "sigma = { window = 3, sigma = 0.0625 }"), "sigma_picture", &source);
     for c in 0..4 {

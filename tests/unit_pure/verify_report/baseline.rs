@@ -1,23 +1,23 @@
-//! Runs against earlier ones.
+//! Runs compared with earlier ones.
 
 use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
-use echolume::verify::report::baseline::{Class, Compared, Options, compare};
-use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, words};
+use echolume::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
+use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, summary};
 use proptest::prelude::*;
 
-fn compared(old: &Run, new: &Run) -> Compared {
-    compare(old, new, &Options::default())
+fn compared(old: &Run, new: &Run) -> BaselineComparison {
+    compare(old, new, &BaselineOptions::default())
 }
 
 /// Class and text of every change.
-fn told(compared: &Compared) -> Vec<(Class, String)> {
+fn told(compared: &BaselineComparison) -> Vec<(Class, String)> {
     compared.changes.iter().map(|c| (c.class, c.to_string())).collect()
 }
 
-/// A run with the errors of another and its own times, from the same one.
-fn changed(change: impl Fn(&mut Run)) -> Compared {
+/// Two runs with the same errors and different times of the same distribution.
+fn changed(change: impl Fn(&mut Run)) -> BaselineComparison {
     let old = run(1);
     let mut new = old.clone();
     change(&mut new);
@@ -25,7 +25,7 @@ fn changed(change: impl Fn(&mut Run)) -> Compared {
 }
 
 #[test]
-fn a_run_against_itself_has_nothing_to_tell() {
+fn a_run_compared_with_itself_reports_nothing() {
     let mut same = run(1);
     fail(&mut same, "passes", "shade");
     check(&mut same, "passes", "tone").figures[0].value = f64::NAN;
@@ -36,7 +36,7 @@ fn a_run_against_itself_has_nothing_to_tell() {
 }
 
 #[test]
-fn an_error_that_grew_is_told_though_it_passes() {
+fn an_error_that_grew_is_reported_even_if_it_passes() {
     let grew = changed(|new| check(new, "passes", "raycast_volume").figures[0].value = 1.9);
     let line = "passes / raycast_volume: largest error 0.74 -> 1.9 levels, still under 2".to_string();
     assert_eq!(told(&grew), [(Class::Changed, line.clone())]);
@@ -46,7 +46,7 @@ fn an_error_that_grew_is_told_though_it_passes() {
 }
 
 #[test]
-fn an_error_that_left_its_tolerance_is_worse_and_so_is_one_that_is_no_number() {
+fn errors_beyond_their_tolerance_or_not_finite_are_worse() {
     for (value, shown) in [(2.5, "2.5"), (f64::NAN, "NaN"), (f64::INFINITY, "infinity")] {
         let left = changed(|new| check(new, "passes", "median").figures[0].value = value);
         let line = format!("passes / median: largest error 0.8 -> {shown} levels, now over 2");
@@ -87,7 +87,7 @@ fn what_fails_now_is_worse_and_what_passes_now_is_better() {
 }
 
 #[test]
-fn checks_and_figures_that_only_one_run_has_are_told() {
+fn checks_and_figures_of_only_one_run_are_reported() {
     let differing = changed(|new| {
         new.outcomes.retain(|o| o.name != "shadow" || o.group != "passes");
         new.outcomes.push(outcome("passes", "glow", Verdict::Passed));
@@ -110,7 +110,7 @@ fn checks_and_figures_that_only_one_run_has_are_told() {
 }
 
 #[test]
-fn a_terminal_is_told_of_every_check_that_is_worse_and_of_some_of_the_rest() {
+fn the_terminal_lists_every_worse_check_and_some_others() {
     let many = |value: f64| {
         let mut many = run(1);
         for i in 0..100 {
@@ -120,12 +120,12 @@ fn a_terminal_is_told_of_every_check_that_is_worse_and_of_some_of_the_rest() {
         }
         many
     };
-    let text = words::comparison(&compared(&many(0.5), &many(1.0)));
+    let text = summary::comparison(&compared(&many(0.5), &many(1.0)));
     assert!(
         text.contains("input 39: ") && !text.contains("input 40: ") && text.contains("\n  and 60 more\n"),
         "{text}"
     );
-    let text = words::comparison(&compared(&many(0.5), &many(3.0)));
+    let text = summary::comparison(&compared(&many(0.5), &many(3.0)));
     assert!(text.contains("input 99: ") && !text.contains(" more\n"), "{text}");
 }
 
@@ -161,7 +161,7 @@ fn fourteen_percent_slower_is_worse_and_faster_is_better() {
 }
 
 #[test]
-fn slower_within_the_threshold_is_told_and_fails_nothing() {
+fn slower_within_the_threshold_is_reported_and_fails_nothing() {
     let quiet = profile::Noise { spread: 0.002, ..profile::Noise::default() };
     let timed = |seed: u64, factor: f64| {
         let mut run = run(1);
@@ -177,21 +177,21 @@ fn slower_within_the_threshold_is_told_and_fails_nothing() {
     assert!(!small.is_worse() && small.changes.len() == 1, "{:?}", small.lines());
     assert!(small.lines()[0].starts_with("speed / shade: device time 3.0 % slower (1.0"), "{:?}", small.lines());
     assert!(small.lines()[0].ends_with(", within the threshold of 5 %"), "{:?}", small.lines());
-    let strict = Options::new(1.01).expect("options");
+    let strict = BaselineOptions::new(1.01).expect("options");
     assert!(compare(&old, &new, &strict).is_worse());
 }
 
 #[test]
 fn a_threshold_below_one_is_refused() {
     for threshold in [0.99, f64::NAN, f64::INFINITY, -1.0] {
-        let error = Options::new(threshold).expect_err("refused");
+        let error = BaselineOptions::new(threshold).expect_err("refused");
         assert!(error.ends_with("is not a ratio of at least 1 (1.05 is five percent slower)"), "{error}");
     }
-    assert_eq!(Options::default().threshold(), 1.05);
+    assert_eq!(BaselineOptions::default().threshold(), 1.05);
 }
 
 #[test]
-fn too_few_times_and_times_of_another_device_are_not_judged_and_that_is_said() {
+fn too_few_times_and_other_devices_are_not_compared_and_reported() {
     let mut few = run(1);
     few.outcomes.iter_mut().flat_map(|o| &mut o.figures).for_each(|f| f.samples.truncate(3));
     let compared_few = compared(&run(1), &few);
@@ -237,13 +237,13 @@ fn other_levels_compare_what_both_have() {
 }
 
 #[test]
-fn the_words_have_the_worst_first() {
+fn the_text_lists_the_worst_first() {
     let both = changed(|new| {
         new.device.driver = "none 1.1".into();
         check(new, "passes", "median").figures[0].value = 1.0;
         fail(new, "modes", "vr");
     });
-    let text = words::comparison(&both);
+    let text = summary::comparison(&both);
     let expected = "compared with the run of 2026-01-02T03:04:05Z (echolume 0.1.0, release, quick) on simulated, none 1.0\n\
         driver: none 1.0 -> none 1.1\n\
         worse:\n  modes / vr: passed -> failed: the output differs by more than its tolerance\n\
@@ -257,9 +257,9 @@ proptest! {
 
     #[test]
     fn any_two_runs_compare_in_lines_and_none_differs_from_itself(old in any_run(), new in any_run()) {
-        let compared = compare(&old, &new, &Options::default());
+        let compared = compare(&old, &new, &BaselineOptions::default());
         prop_assert!(compared.lines().iter().all(|line| !line.chars().any(char::is_control)));
-        let itself = compare(&new, &new, &Options::default());
+        let itself = compare(&new, &new, &BaselineOptions::default());
         prop_assert!(itself.lines().is_empty(), "{:?}", itself.lines());
     }
 }

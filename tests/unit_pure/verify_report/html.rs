@@ -1,14 +1,14 @@
 //! The page, read back as a browser would.
 
 use super::simulated::{any_run, check, fail, outcome, run, shown, slower};
-use echolume::verify::report::baseline::{Options, compare};
+use echolume::verify::report::baseline::{BaselineOptions, compare};
 use echolume::verify::report::html::html;
 use echolume::verify::report::{Fault, Figure, Run, Unit, Verdict};
 use proptest::prelude::*;
 use scraper::{ElementRef, Html, Selector};
 
 fn page(run: &Run, old: Option<&Run>) -> String {
-    let compared = old.map(|old| compare(old, run, &Options::default()));
+    let compared = old.map(|old| compare(old, run, &BaselineOptions::default()));
     html(run, compared.as_ref()).expect("page")
 }
 
@@ -20,7 +20,7 @@ fn text(element: ElementRef) -> String {
     element.text().flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
 }
 
-/// No mistake that a browser would have to mend, nothing that runs, and nothing that is fetched.
+/// The page has no error that a browser would repair, no script, and no external resource.
 fn checked(page: &str) -> Html {
     let document = Html::parse_document(page);
     assert!(document.errors.is_empty(), "{:?}", document.errors);
@@ -39,14 +39,14 @@ fn checked(page: &str) -> Html {
     assert!(all(&document, "#injected, b, script").is_empty());
     for word in ["http:", "https:", "@import", "url("] {
         assert!(
-            !include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/verify/report/html/style.css")).contains(word),
+            !include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/verify/report/style.css")).contains(word),
             "{word}"
         );
     }
     document
 }
 
-/// What a bad driver update looks like: for the tests, and to be looked at.
+/// A page as after a bad driver update: for the tests, and to look at.
 fn bad_update() -> (Run, Run) {
     let old = run(1);
     let mut new = run(2);
@@ -123,7 +123,7 @@ fn what_went_wrong_comes_first_with_its_pictures_side_by_side() {
 }
 
 #[test]
-fn a_run_in_which_all_is_well_says_so_and_one_of_nothing_does_not() {
+fn a_run_without_failures_says_so_and_an_empty_run_does_not() {
     let well = checked(&page(&run(1), Some(&run(1))));
     assert_eq!(text(all(&well, "h1")[0]), "Passed");
     assert!(all(&well, "#failures").is_empty());
@@ -137,7 +137,7 @@ fn a_run_in_which_all_is_well_says_so_and_one_of_nothing_does_not() {
 }
 
 #[test]
-fn a_picture_that_is_none_is_told_and_the_page_is_still_written() {
+fn a_broken_picture_is_reported_and_the_page_still_written() {
     let mut run = run(1);
     fail(&mut run, "passes", "tone");
     check(&mut run, "passes", "tone").pictures[0].actual.rgba.pop();
@@ -173,7 +173,7 @@ fn many_checks_and_many_pictures_make_a_page_of_bounded_size() {
     assert!(note.contains("101 of 401 sets of pictures are left out: a page holds 300 sets and 24 MiB."), "{note}");
 }
 
-/// Noise does not compress: pictures are bounded in bytes too.
+/// Noise does not compress: the size of pictures is limited in bytes too.
 #[test]
 fn large_pictures_are_left_out_where_the_page_is_full() {
     let mut large = run(1);

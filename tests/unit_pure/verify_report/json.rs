@@ -1,11 +1,11 @@
 //! Runs as JSON.
 
 use super::simulated::{any_run, check, empty, fail, run};
-use echolume::verify::report::json::{MOST_OUTCOMES, MOST_SAMPLES, from_json, to_json};
 use echolume::verify::report::{Figure, Run, Unit};
+use echolume::verify::report::{MAX_OUTCOMES, MAX_SAMPLES, from_json, to_json};
 use proptest::prelude::*;
 
-/// The numbers that JSON knows no numbers for make runs unequal to themselves: equal by their text.
+/// Non-finite numbers make runs unequal to themselves: they are compared by their text.
 fn comes_back(run: &Run) {
     let text = to_json(run).expect("JSON");
     let again = from_json(&text).expect("run");
@@ -14,7 +14,7 @@ fn comes_back(run: &Run) {
 }
 
 #[test]
-fn a_run_comes_back_as_it_went() {
+fn a_run_round_trips_without_a_change() {
     let whole = run(1);
     assert_eq!(from_json(&to_json(&whole).expect("JSON")).expect("run"), whole);
     comes_back(&whole);
@@ -22,7 +22,7 @@ fn a_run_comes_back_as_it_went() {
 }
 
 #[test]
-fn what_is_not_a_number_is_a_finding_and_is_kept() {
+fn non_finite_findings_are_kept() {
     for (value, word) in [(f64::NAN, "NaN"), (f64::INFINITY, "Infinity"), (f64::NEG_INFINITY, "-Infinity")] {
         let mut run = run(2);
         fail(&mut run, "passes", "shade");
@@ -99,7 +99,7 @@ fn what_contradicts_itself_is_neither_read_nor_written() {
     assert_eq!(broken(&|r| r.outcomes[1].name.clear()), "outcome 1: has no group or no name");
     assert!(broken(&|r| r.device.timestamp_period_ns = f64::INFINITY).starts_with("timestamp_period_ns: inf"));
     assert!(
-        broken(&|r| r.outcomes = vec![r.outcomes[0].clone(); MOST_OUTCOMES + 1]).starts_with("outcomes: are 100001")
+        broken(&|r| r.outcomes = vec![r.outcomes[0].clone(); MAX_OUTCOMES + 1]).starts_with("outcomes: are 100001")
     );
     let twice = |r: &mut Run| {
         let figure = Figure::error("largest error", 0.0, 1.0, Unit::Count);
@@ -108,7 +108,7 @@ fn what_contradicts_itself_is_neither_read_nor_written() {
     assert_eq!(broken(&twice), "passes / tone: figure 'largest error' is there twice");
     assert!(speed(&|f| f.allowed = Some(f64::INFINITY)).starts_with("speed / shade: figure 'device time' allows inf"));
     assert!(speed(&|f| f.samples[7] = f64::NAN).contains("sample 7: NaN is not finite"));
-    assert!(speed(&|f| f.samples = vec![1.0; MOST_SAMPLES + 1]).contains("100001 samples"));
+    assert!(speed(&|f| f.samples = vec![1.0; MAX_SAMPLES + 1]).contains("100001 samples"));
     let beyond = |r: &mut Run| {
         fail(r, "passes", "tone");
         check(r, "passes", "tone").faults[0].worst.as_mut().expect("worst").beyond = 5000;
@@ -120,7 +120,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_run_comes_back(run in any_run()) {
+    fn any_run_round_trips(run in any_run()) {
         comes_back(&run);
     }
 

@@ -1,14 +1,14 @@
 //! JUnit XML, read back by another parser.
 
 use super::simulated::{any_run, check, fail, run};
-use echolume::verify::report::baseline::{Options, compare};
+use echolume::verify::report::baseline::{BaselineOptions, compare};
 use echolume::verify::report::junit::junit;
 use echolume::verify::report::{Run, Verdict};
 use proptest::prelude::*;
 use roxmltree::{Document, Node};
 
 fn written(run: &Run, old: Option<&Run>) -> String {
-    let compared = old.map(|old| compare(old, run, &Options::default()));
+    let compared = old.map(|old| compare(old, run, &BaselineOptions::default()));
     junit(run, compared.as_ref()).expect("XML")
 }
 

@@ -1,4 +1,4 @@
-//! What is made of a verification's findings: JSON that comes back, comparisons of simulated runs, reports that other programs read.
+//! Reports of a verification: JSON that round-trips, comparisons of simulated runs, formats that other programs read.
 //! Needs no GPU.
 
 mod baseline;

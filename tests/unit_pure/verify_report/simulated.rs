@@ -1,16 +1,16 @@
-//! Runs whose truth is known.
+//! Simulated runs with a known truth.
 
 use super::profile;
 use super::profile::{Noise, Random};
 use echolume::picture::Picture;
-use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, Run, Shown, Unit, Verdict, Worst};
+use echolume::verify::report::{FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Unit, Verdict, Worst};
 use proptest::prelude::*;
 
 /// Passes that are timed and checked.
 pub const PASSES: [&str; 8] =
     ["scan_convert", "median", "sigma", "raycast_volume", "raycast_surface", "shade", "shadow", "tone"];
 
-/// Times of `repeats` as they scatter on a device in its own room.
+/// Times of `repeats` as they scatter on an idle device.
 pub const STEADY: Noise = Noise { spread: 0.03, memory: 0.3, drift: 0.01, own_drift: 0.0, walk: 0.0, outliers: 0.02 };
 
 pub fn outcome(group: &str, name: &str, verdict: Verdict) -> Outcome {
@@ -26,7 +26,7 @@ pub fn outcome(group: &str, name: &str, verdict: Verdict) -> Outcome {
     }
 }
 
-/// Nothing was checked.
+/// A run without checks.
 pub fn empty() -> Run {
     Run {
         format: FORMAT.into(),
@@ -40,7 +40,7 @@ pub fn empty() -> Run {
     }
 }
 
-/// A run in which all is well. The seed makes the times.
+/// A run without failures. The seed determines the times.
 pub fn run(seed: u64) -> Run {
     let mut run = empty();
     let mut random = Random(seed);
@@ -81,7 +81,7 @@ pub fn slower(run: &mut Run, name: &str, factor: f64) {
     *figure = Figure::times("device time", samples).expect("times");
 }
 
-/// Makes a check of a pass fail, with the worst that a driver does.
+/// Makes a check of a pass fail, as with the worst driver faults.
 pub fn fail(run: &mut Run, group: &str, name: &str) {
     let check = check(run, group, name);
     check.verdict = Verdict::Failed;
@@ -105,7 +105,7 @@ pub fn fail(run: &mut Run, group: &str, name: &str) {
 }
 
 /// A lit sphere, one with a wrong corner, and ten times their difference.
-pub fn shown(what: &str, size: u32, fault: Option<usize>) -> Shown {
+pub fn shown(what: &str, size: u32, fault: Option<usize>) -> PictureComparison {
     let pixel = |x: u32, y: u32, wrong: bool| {
         let at = |v: u32| 2.2 * (f64::from(v) + 0.5) / f64::from(size) - 1.1;
         let (x, y) = (at(x), at(y));
@@ -125,7 +125,7 @@ pub fn shown(what: &str, size: u32, fault: Option<usize>) -> Shown {
         let (a, b) = (pixel(x, y, true), pixel(x, y, false));
         std::array::from_fn(|c| a[c].abs_diff(b[c]).saturating_mul(10))
     };
-    Shown {
+    PictureComparison {
         what: what.into(),
         actual: picture(&|x, y| pixel(x, y, fault.is_some())),
         expected: picture(&|x, y| pixel(x, y, false)),
@@ -135,7 +135,7 @@ pub fn shown(what: &str, size: u32, fault: Option<usize>) -> Shown {
     }
 }
 
-/// What a name or message may hold that another program takes for its own.
+/// Text in names or messages that other programs might interpret as markup.
 pub fn nasty() -> impl Strategy<Value = String> {
     let known = prop::sample::select(vec![
         "]]>",
@@ -155,7 +155,7 @@ pub fn nasty() -> impl Strategy<Value = String> {
     prop_oneof![known.prop_map(String::from), any::<String>(), "\\PC{0,40}"]
 }
 
-/// Any run that agrees with itself, without pictures.
+/// Any consistent run without pictures.
 pub fn any_run() -> impl Strategy<Value = Run> {
     let value = prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(f64::NEG_INFINITY), any::<f64>(), -2.0..2.0];
     let unit =
@@ -186,7 +186,7 @@ pub fn any_run() -> impl Strategy<Value = Run> {
         run.device.driver.clone_from(&device);
         run.device.name = device;
         for (i, (group, name, verdict, seconds, (mut figures, faults, notes))) in outcomes.into_iter().enumerate() {
-            // Names are unique, whatever they are.
+            // Names must be unique.
             figures.iter_mut().enumerate().for_each(|(i, figure)| figure.what.push_str(&i.to_string()));
             let (group, name) = (format!("{group}g"), format!("{name}{i}"));
             run.outcomes.push(Outcome { group, name, verdict, seconds, figures, faults, notes, pictures: Vec::new() });

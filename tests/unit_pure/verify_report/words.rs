@@ -2,12 +2,12 @@
 
 use super::simulated::{any_run, check, empty, fail, outcome, run};
 use echolume::text::escaped;
-use echolume::verify::report::numbers::{amount, change, expected_and_got, number, of_allowed, percent, seconds};
-use echolume::verify::report::{Figure, Outcome, Unit, Verdict, words};
+use echolume::verify::report::numbers::{amount, change, expected_and_got, number, percent, seconds, value_of_limit};
+use echolume::verify::report::{Figure, Outcome, Unit, Verdict, summary};
 use proptest::prelude::*;
 
 #[test]
-fn a_failure_is_told_in_full() {
+fn a_failure_is_reported_in_full() {
     let mut run = run(1);
     fail(&mut run, "passes", "shade");
     let shade = check(&mut run, "passes", "shade");
@@ -25,7 +25,7 @@ fn a_failure_is_told_in_full() {
   largest error: 2.0004 of 2 levels
   without validation
 ";
-    assert_eq!(words::failure(shade), expected);
+    assert_eq!(summary::failure(shade), expected);
 }
 
 #[test]
@@ -34,19 +34,19 @@ fn a_group_and_a_run_have_one_line_each() {
     fail(&mut run, "passes", "tone");
     let groups = run.groups();
     assert_eq!(groups.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["passes", "modes", "formats", "speed"]);
-    let line = |at: usize| words::group_line(groups[at].0, &groups[at].1);
+    let line = |at: usize| summary::group_line(groups[at].0, &groups[at].1);
     assert_eq!(
         line(0),
         "passes             7 passed, 1 failed in 2.0 s; nearest to its tolerance: raycast_surface, 81 %"
     );
     assert_eq!(line(2), "formats            1 left out in 250 ms");
-    assert_eq!(words::group_line("none", &[]), "none               no checks in 0 s");
+    assert_eq!(summary::group_line("none", &[]), "none               no checks in 0 s");
     let expected = "passed 19, failed 1, left out 1 in 48 s on simulated, none 1.0, Vulkan 1.3.0 (quick, validation layer \
                     watching)";
-    assert_eq!(words::summary(&run), expected);
+    assert_eq!(summary::summary(&run), expected);
     run.validation = false;
-    assert!(words::summary(&run).ends_with("Vulkan 1.3.0 (quick)"));
-    assert!(words::summary(&empty()).starts_with("passed 0, failed 0, left out 0 in 48 s"));
+    assert!(summary::summary(&run).ends_with("Vulkan 1.3.0 (quick)"));
+    assert!(summary::summary(&empty()).starts_with("passed 0, failed 0, left out 0 in 48 s"));
 }
 
 #[test]
@@ -79,8 +79,8 @@ fn two_numbers_that_differ_look_different() {
     assert_eq!(change(0.8001, 0.8002, Unit::Value), "0.8001 -> 0.8002");
     assert_eq!(expected_and_got(0.5, 0.5 + f64::EPSILON), ["0.5", "0.5000000000000002"]);
     assert_eq!(expected_and_got(0.5, 0.5), ["0.5", "0.5"]);
-    assert_eq!(of_allowed(&Figure::error("", 2.0001, 2.0, Unit::Levels)), "2.0001 of 2 levels");
-    assert_eq!(of_allowed(&Figure::error("", 0.2, 1.0, Unit::Levels)), "0.2 of 1 level");
+    assert_eq!(value_of_limit(&Figure::error("", 2.0001, 2.0, Unit::Levels)), "2.0001 of 2 levels");
+    assert_eq!(value_of_limit(&Figure::error("", 0.2, 1.0, Unit::Levels)), "0.2 of 1 level");
     assert_eq!(
         [0.0, 0.009, 0.999, 1.0, 1.0001, 2.5, f64::INFINITY].map(percent),
         ["0 %", "under 1 %", "99 %", "100 %", "101 %", "250 %", "over 9999 %"]
@@ -111,7 +111,7 @@ fn times_become_their_median() {
 }
 
 #[test]
-fn no_text_drives_the_terminal() {
+fn no_text_controls_the_terminal() {
     assert_eq!(escaped("a\u{1b}[2J\n\u{202e}"), "a\\u{1b}[2J\\n\\u{202e}");
     assert_eq!(escaped("'quotes' and \"those\" \\ stay"), "'quotes' and \"those\" \\ stay");
     assert_eq!(escaped(&"x".repeat(5000)).len(), 604);
@@ -121,13 +121,13 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn any_run_is_told_in_lines(run in any_run()) {
+    fn any_run_is_reported_in_lines(run in any_run()) {
         let is_line = |text: &str| !text.chars().any(char::is_control);
-        prop_assert!(is_line(&words::summary(&run)));
+        prop_assert!(is_line(&summary::summary(&run)));
         for (group, outcomes) in run.groups() {
-            prop_assert!(is_line(&words::group_line(group, &outcomes)));
+            prop_assert!(is_line(&summary::group_line(group, &outcomes)));
         }
-        for text in run.outcomes.iter().map(|o: &Outcome| words::failure(o)) {
+        for text in run.outcomes.iter().map(|o: &Outcome| summary::failure(o)) {
             prop_assert!(text.ends_with('\n') && text.lines().all(is_line), "{text:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! From messages to volumes: samples of an IMAGE, whole Cartesian volumes, and freehand sweeps of tracked frames.
+//! Assembles volumes from messages: samples of an IMAGE, Cartesian volumes, and freehand sweeps of tracked frames.
 
 use super::faults::{FaultKind, Faults};
 use crate::probe::{Geometry, Grid};
@@ -12,28 +12,28 @@ use crate::source::samples::{Replaced, SampleType, StoredType, not_empty, store,
 use glam::DAffine3;
 use std::time::{Duration, Instant};
 
-/// Where the pose of a 2D frame comes from.
+/// The origin of the poses of 2D frames.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// TRANSFORM and TDATA messages, chosen as [`Pairing::new`](crate::source::igtl::Pairing::new) says: device, tolerance and patience in s.
+    /// TRANSFORM and TDATA messages, selected as [`Pairing::new`](crate::source::igtl::Pairing::new) documents: device, tolerance and patience in s.
     Messages { device: Option<String>, tolerance: f64, patience: f64 },
     /// The image's own matrix.
     Image,
 }
 
-/// How a [`Network`] behaves.
+/// Options of a [`Network`](super::Network).
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
     pub poses: Poses,
     pub freehand: freehand::CompoundingOptions,
-    /// The volume of a sweep is laid around so many first frames, or those of ten seconds or of 256 MiB.
+    /// The volume of a sweep is placed around so many first frames, or those of ten seconds or of 256 MiB.
     pub first: usize,
-    /// A sweep is given out so often, s, while frames come ...
+    /// The volume of a sweep is emitted at this interval, s, while frames arrive ...
     pub update: f64,
-    /// ... or after so many frames.
+    /// ... or after this number of frames.
     pub frames: usize,
-    /// Largest volume, bytes as it is stored.
+    /// Largest Cartesian volume, bytes of stored samples.
     pub volume_bytes: usize,
 }
 
@@ -51,11 +51,11 @@ impl Default for NetworkOptions {
     }
 }
 
-/// How long the first frames are waited for, and how many bytes of them.
+/// Longest wait for the first frames, and most bytes of them.
 const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
 const MAX_FIRST_BYTES: usize = 256 << 20;
 
-/// A frame that came before there was a volume for it.
+/// A frame that arrived before the volume was placed.
 struct BufferedFrame {
     pose: Pose,
     bytes: Vec<u8>,
@@ -64,16 +64,16 @@ struct BufferedFrame {
 pub(super) struct FreehandSweep {
     options: NetworkOptions,
     pairing: Pairing,
-    /// Of all frames; another one begins another sweep.
+    /// Sample type of all frames. A different type begins a new sweep.
     stored: StoredType,
     range: [f64; 2],
     buffered: Vec<BufferedFrame>,
     buffered_bytes: usize,
     compounder: Option<Compounder>,
-    /// When the first frame came that was not given out yet.
+    /// When the first frame arrived that was not emitted yet.
     since: Option<Instant>,
     frames: usize,
-    /// Of the last frame.
+    /// Time stamp of the last frame.
     time: Option<f64>,
 }
 
@@ -97,7 +97,7 @@ impl FreehandSweep {
         }
     }
 
-    /// Takes what is of a sweep; other messages are passed over.
+    /// Takes frames and poses; skips other messages.
     pub fn take(&mut self, message: Message, faults: &mut Faults) {
         match (message, &self.options.poses) {
             (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
@@ -129,7 +129,7 @@ impl FreehandSweep {
             Err(fault) => return faults.note(FaultKind::Image, 1, &fault),
         };
         if stored != self.stored {
-            // Values of two types do not mix.
+            // Values of two types cannot be mixed.
             (self.stored, self.compounder, self.buffered_bytes) = (stored, None, 0);
             self.buffered.clear();
         }
@@ -145,7 +145,7 @@ impl FreehandSweep {
         }
     }
 
-    /// Brings the volume up to date if that is due; then the time of its last frame.
+    /// Updates the volume if that is due. Then returns the time stamp of its last frame.
     pub fn update(&mut self, faults: &mut Faults) -> Option<Option<f64>> {
         let waited = self.since?.elapsed();
         if self.compounder.is_none() {
@@ -162,7 +162,7 @@ impl FreehandSweep {
         (!changed.is_empty()).then_some(self.time)
     }
 
-    /// Lays the volume around the first frames and compounds them.
+    /// Places the volume around the first frames and compounds them.
     fn begin(&mut self, faults: &mut Faults) {
         let buffered = std::mem::take(&mut self.buffered);
         self.buffered_bytes = 0;
@@ -183,13 +183,13 @@ impl FreehandSweep {
         self.compounder = Some(compounder);
     }
 
-    /// None before there is a volume.
+    /// None before the volume is placed.
     pub fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.compounder.as_ref()?.lattice().grid);
         Some(Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range })
     }
 
-    /// None beyond the last.
+    /// A slice; None beyond the last.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         self.compounder.as_ref()?.slice(k)
     }
@@ -197,16 +197,16 @@ impl FreehandSweep {
 
 fn push(compounder: &mut Compounder, pose: Pose, bytes: &[u8], faults: &mut Faults) {
     match compounder.push(&TrackedFrame { pose, stored: compounder.stored(), bytes }) {
-        Ok(0) => faults.note(FaultKind::Outside, 1, "the volume was laid around the first frames of the sweep"),
+        Ok(0) => faults.note(FaultKind::Outside, 1, "the volume was placed around the first frames of the sweep"),
         Ok(_) => {}
         Err(fault) => faults.note(FaultKind::Pose, 1, &fault),
     }
 }
 
-/// Lengths that are no more than this share apart are the same: a volume that is turned has its spacing computed anew in f32.
+/// Relative difference of spacings that count as equal: the spacing of a rotated volume is computed again in f32.
 const SPACING_TOLERANCE: f64 = 1e-5;
 
-/// The volume as it is after the last message.
+/// A Cartesian volume, as of the last message.
 pub(super) struct CartesianVolume {
     scalar: Scalar,
     components: u8,
@@ -217,15 +217,14 @@ pub(super) struct CartesianVolume {
 }
 
 impl CartesianVolume {
-    /// Puts an image's slices in their place, in a volume of its own if it is not of the one before; what has not come yet is 0. How many
-    /// samples read as 0 because they were not finite or denormal.
+    /// Stores the slices of an image. If it does not belong to the present volume, a new one is begun, whose missing slices are 0. Returns
+    /// the number of samples that read as 0 because they are not finite or denormal.
     ///
-    /// The volume's lateral axis is the image's i, depth is j, elevation is k; lateral and elevation are centred, depth begins at 0. Where
-    /// it lies in the patient is not used. Values that are shown as 0 and 1: all of 8 bits, otherwise the smallest and
-    /// largest of the first message.
+    /// Lateral is the image's i, depth its j, elevation its k. Lateral and elevation are centred, depth begins at 0. The position in the
+    /// patient is not used. The values shown as 0 and 1 are 0 and 255 for 8 bits, otherwise the smallest and largest of the first message.
     ///
     /// # Errors
-    /// What is wrong with an image that is passed over; the volume stays as it is.
+    /// In words, an image that cannot be used. The volume is not changed.
     pub fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
         let [i, j, _] = image.size;
         let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
@@ -276,14 +275,14 @@ impl CartesianVolume {
         Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range }
     }
 
-    /// None beyond the last.
+    /// A slice; None beyond the last.
     pub fn slice(&self, k: usize) -> Option<&[u8]> {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
 }
 
-/// Along an axis of one pixel any step may be given, or none.
+/// The grid of an image. An axis of one pixel may have any spacing, or none.
 fn grid(image: &Image) -> Grid {
     let size = image.size.map(usize::from);
     let mut spacing = image.spacing();
@@ -296,12 +295,12 @@ fn grid(image: &Image) -> Grid {
     Grid { size, spacing, origin: [half(0), 0.0, half(2)] }
 }
 
-/// Shares of red, green and blue in luminance (ITU-R BT.601).
+/// Weights of red, green and blue in luminance (ITU-R BT.601).
 const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
-/// What is added to an i8 to store it as u8.
+/// Added to an i8 to store it as u8.
 const I8_SHIFT: f64 = 128.0;
 
-/// What samples of a scalar are stored as: 8 and 16 bits as they are, signed ones shifted to begin at 0, all others as f32.
+/// The stored type of a scalar: 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others f32.
 pub(super) fn stored(scalar: Scalar) -> StoredType {
     match scalar {
         Scalar::I8 | Scalar::U8 => StoredType::U8,
@@ -310,17 +309,17 @@ pub(super) fn stored(scalar: Scalar) -> StoredType {
     }
 }
 
-/// One sample a pixel, little-endian, in the image's order, and how many of them read as 0 because no pass may see them.
+/// One sample a pixel, little-endian, in the order of the image, and the number of samples that were replaced by 0.
 ///
-/// Pixels of 3 or 4 components (red, green, blue and what else there is) become their luminance.
+/// Pixels of 3 or 4 components (red, green, blue, and any fourth) become their luminance.
 ///
 /// # Errors
-/// Pixels of another number of components, which have no brightness.
+/// Pixels with another number of components.
 pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
     let scalar = image.scalar;
     let mut bytes = match (image.components, scalar) {
         (1, Scalar::I8) => {
-            // Adding 128 to an i8 turns its top bit.
+            // Adding 128 to an i8 flips its top bit.
             image.bytes.iter_mut().for_each(|byte| *byte ^= 0x80);
             image.bytes
         }
@@ -349,7 +348,7 @@ pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
     Ok((bytes, not_finite + denormal))
 }
 
-/// Little-endian; a number beyond f32 becomes infinite later, and 0 with that.
+/// The value of little-endian bytes. A number beyond f32 becomes infinite later, and then 0.
 fn value(scalar: Scalar, bytes: &[u8]) -> f64 {
     match (scalar, bytes) {
         (Scalar::U8, [a]) => f64::from(*a),
@@ -364,7 +363,7 @@ fn value(scalar: Scalar, bytes: &[u8]) -> f64 {
     }
 }
 
-/// A luminance, as the file's type would have it; an i16 is shifted with all others of its kind.
+/// Stores a luminance in the type of the image. An i16 is shifted later, with all samples.
 fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
     match scalar {
         Scalar::U8 => bytes.push(value.round() as u8),

@@ -1,13 +1,14 @@
-//! What is amiss, reported at most once a second each, with how often it was.
+//! Faults of the network source. Each kind is reported at most once a second, with its count.
 
 use crate::files::escaped;
 use std::time::{Duration, Instant};
 
+/// Shortest time between two reports of one kind.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest reason, in characters.
+/// Longest reason, characters.
 const MAX_REASON: usize = 400;
 
-/// What may be amiss.
+/// The kinds of faults.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FaultKind {
     Unreachable,
@@ -16,7 +17,7 @@ pub(super) enum FaultKind {
     Checksum,
     Malformed,
     Dropped,
-    /// An image that is no volume and no frame.
+    /// An image that is neither a volume nor a frame.
     Image,
     Samples,
     /// A frame without a pose.
@@ -44,7 +45,7 @@ const KINDS: [(FaultKind, &str); 12] = [
 #[derive(Clone, Default)]
 struct Fault {
     count: u64,
-    /// The last one's.
+    /// Reason of the last one.
     why: String,
     reported: Option<Instant>,
 }
@@ -67,8 +68,8 @@ impl Faults {
         }
     }
 
-    /// One that has not been reported for a second.
-    pub fn due(&mut self) -> Option<String> {
+    /// A fault whose kind was not reported within the last second.
+    pub(crate) fn due(&mut self) -> Option<String> {
         let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
         let mut faults = self.faults.iter_mut().zip(KINDS);
         let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;

@@ -1,8 +1,8 @@
-//! OpenIGTLink as a live source: whole volumes as they come, and tracked 2D frames compounded into one.
+//! OpenIGTLink as a live source: Cartesian volumes, and tracked 2D frames that are compounded into a volume.
 //!
-//! An IMAGE of several slices is a Cartesian volume; one that brings only some whole slices of it updates those. An IMAGE of one slice is a
-//! frame of a freehand sweep. Whichever changed is then given slice by slice under a new volume's number, always all of its slices, so that
-//! whoever receives them has a whole volume every time and need not know what is behind it.
+//! An IMAGE of several slices is a Cartesian volume; one with only some complete slices of it updates those. An IMAGE of one slice is a
+//! frame of a freehand sweep. After a change, all slices of the volume are emitted under a new volume number, so that the receiver
+//! always gets complete volumes and need not know their origin.
 
 mod assembly;
 mod faults;
@@ -18,38 +18,38 @@ use faults::{FaultKind, Faults};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// How often statistics are looked at while nothing comes.
+/// How often the statistics are checked while nothing arrives.
 const POLL: Duration = Duration::from_millis(100);
-/// Messages that are looked through although patience is at its end, so that one who never waits gets on, too.
+/// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
 const MAX_AT_ONCE: usize = 256;
 
-/// What comes from an OpenIGTLink server, which is connected to again whenever it is lost.
+/// A live source: the images of an OpenIGTLink server. It reconnects whenever the connection is lost, and never ends by itself.
 ///
-/// Nothing is taken from the client while slices are given out; what then does not fit its queue is lost by whole messages, and counted.
-/// What is amiss comes as [`Event::Fault`], each kind at most once a second and with how often it was. It never ends by itself.
+/// No messages are processed while slices are emitted; messages that then exceed the client's queue are dropped and counted. Faults are
+/// reported as [`Event::Fault`], each kind at most once a second and with its count.
 ///
-/// Memory: the [`Client`]'s, one volume of at most `volume_bytes` and the message it came in, the first frames of a sweep (256 MiB), and
-/// what a [`Compounder`](freehand::Compounder) and a [`Pairing`](super::Pairing) take.
+/// Memory: that of the [`Client`], one volume of at most `volume_bytes` and its message, the first frames of a sweep (256 MiB), and that
+/// of a [`Compounder`](crate::source::freehand::Compounder) and a [`Pairing`](super::Pairing).
 pub struct Network {
     client: Client,
-    /// What the faults have been told of.
+    /// Statistics that were reported as faults.
     known: ClientStatistics,
     last_error: Option<String>,
-    /// There ever was a connection.
+    /// There was at least one connection.
     connected: bool,
-    /// Connections.
+    /// Lost connections.
     lost: u64,
     faults: Faults,
     whole: Option<CartesianVolume>,
     sweep: FreehandSweep,
     volume_bytes: usize,
-    /// Given with the last `Begin`.
+    /// Header of the last `Begin`.
     begun: Option<Header>,
     output: Option<VolumeOutput>,
     volumes: u32,
 }
 
-/// A volume whose slices are given out.
+/// A volume whose slices are being emitted.
 struct VolumeOutput {
     of_sweep: bool,
     begin: bool,
@@ -59,10 +59,10 @@ struct VolumeOutput {
 }
 
 impl Network {
-    /// Starts connecting, as [`Client::connect`] does.
+    /// Starts to connect, as [`Client::connect`].
     ///
     /// # Errors
-    /// The operating system starts no thread.
+    /// The thread cannot be started.
     pub fn connect(address: &str, options: NetworkOptions) -> io::Result<Network> {
         Ok(Network {
             client: Client::connect(address, options.client.clone())?,
@@ -80,13 +80,13 @@ impl Network {
         })
     }
 
-    /// Of the connection.
+    /// Statistics of the connection.
     pub fn statistics(&self) -> ClientStatistics {
         self.client.statistics()
     }
 
-    /// Tells the faults what has happened to the connection since the last time.
-    fn look(&mut self) {
+    /// Records what happened to the connection since the last call.
+    fn check_connection(&mut self) {
         let now = self.client.statistics();
         let error = self.client.last_error();
         let why = error.as_deref().unwrap_or("no reason is known");
@@ -95,12 +95,12 @@ impl Network {
         faults.note(FaultKind::Malformed, now.malformed - known.malformed, why);
         faults.note(FaultKind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
         faults.note(FaultKind::Again, now.reconnects - known.reconnects, "");
-        // Every connection but the one that stands was lost, however short it was.
+        // Every connection except the present one was lost.
         self.connected |= now.connected || now.bytes > 0 || now.reconnects > 0;
         let lost = now.reconnects + u64::from(self.connected) - u64::from(now.connected);
         faults.note(FaultKind::Lost, lost.saturating_sub(self.lost), why);
-        let is_told = lost > self.lost || error == self.last_error;
-        if !now.connected && !is_told && error.is_some() {
+        let is_reported = lost > self.lost || error == self.last_error;
+        if !now.connected && !is_reported && error.is_some() {
             faults.note(FaultKind::Unreachable, 1, why);
         }
         (self.known, self.last_error, self.lost) = (now, error, lost);
@@ -113,7 +113,7 @@ impl Network {
                 match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
                     Ok(replaced) => {
                         self.faults.note(FaultKind::Samples, replaced, "they read as 0");
-                        self.give(false, time);
+                        self.start_output(false, time);
                     }
                     Err(fault) => self.faults.note(FaultKind::Image, 1, &fault),
                 }
@@ -122,8 +122,8 @@ impl Network {
         }
     }
 
-    /// Begins to give a volume out.
-    fn give(&mut self, of_sweep: bool, time: Option<f64>) {
+    /// Starts to emit a volume.
+    fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
         let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
         let Some(header) = header else { return };
         if let Err((field, fault)) = header.check() {
@@ -135,8 +135,8 @@ impl Network {
         self.volumes = self.volumes.wrapping_add(1);
     }
 
-    /// What is next of the volume that is given out.
-    fn given(&mut self) -> Option<Event> {
+    /// The next event of the volume that is being emitted.
+    fn next_output(&mut self) -> Option<Event> {
         let output = self.output.as_mut()?;
         if std::mem::take(&mut output.begin) {
             return self.begun.clone().map(|header| Event::Begin(Box::new(header)));
@@ -161,19 +161,19 @@ impl Live for Network {
         let started = Instant::now();
         let mut taken = 0;
         loop {
-            self.look();
+            self.check_connection();
             if let Some(fault) = self.faults.due() {
                 return Event::Fault(fault);
             }
-            if let Some(event) = self.given() {
+            if let Some(event) = self.next_output() {
                 return event;
             }
             if let Some(time) = self.sweep.update(&mut self.faults) {
-                self.give(true, time);
+                self.start_output(true, time);
                 continue;
             }
             let left = patience.saturating_sub(started.elapsed());
-            // Poses alone may come without end.
+            // Poses alone may arrive without end.
             if left.is_zero() && taken >= MAX_AT_ONCE {
                 return Event::Idle;
             }

@@ -1,4 +1,4 @@
-//! Hands that do anything, sources that end anywhere, devices that are lost: nothing breaks, and nothing is left behind.
+//! Random input, sources that end anywhere, lost devices: nothing breaks, and nothing leaks.
 
 mod random_source;
 
@@ -13,19 +13,19 @@ use random_source::Wild;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// It runs in a process of its own, whose memory no other test uses.
-const TEST: &str = "console::monkey::nothing_that_hands_sources_and_devices_do_breaks_it";
-/// Resident memory that the second half may take more than the first, bytes: pictures are large at times, and what they leave is not
-/// given back at once.
+const TEST: &str = "console::monkey::random_input_sources_and_device_losses_break_nothing";
+/// Growth of resident memory allowed in the second half, bytes: some pictures are large, and their memory is not
+/// returned at once.
 const GROWTH: u64 = 128 << 20;
 
-/// Prevents panics, messages of validation, leaks, and a console that draws no more, after whatever was done to it. MONKEY_SECONDS goes
-/// on for longer, MONKEY_SEED does the same again.
+/// Prevents panics, validation messages, leaks, and a console that stops drawing, after any sequence of events. MONKEY_SECONDS continues
+/// for longer, MONKEY_SEED repeats a run.
 #[test]
-fn nothing_that_hands_sources_and_devices_do_breaks_it() {
+fn random_input_sources_and_device_losses_break_nothing() {
     if own_process::is_child() {
         return run();
     }
-    // Validation is silent, and without it memory is bounded: its layers grow with every pipeline.
+    // With validation no message; without it bounded memory, because its layers grow with every pipeline.
     for watched in ["1", "0"] {
         let printed = own_process::passes(own_process::command(TEST).env("MONKEY_WATCHED", watched));
         printed.lines().filter(|line| line.contains("monkey:")).for_each(|line| println!("{line}"));
@@ -92,7 +92,7 @@ impl Monkey {
         ((self.noise.next() * n as f64) as usize).min(n - 1)
     }
 
-    /// As a rule something sensible.
+    /// Usually a sensible value.
     fn number(&mut self) -> f64 {
         const ODD: [f64; 10] =
             [0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300, f64::MIN_POSITIVE, 1e9, -1e9, -0.0];
@@ -146,7 +146,7 @@ impl Monkey {
             11 => Command::StepSlider(self.below(SLIDERS.len() + 2), [i32::MIN, i32::MAX, -1, 1, 3][self.below(5)]),
             12 => Command::StepCine([i32::MIN, i32::MAX, -1, 1, 5][self.below(5)]),
             13 => Command::SeekCine([0, 1, 3, usize::MAX][self.below(4)]),
-            // Far from the edges, where pictures are of something.
+            // Far from the edges, where the picture shows something.
             14 => Command::Reset,
             _ => KEY_BINDINGS[self.below(KEY_BINDINGS.len())].command,
         }
@@ -155,7 +155,7 @@ impl Monkey {
     fn step(&mut self) {
         match self.below(200) {
             0..=3 => {
-                // Small ones as a rule: there are more of them to a second.
+                // Usually small ones: more of them fit into a second.
                 let edge = |m: &mut Monkey, most: f64| most.powf(m.noise.next()).round() as u32;
                 let size = if self.below(8) == 0 { [700.0, 500.0] } else { [160.0, 120.0] };
                 let size = size.map(|most| edge(self, most));
@@ -191,15 +191,15 @@ impl Monkey {
             Err(ConsoleError::DeviceLost(_)) => {
                 self.lost += 1;
                 let other = Device::watched(self.watched);
-                // What cannot be made of it now is made of the next source's geometry.
+                // Settings that do not fit now apply to the geometry of the next source.
                 let _ = self.desk.console.revive(&other, None);
-                // Looked at here for what it said.
+                // Its messages are checked here.
                 self.device = other;
             }
         }
     }
 
-    /// No failure is planned any more, the volume of a source of ours is shown as at the start, and drawn as by itself.
+    /// Without further injected faults, a volume of a normal source is shown as by a separate renderer.
     fn rest(&mut self) {
         self.device.faults.inject(InjectionPoint::Wait, u32::MAX, vk::Result::SUCCESS);
         self.calm.store(true, Ordering::Relaxed);
@@ -217,7 +217,7 @@ impl Monkey {
         self.desk.begin();
         self.desk.frames(body(1));
         let begun = Instant::now();
-        // Panels may lie beside it.
+        // Panels may take space next to it.
         let settings = self.desk.drawn();
         let expected = headless(&self.device, &settings, &body(1));
         loop {
@@ -230,12 +230,12 @@ impl Monkey {
             assert!(begun.elapsed() < BOUND, "the picture at the end is another");
         }
         self.calm.store(false, Ordering::Relaxed);
-        // The wild ones come again.
+        // Random sources follow again.
         self.desk.say.send(Event::End(None)).expect("listens");
     }
 }
 
-/// Bytes of this process that lie in memory.
+/// Resident memory of this process, bytes.
 fn resident() -> u64 {
     let pages = std::fs::read_to_string("/proc/self/statm").expect("statm");
     4096 * pages.split(' ').nth(1).expect("resident").parse::<u64>().expect("pages")

@@ -1,4 +1,4 @@
-//! A source that does whatever a source may do.
+//! A source with random behaviour.
 
 use super::*;
 use crate::common::gpu::{Noise, linear};
@@ -6,7 +6,7 @@ use echolume::probe::Geometry;
 use echolume::source::recorder::Header;
 use std::collections::VecDeque;
 
-/// Volumes of a body, at times of another probe, with frames that are missing or wrong; it ends after some.
+/// Volumes of a body, sometimes of another probe, with missing or wrong frames; it ends after some.
 pub struct Wild {
     noise: Noise,
     said: VecDeque<Event>,
@@ -17,7 +17,7 @@ pub struct Wild {
 }
 
 impl Wild {
-    /// `calm`: it ends at once where that is set.
+    /// It ends at once if `calm` is set.
     pub fn new(seed: u64, calm: Arc<AtomicBool>) -> Wild {
         let mut noise = Noise(seed);
         let last = noise.range(2.0, 60.0) as u32;
@@ -47,7 +47,7 @@ impl Wild {
                 3 => self.said.push_back(Event::Fault("the cable is bent".into())),
                 4 => self.said.push_back(Event::Frame(frame.clone())),
                 5 => {
-                    // In two parts, of lines.
+                    // In two parts of lines.
                     let line = if self.is_other { 48 } else { 64 };
                     let rest = frame.bytes.split_off(whole / line / 2 * line);
                     self.said.push_back(Event::Lines { frame: frame.clone(), first: 0 });

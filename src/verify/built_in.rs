@@ -1,0 +1,485 @@
+//! Inputs built into the program: probes, scenes, bodies and noise, the same on every machine. Tests use them too.
+
+use crate::passes::Texels;
+use crate::probe::{Advance, Array, Axis, Geometry, Grid, Indices, Motion, Probe};
+use crate::scene::{Input, Scene, Settings};
+use crate::source::StoredType;
+use glam::DVec3;
+
+/// Specification of a scene.
+#[derive(Clone)]
+pub struct SceneSpec {
+    pub name: String,
+    geometry: Geometry,
+    input: Input,
+    /// Settings as TOML.
+    toml: String,
+    /// Use pictures of floats, whatever the settings say.
+    floats: bool,
+}
+
+impl SceneSpec {
+    fn new(name: &str, geometry: &Geometry, input: Input, toml: String) -> SceneSpec {
+        SceneSpec { name: name.into(), geometry: geometry.clone(), input, toml, floats: false }
+    }
+
+    /// Builds the scene.
+    ///
+    /// # Errors
+    /// One line: the settings are invalid.
+    pub fn build(&self) -> Result<Scene, String> {
+        let mut scene =
+            scene(self.geometry.clone(), self.input, &self.toml).map_err(|e| format!("{}: {e}", self.name))?;
+        scene.settings.post.floats |= self.floats;
+        Ok(scene)
+    }
+}
+
+/// Scenes that together need every pass, in every variant of the geometry.
+pub fn scenes() -> Vec<SceneSpec> {
+    let planes = plane_scenes();
+    // Planes that are rendered directly to 8 bits are also rendered via floats.
+    let straight = planes.iter().filter(|spec| spec.build().is_ok_and(|scene| scene.tones_planes()));
+    let in_floats =
+        straight.map(|spec| SceneSpec { name: format!("{}, in floats", spec.name), floats: true, ..spec.clone() });
+    let in_floats: Vec<SceneSpec> = in_floats.collect();
+    ray_scenes().into_iter().chain(planes).chain(in_floats).collect()
+}
+
+/// A scene with settings from TOML.
+///
+/// # Errors
+/// One line: the settings are invalid.
+pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, String> {
+    let settings: Settings = toml::from_str(toml).map_err(|e| format!("settings: {}", e.message()))?;
+    Scene::new(geometry, input, settings).map_err(|e| e.to_string())
+}
+
+/// Pseudorandom numbers in 0..1, the same on every machine (SplitMix64).
+pub struct Noise(pub u64);
+
+impl Noise {
+    // Not an iterator: it never ends.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// A small abdominal wobbler: 24 lines over 66 deg, 9 frames over 27 deg, 64 samples.
+pub fn wobbler() -> Probe {
+    Probe {
+        array: Array::Curved { radius: 20.0 },
+        lines: Axis::centred(0.05, 24),
+        start_depth: 2.0,
+        sample_pitch: 0.8,
+        samples: 64,
+        motion: Motion::Fan { wobble_radius: 12.0 },
+        slices: Axis::centred(0.06, 9),
+        advance: Advance::None,
+        sound_speed: 1540.0,
+    }
+}
+
+/// The same probe with frames at uneven angles.
+pub fn uneven(mut probe: Probe) -> Probe {
+    let at = |k: usize| probe.slices.at(k as f64) + 0.012 * (1.7 * k as f64).sin();
+    probe.slices = Axis::from_table((0..probe.slices.len()).map(at).collect());
+    probe
+}
+
+/// A linear array moved sideways.
+pub fn linear() -> Probe {
+    Probe {
+        array: Array::Linear,
+        lines: Axis::centred(1.1, 20),
+        motion: Motion::Translated,
+        slices: Axis::centred(1.5, 7),
+        samples: 48,
+        ..wobbler()
+    }
+}
+
+pub fn still() -> Probe {
+    Probe { motion: Motion::Still { thickness: 3.0 }, slices: Axis::centred(1.0, 1), ..wobbler() }
+}
+
+pub fn cartesian(size: [usize; 3]) -> Geometry {
+    Geometry::Cartesian(Grid { size, spacing: [0.5, 0.4, 0.9], origin: [-4.0, 1.0, -3.0] })
+}
+
+pub const BYTES: Input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
+pub const FLOATS: Input = Input { stored: StoredType::F32, range: [0.0, 1.0] };
+
+/// Frames of a volume with the values that their textures yield, from a function of texel and slice.
+pub fn frames(scene: &Scene, f: impl Fn([usize; 3]) -> f64) -> Vec<Texels> {
+    let [width, height] = scene.frame_size().map(|n| n as usize);
+    let one = |k| Texels::from_fn([width, height, 1], 1, |[x, y, _], _| f([x, y, k]));
+    (0..scene.slices() as usize).map(one).collect()
+}
+
+/// Frames of a volume that shows a body, given as a function of space (mm).
+pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
+    let place = |[i, j, k]: [usize; 3]| match &scene.geometry {
+        Geometry::Sweep(probe) => probe.to_space(Indices { sample: i as f64, line: j as f64, slice: k as f64 }),
+        Geometry::Cartesian(grid) => {
+            let at = [i, j, k];
+            DVec3::from_array(std::array::from_fn(|a| grid.origin[a] + grid.spacing[a] * at[a] as f64))
+        }
+    };
+    frames(scene, |at| body(place(at)))
+}
+
+/// Names of modes with their settings.
+const MODES: [(&str, &str); 14] = [
+    ("vr", "mode = 'vr'"),
+    ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
+    ("vr, first hit", "mode = 'vr'\nvolume = { shading = 'first-hit' }"),
+    ("sr", "mode = 'sr'"),
+    ("mixed", "mode = 'mixed'"),
+    ("mip", "mode = 'mip'"),
+    ("minip", "mode = 'minip'"),
+    ("mean", "mode = 'mean'"),
+    ("plane", "mode = 'plane'\nplanes = { azimuth = 25, tilt = -15, roll = 40, thickness = 2.5 }"),
+    ("orthogonal", "mode = 'orthogonal'"),
+    ("tomography", "mode = 'tomography'\nplanes = { columns = 3, rows = 2, spacing = 2.5 }"),
+    ("cube", "mode = 'cube'"),
+    ("4-up, sr", "mode = 'sr'\nlayout = 'four'"),
+    ("4-up, vr", "mode = 'vr'\nlayout = 'four'"),
+];
+
+/// Every mode once, each with filters of every stage, in one small sweep.
+pub fn modes() -> Vec<SceneSpec> {
+    let sweep = Geometry::Sweep(wobbler());
+    MODES.iter().map(|(name, toml)| SceneSpec::new(name, &sweep, BYTES, format!("{toml}\n{ALL_FILTERS}"))).collect()
+}
+
+/// Frames of a wavy wall between two slightly uneven tissues: structure to render and filter in every mode. The wall has another depth for
+/// each volume `number`.
+pub fn wall(scene: &Scene, number: u32) -> Vec<Texels> {
+    let shift = 4.0 * f64::from(number);
+    body_frames(scene, |p| {
+        let depth = p.y - 42.0 - shift + 3.0 * (0.25 * p.x).sin() + 2.0 * (0.3 * p.z).cos();
+        let uneven = 0.08 * (1.9 * p.x + shift).sin() * (1.3 * p.y).cos() * (1.7 * p.z).cos();
+        (0.15 + 0.6 * (0.5 + 0.5 * depth).clamp(0.0, 1.0) + uneven).clamp(0.0, 1.0)
+    })
+}
+
+pub const TURNED: &str = "azimuth = 25, tilt = -15, roll = 40";
+
+/// All variants of the geometry, by name.
+pub fn geometries() -> Vec<(&'static str, Geometry)> {
+    let mut moved = wobbler();
+    moved.advance = Advance::Same(0.7 * moved.slices.pitch());
+    let mut mixed = uneven(wobbler());
+    mixed.advance = Advance::Each((0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect());
+    vec![
+        ("fan", Geometry::Sweep(wobbler())),
+        ("fan, motor moving", Geometry::Sweep(moved)),
+        ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
+        ("fan, uneven and mixed", Geometry::Sweep(mixed)),
+        ("linear array, translated", Geometry::Sweep(linear())),
+        ("single frame", Geometry::Sweep(still())),
+        ("Cartesian", cartesian([17, 23, 9])),
+    ]
+}
+
+/// Scenes of planes, tomography and the block: each mode in every geometry, and extremes in one.
+fn plane_scenes() -> Vec<SceneSpec> {
+    let mut scenes = Vec::new();
+    let base = "slices = { pixels = 33 }\nray = { sampling = 'exact' }";
+    for (name, geometry) in geometries() {
+        for (mode, rest) in [
+            ("plane", format!("picture = {{ size = [23, 31] }}\nplanes = {{ {TURNED}, thickness = 2.5 }}")),
+            ("orthogonal", "picture = { size = [37, 29] }".into()),
+            ("cube", "picture = { size = [21, 25] }\ncamera = { azimuth = 35, elevation = -20, roll = 5 }".into()),
+        ] {
+            let toml = format!("mode = '{mode}'\n{base}\n{rest}");
+            scenes.push(SceneSpec::new(&format!("{name}, {mode}"), &geometry, BYTES, toml));
+        }
+    }
+    for toml in [
+        format!("mode = 'orthogonal'\npicture = {{ size = [41, 33] }}\nplanes = {{ {TURNED}, position = [3, 20, -2] }}"),
+        "mode = 'orthogonal'\npicture = { size = [2, 2] }".into(),
+        "mode = 'orthogonal'\nplanes = { lines = false, window = [0.3, 0.6] }\npicture = { size = [33, 20] }".into(),
+        "mode = 'tomography'\nplanes = { columns = 5, rows = 3, spacing = 3.5, zoom = 1.7 }\npicture = { size = [43, 31] }".into(),
+        "mode = 'tomography'\nplanes = { columns = 2, rows = 7, plane = 'c', thickness = 9, slab = 'max' }\npicture = { size = [31, 31] }".into(),
+        "mode = 'plane'\nplanes = { plane = 'b', thickness = 7, slab = 'min' }\npicture = { size = [19, 26] }\npost = { colour_map = 'ice' }".into(),
+        "mode = 'plane'\nplanes = { position = [900, 20, 0], plane = 'b' }\npicture = { size = [9, 9] }".into(),
+        format!("mode = 'plane'\nplanes = {{ {TURNED} }}\npicture = {{ size = [30, 30] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}, {{ at = [5, 0, 0], normal = [1, 0, 0] }}]"),
+        "mode = 'vr'\nlayout = 'four'\npicture = { size = [27, 31] }".into(),
+        "mode = 'cube'\npicture = { size = [40, 30] }\ncamera = { azimuth = -140, elevation = 25, field_of_view = 40 }
+         cube = { shading = 0.8, inset = { left = 9, near = 8, top = 2.5, far = 12 }, tilt = { near = [20, -10], top = [-5, 12] } }
+         clip = [{ at = [0, 40, 0], normal = [0.5, 0.5, -0.3] }]".into(),
+        "mode = 'cube'\npicture = { size = [33, 25] }\ncamera = { azimuth = 90 }\ncube = { shading = 0, edges = false, inset = { left = 12 } }".into(),
+        "mode = 'cube'\npicture = { size = [23, 25] }\ncamera = { field_of_view = 70, zoom = 20 }\ncube = { inset = { near = 10 } }".into(),
+    ] {
+        scenes.push(SceneSpec::new(&toml.replace('\n', ", "), &Geometry::Sweep(wobbler()), BYTES, format!("{toml}\n{base}")));
+    }
+    scenes
+}
+
+/// Settings with every filter, light and adjustment at once.
+pub const ALL_FILTERS: &str = "
+    slices = { pixels = 41, median = true, sigma = { window = 5, sigma = 0.08 }, smooth = { lateral = 2.0, depth = 3.0, elevation = 0.8 } }
+    distance = { median = 5, bilateral = { pixels = 1.5, distance = 2.0, repeat = 2 }, sigma = { window = 7, sigma = 0.7 } }
+    post = { sigma = { window = 5, sigma = 0.05 }, brightness = 0.05, contrast = 1.3, gamma = 1.8, colour_map = 'skin' }
+    light = { texture = 0.4, shininess = 40.0, shadow = { softness = 0.3 }, occlusion = {}, position = [5.0, 10.0, 30.0] }
+    picture = { size = [37, 29] }
+    camera = { azimuth = 20, elevation = -35, roll = 10, field_of_view = 30 }
+    ray = { step = 0.5, sampling = 'exact' }
+    surface = { threshold = 0.12 }
+";
+
+fn moved(mut probe: Probe, share: f64) -> Probe {
+    probe.advance = Advance::Same(share * probe.slices.pitch());
+    probe
+}
+
+fn ray_scenes() -> Vec<SceneSpec> {
+    let mut scenes = Vec::new();
+    let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
+        if toml.starts_with("mode") {
+            scenes.push(SceneSpec::new(name, geometry, input, toml.into()));
+            return;
+        }
+        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }"] {
+            let toml = format!("mode = {mode}\n{toml}");
+            scenes.push(SceneSpec::new(&format!("{name}, {mode}"), geometry, input, toml));
+        }
+    };
+    let sweep = Geometry::Sweep(wobbler());
+    add("fan with every filter", &sweep, BYTES, ALL_FILTERS);
+    let each = (0..9).map(|k| if k < 4 { 0.02 } else { -0.02 }).collect();
+    let geometries = [
+        ("fan, motor moving", Geometry::Sweep(moved(wobbler(), 0.7))),
+        ("fan, uneven", Geometry::Sweep(uneven(wobbler()))),
+        ("fan, uneven and moving", Geometry::Sweep(Probe { advance: Advance::Each(each), ..uneven(wobbler()) })),
+        ("linear array, translated", Geometry::Sweep(linear())),
+        ("linear array, translated and moving backwards", Geometry::Sweep(moved(linear(), -0.9))),
+        ("single frame", Geometry::Sweep(still())),
+        ("Cartesian", cartesian([17, 23, 9])),
+        ("Cartesian, one slice", cartesian([9, 8, 1])),
+    ];
+    for (name, geometry) in &geometries {
+        let toml = "slices = { pixels = 33 }
+            picture = { size = [19, 33] }
+            camera = { azimuth = -30, elevation = 25 }
+            ray = { step = 0.45, sampling = 'exact' }";
+        add(name, geometry, BYTES, toml);
+    }
+    for format in ["r8", "r16", "r16f", "r32f"] {
+        for sampling in ["hardware", "exact", "quads"] {
+            let toml = format!(
+                "slices = {{ pixels = 24, format = '{format}' }}\npicture = {{ size = [16, 16] }}\nray = {{ step = 0.6, sampling = '{sampling}' }}"
+            );
+            add(&format!("volume in {format}, sampling {sampling}"), &sweep, BYTES, &toml);
+        }
+    }
+    for (name, stored, range) in [("u16", StoredType::U16, [1000.0, 40000.0]), ("f32", StoredType::F32, [-0.25, 1.5])] {
+        let toml = "slices = { pixels = 9 }\npicture = { size = [1, 1] }\nray = { sampling = 'exact' }";
+        add(&format!("frames in {name}, one pixel"), &sweep, Input { stored, range }, toml);
+    }
+    for (name, stored, range, conditioning) in [
+        ("decimated, the last sample left over", StoredType::U8, [0.0, 255.0], "samples = 13"),
+        ("decimated to the least", StoredType::U8, [0.0, 255.0], "samples = 2"),
+        ("decimated without a low pass", StoredType::U8, [0.0, 255.0], "samples = 22, low_pass = 0"),
+        (
+            "every conditioning",
+            StoredType::U16,
+            [1000.0, 40000.0],
+            "samples = 17, low_pass = 1.3, dynamic_range = 20, tgc = [{ depth = 3, gain = -20 }, { depth = 40, gain = 35.5 }]",
+        ),
+        ("log alone", StoredType::F32, [-0.25, 1.5], "dynamic_range = 60"),
+        ("low pass wider than the line", StoredType::F32, [0.0, 1.0], "low_pass = 32"),
+        (
+            "gain of compressed lines",
+            StoredType::U8,
+            [0.0, 255.0],
+            "compressed_range = 45, tgc = [{ depth = 0, gain = 12 }, { depth = 12.5, gain = -30 }]",
+        ),
+    ] {
+        let toml =
+            format!("conditioning = {{ {conditioning} }}\nslices = {{ pixels = 33 }}\npicture = {{ size = [9, 7] }}");
+        add(name, &sweep, Input { stored, range }, &toml);
+        add(&format!("{name}, linear array"), &Geometry::Sweep(linear()), Input { stored, range }, &toml);
+    }
+    for (name, toml) in [
+        ("sigma 0", "slices = { pixels = 20, sigma = { window = 7, sigma = 0.0 } }"),
+        (
+            "infinite sigma",
+            "slices = { pixels = 20, sigma = { window = 63, sigma = inf } }\npost = { sigma = { window = 9, sigma = inf } }",
+        ),
+        (
+            "first crossing, no rough detector",
+            "surface = { place = 'first-crossing', rough = 1 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "dark cavity, roughest",
+            "surface = { sign = 'dark', rough = 8, rough_threshold = 0.05 }\nslices = { pixels = 30 }",
+        ),
+        ("parallel to a face", "camera = { elevation = 90 }\nslices = { pixels = 30 }"),
+        ("inside the volume", "camera = { field_of_view = 90, zoom = 20 }\nslices = { pixels = 30 }"),
+        ("shadow, hard", "light = { shadow = { softness = 0.0, bias = 0.4 } }\nslices = { pixels = 12 }"),
+        (
+            "shadow, soft, near light",
+            "light = { position = [10.0, 15.0, 25.0], shadow = {} }\nslices = { pixels = 12 }",
+        ),
+        ("occlusion", "light = { occlusion = { radius = 8.0, strength = 1.5 } }\nslices = { pixels = 12 }"),
+        ("skin", "light = { skin = {}, shadow = {}, occlusion = {} }\nslices = { pixels = 30 }"),
+        ("light on the surface", "light = { position = [0.0, 0.0, 0.0], shadow = {} }\nslices = { pixels = 12 }"),
+        (
+            "light behind",
+            "light = { direction = [0.0, 0.0, -1.0], shadow = {}, skin = { translucency = 1.0 } }\nslices = { pixels = 12 }",
+        ),
+        ("second surface", "surface = { number = 2, threshold = 0.05 }\nslices = { pixels = 30 }"),
+        (
+            "third surface, no rough detector",
+            "surface = { number = 3, threshold = 0.05, rough = 1, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        ("adaptive", "surface = { detector = 'adaptive', threshold = 0.02 }\nslices = { pixels = 30 }"),
+        (
+            "adaptive, no rough detector, second surface",
+            "surface = { detector = 'adaptive', threshold = 0.02, noise = 1.5, rough = 1, number = 2 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "adaptive, dark, roughest, first crossing",
+            "surface = { detector = 'adaptive', sign = 'dark', rough = 8, threshold = 0.02, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        ("lasting", "surface = { detector = 'lasting', threshold = 0.02, noise = 1.0 }\nslices = { pixels = 30 }"),
+        (
+            "lasting, no rough detector, first crossing",
+            "surface = { detector = 'lasting', threshold = 0.02, rough = 1, noise = 1.0, place = 'first-crossing' }\nslices = { pixels = 30 }",
+        ),
+        (
+            "lasting, dark, second surface",
+            "surface = { detector = 'lasting', threshold = 0.02, sign = 'dark', number = 2, noise = 0.0, rough = 3 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "enhanced sigma",
+            "post = { enhanced_sigma = { window = 3, largest = 11, sigma = 0.08 } }\nslices = { pixels = 12 }",
+        ),
+        (
+            "both sigmas",
+            "post = { sigma = { window = 3, sigma = 0.1 }, enhanced_sigma = { window = 5, largest = 5, sigma = inf } }\nslices = { pixels = 12 }",
+        ),
+        ("smallest", "mode = 'minip'\nslices = { pixels = 30 }"),
+        ("mean", "mode = 'mean'\nslices = { pixels = 30 }"),
+        (
+            "clipped, lit volume",
+            "mode = 'vr'\nvolume = { shading = 'first-hit', hit = 0.1 }\nlight = { shadow = {}, occlusion = {} }\nslices = { pixels = 30 }
+             clip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }, { at = [5, 0, 0], normal = [1, 0, 0] }]",
+        ),
+        ("clipped surface", "slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]"),
+        ("veil over a surface", "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { occlusion = {} }\nslices = { pixels = 30 }"),
+        ("veil and shadow", "mode = 'mixed'\nlight = { shadow = {} }\nslices = { pixels = 30 }"),
+        ("lit volume, shadow", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {}, skin = {} }\nslices = { pixels = 12 }"),
+        ("lit volume, occlusion", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { occlusion = {} }\nslices = { pixels = 12 }"),
+        ("depth-coded", "mode = 'vr'\nvolume = { shading = 'depth-coded', transfer = 'warm' }\nslices = { pixels = 30 }"),
+        ("Riemann", "mode = 'vr'\nvolume = { compositing = 'riemann', transfer = 'cool' }\nslices = { pixels = 30 }"),
+        ("pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', threshold = 0.5 }\nslices = { pixels = 30 }"),
+        ("two rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { rays = 2 }"),
+        ("half the rays", "mode = 'vr'\nslices = { pixels = 12 }\nray = { half = true }"),
+        (
+            "4-up, half the rays, filters in their pixels",
+            "layout = 'four'\nslices = { pixels = 12 }\ndistance = { median = 9, sigma = { window = 7 } }\nray = { half = true }",
+        ),
+        ("4-up, three rays", "mode = 'mip'\nlayout = 'four'\nslices = { pixels = 12 }\nray = { rays = 3 }"),
+        (
+            "every diffusion, explicit",
+            "slices = { pixels = 20, perona_malik = { repeat = 3 }, smooth = { lateral = 1.0 } }\n\
+             distance = { perona_malik = { edge = 0.8, conductance = 'exponential', step = 0.25, repeat = 2 } }\n\
+             post = { perona_malik = { edge = 0.3, conductance = 'exponential', repeat = 3 } }",
+        ),
+        (
+            "diffusion with sharpest and dullest edges",
+            "slices = { pixels = 20, perona_malik = { edge = 1e-30, conductance = 'exponential', repeat = 1 } }\n\
+             distance = { perona_malik = { edge = 1e-30, repeat = 1 } }\npost = { perona_malik = { edge = inf, repeat = 1 } }",
+        ),
+        (
+            "the heat equation, edges of 0",
+            "slices = { pixels = 20, perona_malik = { edge = inf, repeat = 2 } }\n\
+             distance = { perona_malik = { edge = inf, repeat = 1 } }\npost = { perona_malik = { edge = 0.0 } }",
+        ),
+        (
+            "AOS",
+            "slices = { pixels = 41, perona_malik = { scheme = 'aos', step = 2.0, repeat = 2 } }\n\
+             post = { perona_malik = { scheme = 'aos', step = 5.0, repeat = 2, conductance = 'exponential' } }",
+        ),
+        (
+            "AOS in huge steps, between filters",
+            "slices = { pixels = 20, median = true, perona_malik = { scheme = 'aos', edge = inf, step = 1e6, repeat = 1 }, smooth = { depth = 1.0 } }\n\
+             post = { perona_malik = { scheme = 'aos', edge = 1e-30, step = 1e9, repeat = 1 } }",
+        ),
+        (
+            "enhanced sigmas, Perona-Malik centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 3, largest = 17, sigma = 0.05, centre = 'perona-malik', growth = true } }\n\
+             distance = { enhanced_sigma = { window = 5, largest = 11, sigma = 0.3, centre = 'perona-malik', edge = 0.5 } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'perona-malik', noise = 'multiplicative' } }",
+        ),
+        (
+            "enhanced sigmas, gradient-inverse centre, growth",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.2, noise = 'multiplicative', centre = 'gradient-inverse', growth = true }, smooth = { lateral = 1.0 } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'gradient-inverse' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'gradient-inverse' } }",
+        ),
+        (
+            "enhanced sigmas, Nagao-Matsuyama centre",
+            "slices = { pixels = 24, enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, centre = 'nagao-matsuyama' } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 9, sigma = 0.2, centre = 'nagao-matsuyama' } }\n\
+             post = { enhanced_sigma = { window = 3, largest = 7, sigma = 0.1, centre = 'nagao-matsuyama' } }",
+        ),
+        (
+            "enhanced sigmas, median centre, window beyond the picture",
+            "slices = { pixels = 24, enhanced_sigma = { window = 63, largest = 63, sigma = inf } }\n\
+             distance = { enhanced_sigma = { window = 3, largest = 63, sigma = 0.2, centre = 'median' } }",
+        ),
+        ("Gaussian of 3x3x3", "slices = { pixels = 20, smooth = { kernel = 3 } }"),
+        ("Gaussian of 5x5x5", "slices = { pixels = 20, smooth = { kernel = 5 } }"),
+        ("slight blur", "slices = { pixels = 20, blur = true }"),
+        ("slight blur and frames joined", "slices = { pixels = 20, blur = true, smooth = { elevation = 1.0 } }"),
+        ("median estimator", "slices = { pixels = 20, estimator = 'median' }"),
+        (
+            "Perona-Malik estimator, between filters",
+            "slices = { pixels = 20, estimator = 'perona-malik', sigma = { window = 3, sigma = 0.1 } }",
+        ),
+        ("gradient-inverse estimator", "slices = { pixels = 20, estimator = 'gradient-inverse' }"),
+        ("Nagao-Matsuyama estimator", "slices = { pixels = 20, estimator = 'nagao-matsuyama' }"),
+        (
+            "sigmas of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = 0.3, noise = 'multiplicative' } }\n\
+             post = { sigma = { window = 7, sigma = 0.15, noise = 'multiplicative' } }",
+        ),
+        (
+            "infinite sigma of multiplicative noise",
+            "slices = { pixels = 20, sigma = { window = 5, sigma = inf, noise = 'multiplicative' } }",
+        ),
+        ("shininess 0", "light = { shininess = 0.0, texture = 1.0 }\nslices = { pixels = 12 }"),
+        ("shininess 1e6", "light = { shininess = 1e6 }\nslices = { pixels = 12 }"),
+    ] {
+        let ray = "sampling = 'exact', step = 0.7, early_end = 0.0";
+        let toml = match toml.split_once("ray = { ") {
+            Some((before, after)) => format!("{before}ray = {{ {ray}, {after}"),
+            None => format!("{toml}\nray = {{ {ray} }}"),
+        };
+        add(name, &sweep, BYTES, &format!("{toml}\npicture = {{ size = [23, 17] }}"));
+    }
+    for ray in ["spread = 1.0", "sliding = 3", "sliding = 5, spread = 0.5"] {
+        for mode in ["'sr'", "'vr'", "'mean'", "'vr'\nvolume = { compositing = 'pre-integrated' }"] {
+            let toml = format!(
+                "mode = {mode}\nslices = {{ pixels = 30 }}\npicture = {{ size = [15, 11] }}\nclip = [{{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }}]
+                 camera = {{ azimuth = 35, elevation = 8, roll = 11, field_of_view = 40 }}\nray = {{ sampling = 'exact', step = 0.9, early_end = 0.0, {ray} }}"
+            );
+            scenes.push(SceneSpec::new(&format!("{ray}, {mode}"), &sweep, BYTES, toml));
+        }
+    }
+    scenes
+}

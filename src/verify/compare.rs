@@ -1,0 +1,313 @@
+//! Comparisons with what is expected: outputs of a pass with its reference, pictures with pictures, and difference pictures for the
+//! report.
+
+use super::check::Findings;
+use crate::passes::slots::Format;
+use crate::passes::{Arrays, Bind, DispatchArgs, Pass, Slot, Texels, is_hit};
+use crate::picture::Picture;
+use crate::scene::Scene;
+use crate::verify::report::{Fault, Figure, PictureComparison, Unit, Worst};
+
+/// Errors of the outputs of one dispatch.
+#[derive(Clone, Debug, Default)]
+pub struct Comparison {
+    /// Largest error of the texels within tolerance, in the units of the output.
+    pub largest: f64,
+    /// The same as a share of the allowed error.
+    pub used: f64,
+    /// Largest share of the texels of an output beyond tolerance, minus the extra share allowed.
+    pub outliers: f64,
+    /// Mean signed error of the texels within tolerance, as a share of the allowed error: rounding errors do not all have one sign.
+    /// The maximum over outputs that have enough written texels.
+    pub bias: f64,
+    /// The worst texel of an output with more texels beyond tolerance than its pass allows.
+    pub worst: Option<Worst>,
+}
+
+/// Minimum number of texels for the bias: with fewer, a few flipped roundings look like a bias.
+const MIN_TEXELS: usize = 100;
+/// The same for floats, whose rounding errors are small.
+const MIN_FLOAT_TEXELS: usize = 20;
+
+fn is_float(format: Format) -> bool {
+    let floats = [Format::R16f, Format::Rg16f, Format::Rgba16f, Format::R32f, Format::Rg32f, Format::Rgba32f];
+    floats.contains(&format)
+}
+
+/// Tolerance in addition to that of the pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExtraTolerance {
+    /// For values from 0 to 1.
+    pub value: f64,
+    /// For distances, mm.
+    pub distance: f64,
+    /// Share of texels.
+    pub outliers: f64,
+}
+
+impl ExtraTolerance {
+    /// For a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three axes, between
+    /// neighbours that differ by at most 1. A threshold may then be reached a step earlier or later, and rarely in another voxel.
+    pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
+        match (pass.reads)(scene, args).iter().any(|bind| bind.filtered) {
+            true => ExtraTolerance { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers: 0.02 },
+            false => ExtraTolerance::default(),
+        }
+    }
+
+    fn at(&self, slot: Slot) -> f64 {
+        match slot {
+            Slot::Distance | Slot::DistanceA | Slot::DistanceB => self.distance,
+            _ => self.value,
+        }
+    }
+}
+
+/// Compares all outputs of a dispatch with those of the reference. `poison`: value of the outputs before it; where the reference leaves
+/// NaN, it must be unchanged.
+pub fn compare_outputs(
+    pass: &Pass,
+    scene: &Scene,
+    extra: ExtraTolerance,
+    poison: f64,
+    expected: &Arrays,
+    got: &Arrays,
+    writes: &[Bind],
+) -> Comparison {
+    let mut all = Comparison::default();
+    for bind in writes {
+        let (expected, got) = (expected.get(bind.name), got.get(bind.name));
+        let format = bind.slot.format(scene);
+        let (mut beyond, mut worst) = (0, None);
+        // The expected values as the format stores them, so that its rounding does not count as error.
+        let stored = Texels::decode(expected.size, format, &expected.encode(format));
+        let (mut signed, mut allowance, mut written) = (0.0, 0.0, 0);
+        for (i, (e, g)) in expected.values.iter().zip(&got.values).enumerate() {
+            let untouched = e.is_nan();
+            let e = if untouched { poison } else { *e };
+            let rounding = 1.01 * Texels::spacing(format, e);
+            let tolerance =
+                if untouched { 0.0 } else { pass.tolerance.absolute.max(pass.tolerance.relative * e.abs()) };
+            let loose = if untouched { 0.0 } else { extra.at(bind.slot) };
+            let (error, allowed) = ((e - g).abs(), tolerance + rounding + loose);
+            if error <= allowed {
+                if !untouched {
+                    all.largest = all.largest.max(error);
+                    all.used = all.used.max(error / allowed);
+                    if is_hit(e.abs()) {
+                        let residual = g - if is_float(format) { e } else { stored.values[i] };
+                        // For floats a driver may round to either neighbour.
+                        let rounded =
+                            if is_float(format) { residual.abs().min(Texels::spacing(format, e)) } else { 0.0 };
+                        let residual = residual - rounded.copysign(residual);
+                        (signed, allowance, written) = (signed + residual, allowance + allowed, written + 1);
+                    }
+                }
+                continue;
+            }
+            beyond += 1;
+            // NaN is the worst error.
+            if worst.is_none_or(|(_, _, _, w)| error > w || error.is_nan()) {
+                worst = Some((i, e, *g, error));
+            }
+        }
+        let enough = if is_float(format) { MIN_FLOAT_TEXELS } else { MIN_TEXELS };
+        if written >= enough && allowance > 0.0 {
+            all.bias = all.bias.max((signed / allowance).abs());
+        }
+        let share = beyond as f64 / expected.values.len() as f64;
+        all.outliers = all.outliers.max(share - extra.outliers);
+        let Some((i, e, g, _)) =
+            worst.filter(|_| share > pass.tolerance.outliers + extra.outliers && all.worst.is_none())
+        else {
+            continue;
+        };
+        let (texel, [w, h, _]) = (i / expected.channels, expected.size);
+        all.worst = Some(Worst {
+            output: bind.name.into(),
+            at: [texel % w, texel / w % h, texel / w / h],
+            channel: i % expected.channels,
+            expected: e,
+            got: g,
+            beyond,
+            texels: expected.values.len(),
+        });
+    }
+    all
+}
+
+/// Maximum mean difference of a picture from its reference over the values that are near, levels of 255. Rounding causes some tenths
+/// of a level.
+pub const MAX_MEAN: f64 = 0.2;
+/// Difference above which a value is far off, levels.
+pub const FAR_LEVELS: u8 = 8;
+/// Maximum share of values that are far off: edges may move by a pixel where a threshold of a detector or shadow is met.
+pub const MAX_FAR_SHARE: f64 = 0.02;
+
+/// Edge of a tile, which one workgroup renders, pixels.
+const TILE: u32 = 8;
+/// Maximum share of the pixels of a tile that are far off: an edge that moves by a pixel crosses a tile once or twice, a lost workgroup
+/// affects all pixels.
+const MAX_TILE_SHARE: f64 = 0.5;
+
+/// Difference of two pictures, levels of 255.
+pub struct PictureDifference {
+    /// Mean over the values that are not far off.
+    pub mean: f64,
+    /// Share of values that are far off.
+    pub far: f64,
+    pub largest: u8,
+    /// Largest share of far-off pixels in a tile.
+    pub tile: f64,
+    pub worst: Worst,
+}
+
+/// The difference of two pictures of equal size.
+pub fn picture_difference(expected: &Picture, got: &Picture) -> PictureDifference {
+    let (mut sum, mut far, mut largest, mut at) = (0.0, 0, 0, 0);
+    for (i, (e, g)) in expected.rgba.iter().zip(&got.rgba).enumerate() {
+        let apart = e.abs_diff(*g);
+        match apart > FAR_LEVELS {
+            true => far += 1,
+            false => sum += f64::from(apart),
+        }
+        if apart > largest {
+            (largest, at) = (apart, i);
+        }
+    }
+    let (count, width) = (expected.rgba.len().max(1), expected.width.max(1) as usize);
+    let worst = Worst {
+        output: "screen".into(),
+        at: [at / 4 % width, at / 4 / width, 0],
+        channel: at % 4,
+        expected: expected.rgba.get(at).copied().map_or(0.0, f64::from),
+        got: got.rgba.get(at).copied().map_or(0.0, f64::from),
+        beyond: far,
+        texels: count,
+    };
+    let (mean, far) = (sum / (count - far).max(1) as f64, far as f64 / count as f64);
+    PictureDifference { mean, far, largest, tile: worst_tile(expected, got), worst }
+}
+
+fn worst_tile(expected: &Picture, got: &Picture) -> f64 {
+    let across = expected.width.div_ceil(TILE).max(1);
+    let mut tiles = vec![[0u32; 2]; (across * expected.height.div_ceil(TILE)) as usize];
+    for (i, (e, g)) in expected.rgba.chunks_exact(4).zip(got.rgba.chunks_exact(4)).enumerate() {
+        let (x, y) = (i as u32 % expected.width, i as u32 / expected.width);
+        let is_far = e.iter().zip(g).any(|(e, g)| e.abs_diff(*g) > FAR_LEVELS);
+        let [far, all] = &mut tiles[(y / TILE * across + x / TILE) as usize];
+        (*far, *all) = (*far + u32::from(is_far), *all + 1);
+    }
+    tiles.iter().map(|[far, all]| f64::from(*far) / f64::from((*all).max(1))).fold(0.0, f64::max)
+}
+
+/// Records the difference of a picture from the expected one, and adds a fault if it is too large.
+pub fn compare_picture(findings: &mut Findings, input: &str, expected: &Picture, got: &Picture) {
+    if (expected.width, expected.height, expected.rgba.len()) != (got.width, got.height, got.rgba.len()) {
+        return findings.expect(false, || {
+            format!("{input}: {}x{} pixels instead of {}x{}", got.width, got.height, expected.width, expected.height)
+        });
+    }
+    let apart = picture_difference(expected, got);
+    if apart.mean > MAX_MEAN || apart.far > MAX_FAR_SHARE || apart.tile > MAX_TILE_SHARE {
+        let what = format!(
+            "mean difference {:.3} levels, {:.2} % of the values off by more than {FAR_LEVELS}, up to {:.0} % of a tile's pixels",
+            apart.mean,
+            100.0 * apart.far,
+            100.0 * apart.tile
+        );
+        findings.faults.push(Fault { input: input.into(), worst: Some(apart.worst), ..Fault::new(what) });
+    }
+    findings.figures.push(Figure::error("mean difference", apart.mean, MAX_MEAN, Unit::Levels));
+    findings.figures.push(Figure::error("values further off than 8 levels", apart.far, MAX_FAR_SHARE, Unit::Share));
+    findings.figures.push(Figure::error("pixels of a tile that are", apart.tile, MAX_TILE_SHARE, Unit::Share));
+    let largest = Figure::error("largest difference", apart.largest.into(), 0.0, Unit::Levels);
+    findings.figures.push(Figure { allowed: None, ..largest });
+}
+
+/// Adds a fault unless two pictures are identical, byte for byte. Returns whether they are.
+pub fn expect_same_picture(findings: &mut Findings, what: &str, expected: &Picture, got: &Picture) -> bool {
+    if expected == got {
+        return true;
+    }
+    let size = |p: &Picture| format!("{}x{}", p.width, p.height);
+    if size(expected) != size(got) {
+        findings.expect(false, || format!("{what}: expected {}, got {}", size(expected), size(got)));
+        return false;
+    }
+    let apart = picture_difference(expected, got);
+    let other = expected.rgba.iter().zip(&got.rgba).filter(|(a, b)| a != b).count();
+    let values = expected.rgba.len();
+    let said = format!("{what}: {other} of {values} values are others, by {} levels at most", apart.largest);
+    let fault = Some(findings.faults.len());
+    findings.pictures.push(PictureComparison { fault, ..picture_comparison(what, expected, got) });
+    findings.faults.push(Fault { worst: Some(Worst { beyond: other, ..apart.worst }), ..Fault::new(said) });
+    false
+}
+
+/// Records how many pictures were compared, and how many differ.
+pub fn add_picture_counts(findings: &mut Findings, compared: usize, differ: usize) {
+    let figure =
+        |what: &str, value: usize, allowed| Figure { allowed, ..Figure::error(what, value as f64, 0.0, Unit::Count) };
+    findings.figures.push(figure("pictures compared", compared, None));
+    findings.figures.push(figure("pictures that differ", differ, Some(0.0)));
+}
+
+/// A comparison picture of one slice of two arrays, both with the same grey scale: the minimum and maximum expected value are black and
+/// white. Of four channels the first three are red, green and blue; of two channels the first is drawn. Misses and unwritten texels
+/// are black.
+pub fn texel_comparison(what: &str, expected: &Texels, got: &Texels, slice: usize) -> PictureComparison {
+    let visible = |v: f64| v.is_finite() && is_hit(v.abs());
+    let plane = expected.size[0] * expected.size[1] * expected.channels;
+    let from = (slice * plane).min(expected.values.len().saturating_sub(plane));
+    let of = |texels: &'_ Texels| texels.values.iter().skip(from).take(plane).copied().collect::<Vec<f64>>();
+    let (expected_values, got_values) = (of(expected), of(got));
+    let bounds = expected_values.iter().filter(|v| visible(**v));
+    let (low, high) = bounds.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+    // Values within 0..1 are drawn unscaled; distances are stretched.
+    let (low, high) = if low >= 0.0 && high <= 1.0 { (0.0, 1.0) } else { (low, high) };
+    let channels = expected.channels;
+    let size = [expected.size[0] as u32, expected.size[1] as u32];
+    let picture = |of: &dyn Fn(usize) -> f64| {
+        let channel = |texel: usize, c: usize| match channels {
+            4 => of(4 * texel + c),
+            _ => of(channels * texel),
+        };
+        let level = |v: f64| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let texel = |texel: usize| [0, 1, 2].map(|c| level(channel(texel, c)));
+        let rgba = (0..plane / channels.max(1)).flat_map(|t| texel(t).into_iter().chain([255])).collect();
+        Picture { width: size[0], height: size[1], rgba }
+    };
+    let grey = |v: f64| if visible(v) { (v - low) / (high - low).max(1e-12) } else { 0.0 };
+    let apart = |i: usize| (grey(expected_values[i]) - grey(got_values[i])).abs();
+    let largest = (0..plane).map(apart).fold(0.0, f64::max);
+    // The largest difference becomes bright; no difference stays black.
+    let gain = (1.0 / largest.max(1.0 / 255.0)).floor().clamp(1.0, 64.0);
+    PictureComparison {
+        what: what.into(),
+        actual: picture(&|i| grey(got_values[i])),
+        expected: picture(&|i| grey(expected_values[i])),
+        difference: picture(&|i| gain * apart(i)),
+        gain: gain as u32,
+        fault: None,
+    }
+}
+
+/// A comparison picture of two pictures of equal size.
+pub fn picture_comparison(what: &str, expected: &Picture, got: &Picture) -> PictureComparison {
+    let largest = expected.rgba.iter().zip(&got.rgba).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
+    let gain = (255 / u32::from(largest.max(1))).clamp(1, 64);
+    let apart = expected.rgba.iter().zip(&got.rgba).enumerate();
+    let rgba = apart.map(|(i, (a, b))| match i % 4 {
+        3 => 255,
+        _ => (u32::from(a.abs_diff(*b)) * gain).min(255) as u8,
+    });
+    let difference = Picture { width: expected.width, height: expected.height, rgba: rgba.collect() };
+    let (actual, expected) = (got.clone(), expected.clone());
+    PictureComparison { what: what.into(), actual, expected, difference, gain, fault: None }
+}
+
+/// An informative count without limit.
+pub fn count_figure(what: &str, value: usize) -> Figure {
+    Figure { allowed: None, ..Figure::error(what, value as f64, 0.0, Unit::Count) }
+}

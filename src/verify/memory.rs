@@ -1,0 +1,165 @@
+//! Group "memory": nothing reads memory that was not written. New memory is filled with poison values that no pass computes; pictures and
+//! slots must stay the same, and some pass must write every texel of every slot.
+
+use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
+use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
+use super::render;
+use crate::gpu::faults::Poison;
+use crate::gpu::{Context, GpuError, RendererOptions};
+use crate::passes::slots::Initializer;
+use crate::passes::{Slot, Texels};
+use crate::picture::Picture;
+use crate::scene::Scene;
+use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+use std::sync::Arc;
+
+pub fn checks(_: Level) -> Vec<Check> {
+    vec![
+        Check::new("memory", "every mode on poisoned memory", modes),
+        Check::new("memory", "every variant on poisoned memory", variants),
+    ]
+}
+
+/// A rendered picture with the contents of all slots of its plan.
+struct RenderedSlots {
+    picture: Picture,
+    slots: Vec<(Slot, Texels)>,
+}
+
+fn render_on(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Texels],
+    poison: Option<Poison>,
+) -> Result<RenderedSlots, GpuError> {
+    context.faults.poison(poison);
+    let drawn = draw(context, scene, frames);
+    context.faults.poison(None);
+    drawn
+}
+
+fn draw(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<RenderedSlots, GpuError> {
+    let mut renderer = render::sent(context, scene, frames, &RendererOptions::default())?;
+    let picture = renderer.picture()?;
+    let mut slots = Vec::new();
+    for slot in renderer.plan().slots.clone() {
+        if let (Initializer::ByPasses, Some(texels)) = (slot.filled(), renderer.read(slot)?) {
+            slots.push((slot, texels));
+        }
+    }
+    Ok(RenderedSlots { picture, slots })
+}
+
+/// Difference of a slot between zeroed memory and both poisons.
+#[derive(Default)]
+struct SlotDifference {
+    /// Number of values that are still poison: no pass wrote them.
+    left: usize,
+    /// Number of values that depend on the previous contents of memory.
+    depend: usize,
+    /// The first of them.
+    worst: Option<Worst>,
+}
+
+fn slot_difference(slot: Slot, zeros: &Texels, poisoned: [&Texels; 2], scene: &Scene) -> SlotDifference {
+    let mut apart = SlotDifference::default();
+    let format = slot.format(scene);
+    let marks = Poison::BOTH.map(|poison| poison.texel_value(format));
+    let is = |value: f64, mark: f64| value == mark || (value.is_nan() && mark.is_nan());
+    for (i, zero) in zeros.values.iter().enumerate() {
+        let got = poisoned.map(|texels| texels.values[i]);
+        if (0..2).all(|n| is(got[n], marks[n])) {
+            apart.left += 1;
+            continue;
+        }
+        let Some(other) = got.into_iter().find(|got| got.to_bits() != zero.to_bits()) else { continue };
+        apart.depend += 1;
+        let (texel, [w, h, _]) = (i / zeros.channels, zeros.size);
+        apart.worst.get_or_insert(Worst {
+            output: slot.name().into(),
+            at: [texel % w, texel / w % h, texel / w / h],
+            channel: i % zeros.channels,
+            expected: *zero,
+            got: other,
+            beyond: 0,
+            texels: zeros.values.len() / zeros.channels,
+        });
+    }
+    apart
+}
+
+/// Totals over all scenes.
+#[derive(Default)]
+struct Totals {
+    scenes: usize,
+    wrong: usize,
+    slots: usize,
+    left: usize,
+}
+
+fn check_scene(
+    findings: &mut Findings,
+    totals: &mut Totals,
+    context: &Arc<Context>,
+    (name, scene, frames): (&str, &Scene, &[Texels]),
+) -> Result<(), GpuError> {
+    let zeros = render_on(context, scene, frames, None)?;
+    let poisoned = [
+        render_on(context, scene, frames, Some(Poison::BOTH[0]))?,
+        render_on(context, scene, frames, Some(Poison::BOTH[1]))?,
+    ];
+    totals.scenes += 1;
+    for (n, held) in poisoned.iter().enumerate() {
+        let what = format!("{name}, poison {}", n + 1);
+        totals.wrong += usize::from(!expect_same_picture(findings, &what, &zeros.picture, &held.picture));
+    }
+    for (i, (slot, texels)) in zeros.slots.iter().enumerate() {
+        let apart = slot_difference(*slot, texels, [&poisoned[0].slots[i].1, &poisoned[1].slots[i].1], scene);
+        totals.slots += 1;
+        totals.left += apart.left;
+        if let Some(worst) = apart.worst {
+            let what = format!("'{}' depends on what memory held before", slot.name());
+            let (fault, slice) = (Some(findings.faults.len()), worst.at[2]);
+            let pictures = texel_comparison(slot.name(), texels, &poisoned[0].slots[i].1, slice);
+            findings.pictures.push(PictureComparison { fault, ..pictures });
+            let worst = Some(Worst { beyond: apart.depend, ..worst });
+            findings.faults.push(Fault { input: name.into(), worst, ..Fault::new(what) });
+        }
+        findings.expect(apart.left == 0, || {
+            format!("{name}: {} of {} values of '{}' are never written", apart.left, texels.values.len(), slot.name())
+        });
+    }
+    Ok(())
+}
+
+fn add_totals(findings: &mut Findings, totals: &Totals) {
+    add_picture_counts(findings, 2 * totals.scenes, totals.wrong);
+    let figure = Figure::error("slots compared", totals.slots as f64, 0.0, Unit::Count);
+    findings.figures.push(Figure { allowed: None, ..figure });
+    findings.figures.push(Figure::error("values never written", totals.left as f64, 0.0, Unit::Count));
+}
+
+fn modes(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, mut totals, modes) = (Findings::default(), Totals::default(), dut.modes()?);
+    let isolated = IsolatedContext::of_changes(dut)?;
+    for of in modes.iter() {
+        check_scene(&mut findings, &mut totals, &isolated.context, (&of.name, &of.scene, &of.frames))?;
+    }
+    isolated.report_validation(&mut findings);
+    add_totals(&mut findings, &totals);
+    Ok(findings)
+}
+
+/// A part of the built-in scenes; the group "passes" poisons the outputs of single passes in all of them.
+fn variants(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+    let (mut findings, mut totals, scenes) = (Findings::default(), Totals::default(), dut.scenes());
+    let isolated = IsolatedContext::of_changes(dut)?;
+    let step = if dut.level == Level::Quick { 40 } else { 4 };
+    for (name, scene) in scenes.iter().step_by(step) {
+        let frames = super::built_in::wall(scene, 0);
+        check_scene(&mut findings, &mut totals, &isolated.context, (name, scene, &frames))?;
+    }
+    isolated.report_validation(&mut findings);
+    add_totals(&mut findings, &totals);
+    Ok(findings)
+}

@@ -1,0 +1,87 @@
+//! Renders pictures for checks, on the device and by the f64 reference.
+
+use super::built_in;
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::passes::slots::Format;
+use crate::passes::{Slot, Texels};
+use crate::picture::Picture;
+use crate::reference;
+use crate::scene::Scene;
+use std::sync::Arc;
+
+/// A renderer that holds a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields.
+pub fn sent(
+    context: &Arc<Context>,
+    scene: &Scene,
+    frames: &[Texels],
+    options: &RendererOptions,
+) -> Result<Renderer, GpuError> {
+    let mut renderer = Renderer::new(context, scene.clone(), options)?;
+    send(&mut renderer, frames, 0)?;
+    Ok(renderer)
+}
+
+/// Sends the frames of a volume into one of the volume images, and selects it for the next picture.
+pub fn send(renderer: &mut Renderer, frames: &[Texels], image: u32) -> Result<(), GpuError> {
+    let format = Slot::Frames.format(renderer.scene());
+    for (k, frame) in frames.iter().enumerate() {
+        renderer.frame(k as u32, &frame.encode(format), image)?;
+    }
+    renderer.show(image)
+}
+
+/// Renders one picture with a new renderer.
+pub fn picture(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Picture, GpuError> {
+    sent(context, scene, frames, &RendererOptions::default())?.picture()
+}
+
+/// Contents of a slot after a picture.
+pub fn slot(context: &Arc<Context>, scene: &Scene, frames: &[Texels], slot: Slot) -> Result<Texels, GpuError> {
+    let mut renderer = sent(context, scene, frames, &RendererOptions::default())?;
+    renderer.picture()?;
+    let missing = || GpuError::Broken(format!("no pass writes '{}'", slot.name()));
+    renderer.read(slot)?.ok_or_else(missing)
+}
+
+/// A rendered scene, with its frames.
+pub struct Drawn {
+    pub name: String,
+    pub scene: Scene,
+    /// One array per slice, with the values that the texture of a frame yields.
+    pub frames: Vec<Texels>,
+    pub picture: Picture,
+}
+
+/// Renders every mode, one after the other in one renderer, in the simplest way: one volume image, one queue, frames in order.
+pub fn modes(context: &Arc<Context>) -> Result<Vec<Drawn>, GpuError> {
+    let mut renderer: Option<Renderer> = None;
+    let options = RendererOptions { queues: Some(1), ..RendererOptions::default() };
+    let draw = |spec: built_in::SceneSpec| {
+        let scene = spec.build().map_err(GpuError::Broken)?;
+        let frames = built_in::wall(&scene, 0);
+        let there = match &mut renderer {
+            Some(there) => {
+                there.change(scene.clone())?;
+                there
+            }
+            None => renderer.insert(Renderer::new(context, scene.clone(), &options)?),
+        };
+        send(there, &frames, 0)?;
+        Ok(Drawn { name: spec.name, scene, frames, picture: there.picture()? })
+    };
+    built_in::modes().into_iter().map(draw).collect()
+}
+
+/// The picture by the f64 reference.
+pub fn reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
+    let mut slots = reference::render(scene, frames);
+    let screen = slots.remove(&Slot::Screen).unwrap_or_else(|| Texels::untouched([0; 3], 4));
+    Picture { width: screen.size[0] as u32, height: screen.size[1] as u32, rgba: screen.encode(Format::Rgba8) }
+}
+
+/// The picture by the f64 reference, of frames rounded to the format in which the device stores them.
+pub fn stored_reference_picture(scene: &Scene, frames: &[Texels]) -> Picture {
+    let format = Slot::Frames.format(scene);
+    let stored: Vec<_> = frames.iter().map(|f| Texels::decode(f.size, format, &f.encode(format))).collect();
+    reference_picture(scene, &stored)
+}

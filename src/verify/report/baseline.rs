@@ -1,0 +1,424 @@
+//! Compares a run with an earlier one, also within tolerances: a driver whose results differ from those of the previous version is worth
+//! reporting before any check fails.
+
+use super::numbers::{amount, change, number};
+use super::{Figure, Outcome, Run, Unit, Verdict};
+use crate::profile::compare as profile;
+use crate::profile::compare::{Kind, Line, Series};
+use crate::text::escaped;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt::{Display, Formatter};
+
+/// Thresholds of the comparison.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaselineOptions {
+    threshold: f64,
+}
+
+impl Default for BaselineOptions {
+    fn default() -> BaselineOptions {
+        BaselineOptions { threshold: 1.05 }
+    }
+}
+
+impl BaselineOptions {
+    /// `threshold`: ratio of times, at least 1, above which a slower check fails the run.
+    ///
+    /// # Errors
+    /// One line: it is not finite or below 1.
+    pub fn new(threshold: f64) -> Result<BaselineOptions, String> {
+        match threshold.is_finite() && threshold >= 1.0 {
+            true => Ok(BaselineOptions { threshold }),
+            false => Err(format!("threshold: {threshold} is not a ratio of at least 1 (1.05 is five percent slower)")),
+        }
+    }
+
+    pub fn threshold(&self) -> f64 {
+        self.threshold
+    }
+}
+
+/// Severity of a change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// Fails the run: a check that did not fail before, an error now beyond its tolerance, a time beyond the threshold.
+    Worse,
+    /// Reported, without failing the run.
+    Changed,
+    Better,
+}
+
+impl Class {
+    pub const ALL: [Class; 3] = [Class::Worse, Class::Changed, Class::Better];
+
+    pub fn word(self) -> &'static str {
+        match self {
+            Class::Worse => "worse",
+            Class::Changed => "changed",
+            Class::Better => "better",
+        }
+    }
+}
+
+/// A difference between the runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    pub class: Class,
+    pub group: String,
+    pub name: String,
+    /// One line, old before new.
+    pub what: String,
+}
+
+impl Change {
+    fn new(class: Class, of: &Outcome, what: impl Into<String>) -> Change {
+        Change { class, group: of.group.clone(), name: of.name.clone(), what: what.into() }
+    }
+}
+
+impl Display for Change {
+    fn fmt(&self, to: &mut Formatter) -> std::fmt::Result {
+        write!(to, "{} / {}: {}", escaped(&self.group), escaped(&self.name), self.what)
+    }
+}
+
+/// Comparison of a run with an earlier one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaselineComparison {
+    /// Description of the earlier run.
+    pub baseline: String,
+    /// Differences of the conditions, one line each, old before new.
+    pub differences: Vec<String>,
+    /// What could not be compared and why, and other remarks.
+    pub notes: Vec<String>,
+    /// The worst first, otherwise in the order of the new run.
+    pub changes: Vec<Change>,
+    /// Number of checks without changes.
+    pub same: usize,
+    /// Number of checks that fail in both runs.
+    pub still_failing: usize,
+}
+
+impl BaselineComparison {
+    /// True if the comparison fails the run.
+    pub fn is_worse(&self) -> bool {
+        self.changes.iter().any(|c| c.class == Class::Worse)
+    }
+
+    /// Number of checks with a change that fails the run.
+    pub fn worse_checks(&self) -> usize {
+        let worse = self.changes.iter().filter(|c| c.class == Class::Worse);
+        worse.map(|c| (&c.group, &c.name)).collect::<HashSet<_>>().len()
+    }
+
+    /// Differences of the conditions, then all changes with their checks, the worst first. Empty if nothing changed.
+    pub fn lines(&self) -> Vec<String> {
+        self.differences.iter().cloned().chain(self.changes.iter().map(Change::to_string)).collect()
+    }
+
+    /// The last line: how many checks are unchanged.
+    pub fn conclusion(&self) -> String {
+        let first = if self.changes.is_empty() { "nothing changed" } else { "nothing else changed" };
+        let failing = match self.still_failing {
+            0 => String::new(),
+            count => format!("; {count} failed before and fail still"),
+        };
+        format!("{first}: {} checks are as before{failing}", self.same)
+    }
+}
+
+/// A figure of both runs.
+struct Pair<'a> {
+    of: &'a Outcome,
+    old: &'a Figure,
+    new: &'a Figure,
+}
+
+/// Compares the checks and figures of `new` with those of the same name in `old`.
+pub fn compare(old: &Run, new: &Run, options: &BaselineOptions) -> BaselineComparison {
+    let before: HashMap<_, _> = old.outcomes.iter().map(|o| ((&o.group, &o.name), o)).collect();
+    let now: HashSet<_> = new.outcomes.iter().map(|o| (&o.group, &o.name)).collect();
+    let (mut changes, mut notes, mut pairs) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut still_failing, mut only_new) = (0, 0);
+    for outcome in &new.outcomes {
+        let Some(earlier) = before.get(&(&outcome.group, &outcome.name)) else {
+            only_new += 1;
+            changes.extend(arrived(outcome, old.level == new.level));
+            continue;
+        };
+        still_failing += usize::from([earlier.verdict, outcome.verdict] == [Verdict::Failed; 2]);
+        changes.extend(verdict(earlier, outcome));
+        changes.extend(figures(earlier, outcome, &mut pairs));
+    }
+    let gone: Vec<&Outcome> = old.outcomes.iter().filter(|o| !now.contains(&(&o.group, &o.name))).collect();
+    if old.level == new.level {
+        let missing = |o: &&Outcome| Change::new(Class::Changed, o, format!("missing; before it {}", was(o.verdict)));
+        changes.extend(gone.iter().map(missing));
+    } else {
+        let [was, is] = [old, new].map(|run| run.level.word());
+        notes.push(format!(
+            "the levels differ ({was} -> {is}), and with them the inputs of passes: an error that is another may say nothing of the device"
+        ));
+        if gone.len() + only_new > 0 {
+            let gone = gone.len();
+            notes.push(format!(
+                "checks that only the earlier run has, {gone}, and that only this one has, {only_new}, are not compared"
+            ));
+        }
+    }
+    let times = judge_times(&pairs, [old, new], options);
+    changes.extend(error_changes(&pairs));
+    changes.extend(times.changes);
+    notes.extend(times.notes);
+    // The sort is stable: within a class the order stays.
+    changes.sort_by_key(|c| c.class);
+    let touched: HashSet<_> = changes.iter().map(|c| (&c.group, &c.name)).collect();
+    let is_same = |o: &&Outcome| before.contains_key(&(&o.group, &o.name)) && !touched.contains(&(&o.group, &o.name));
+    let same = new.outcomes.iter().filter(is_same).count();
+    BaselineComparison {
+        baseline: described(old),
+        differences: differences(old, new),
+        notes,
+        changes,
+        same,
+        still_failing,
+    }
+}
+
+fn was(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Passed => "passed",
+        Verdict::Failed => "failed",
+        Verdict::LeftOut => "was left out",
+    }
+}
+
+/// The change for a check that only the new run has: reported if both should have it, and always if it fails.
+fn arrived(outcome: &Outcome, same_level: bool) -> Option<Change> {
+    match outcome.verdict {
+        Verdict::Failed => Some(Change::new(Class::Worse, outcome, format!("new, and fails{}", reason(outcome)))),
+        _ => same_level.then(|| Change::new(Class::Changed, outcome, format!("new; {}", outcome.verdict.word()))),
+    }
+}
+
+/// The first fault or note, after a colon.
+fn reason(outcome: &Outcome) -> String {
+    let fault = outcome.faults.first().map(|f| &f.what);
+    let note = outcome.notes.first().filter(|_| outcome.verdict == Verdict::LeftOut);
+    fault.or(note).map_or_else(String::new, |what| format!(": {}", escaped(what)))
+}
+
+fn verdict(old: &Outcome, new: &Outcome) -> Option<Change> {
+    let class = match (old.verdict, new.verdict) {
+        (a, b) if a == b => return None,
+        (_, Verdict::Failed) => Class::Worse,
+        (_, Verdict::Passed) => Class::Better,
+        (_, Verdict::LeftOut) => Class::Changed,
+    };
+    Some(Change::new(class, new, format!("{} -> {}{}", old.verdict.word(), new.verdict.word(), reason(new))))
+}
+
+/// Pairs the figures of a check. A figure of only one run is a change if both passed.
+fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let both_passed = [old.verdict, new.verdict] == [Verdict::Passed; 2];
+    let mut report = |figure: &Figure, what: &str| {
+        changes.push(Change::new(Class::Changed, new, format!("{}: {what}", escaped(&figure.what))));
+    };
+    for figure in new.figures.iter().filter(|f| !f.fleeting) {
+        match old.figures.iter().find(|f| f.what == figure.what) {
+            Some(earlier) if earlier.unit == figure.unit => pairs.push(Pair { of: new, old: earlier, new: figure }),
+            Some(_) => report(figure, "measured in another unit than before, not compared"),
+            None if both_passed => report(figure, "not measured before"),
+            None => {}
+        }
+    }
+    for figure in
+        old.figures.iter().filter(|f| both_passed && !f.fleeting && new.figures.iter().all(|g| g.what != f.what))
+    {
+        report(figure, "measured before, and not now");
+    }
+    changes
+}
+
+fn described(run: &Run) -> String {
+    let parts = [&run.date, &run.program, &run.device.name, &run.device.driver].map(|part| escaped(part));
+    let [date, program, device, driver] = parts;
+    format!("the run of {date} ({program}, {}) on {device}, {driver}", run.level.word())
+}
+
+fn differences(old: &Run, new: &Run) -> Vec<String> {
+    let of = |what: fn(&Run) -> String| [old, new].map(|run| escaped(&what(run)));
+    let conditions = [
+        ("device", of(|r| r.device.name.clone())),
+        ("driver", of(|r| r.device.driver.clone())),
+        ("Vulkan", of(|r| r.device.api.clone())),
+        ("clocks", of(|r| r.device.clocks.clone().unwrap_or_else(|| "not known".into()))),
+        ("program", of(|r| r.program.clone())),
+        ("level", of(|r| r.level.word().into())),
+        ("validation layer", of(|r| if r.validation { "watching" } else { "not watching" }.into())),
+    ];
+    let differing = conditions.into_iter().filter(|(_, [old, new])| old != new);
+    differing.map(|(what, [old, new])| format!("{what}: {old} -> {new}")).collect()
+}
+
+/// Relative difference above which a change of an error is reported.
+const SHARE: f64 = 0.01;
+
+/// Absolute difference above which it is reported: a single-precision rounding error at the scale of the values.
+const ROUNDING: f64 = f32::EPSILON as f64;
+
+/// Changes of figures other than times.
+fn error_changes(pairs: &[Pair]) -> Vec<Change> {
+    let others = pairs.iter().filter(|p| p.new.unit != Unit::Ns);
+    others.flat_map(|pair| [value_change(pair), tolerance_change(pair)]).flatten().collect()
+}
+
+/// True if equal within rounding; counts must be equal.
+fn is_same(old: f64, new: f64, unit: Unit) -> bool {
+    if unit == Unit::Count || !(old.is_finite() && new.is_finite()) {
+        return old == new || (old.is_nan() && new.is_nan());
+    }
+    let largest = old.abs().max(new.abs());
+    (new - old).abs() <= (SHARE * largest).max(ROUNDING * largest.max(1.0))
+}
+
+fn value_change(pair: &Pair) -> Option<Change> {
+    let (old, new, unit) = (pair.old.value, pair.new.value, pair.new.unit);
+    if is_same(old, new, unit) {
+        return None;
+    }
+    let [was_beyond, is_beyond] = [pair.old, pair.new].map(|f| f.used().is_some_and(|used| used > 1.0));
+    // NaN is worse than any number.
+    let grew = new > old || (new.is_nan() && !old.is_nan());
+    let is_error = pair.new.allowed.is_some() || !matches!(unit, Unit::Count | Unit::Share);
+    let class = match (was_beyond, is_beyond) {
+        (false, true) => Class::Worse,
+        _ if is_error && !grew => Class::Better,
+        _ => Class::Changed,
+    };
+    let still = |allowed| match (was_beyond, is_beyond) {
+        (false, false) => format!(", still under {}", bare(allowed, unit)),
+        (true, true) => format!(", still over {}", bare(allowed, unit)),
+        (false, true) => format!(", now over {}", bare(allowed, unit)),
+        (true, false) => format!(", now under {}", bare(allowed, unit)),
+    };
+    let allowed = pair.new.allowed.map_or_else(String::new, still);
+    let what = escaped(&pair.new.what);
+    Some(Change::new(class, pair.of, format!("{what} {}{allowed}", change(old, new, unit))))
+}
+
+/// A value without its unit, which the text already contains.
+fn bare(allowed: f64, unit: Unit) -> String {
+    let shown = amount(allowed, unit);
+    shown.split(' ').next().unwrap_or(&shown).into()
+}
+
+/// A limit that differs between versions of the program.
+fn tolerance_change(pair: &Pair) -> Option<Change> {
+    let (old, new, unit) = (pair.old.allowed, pair.new.allowed, pair.new.unit);
+    if old == new {
+        return None;
+    }
+    let text = match (old, new) {
+        (Some(old), Some(new)) => change(old, new, unit),
+        (_, new) => {
+            let word = |allowed: Option<f64>| allowed.map_or_else(|| "any".into(), |a| amount(a, unit));
+            format!("{} -> {}", word(old), word(new))
+        }
+    };
+    Some(Change::new(Class::Changed, pair.of, format!("{}: allowed {text}", escaped(&pair.new.what))))
+}
+
+/// Probability of any false alarm among all times of a comparison.
+const ALPHA: f64 = 0.05;
+
+#[derive(Default)]
+struct TimeChanges {
+    changes: Vec<Change>,
+    notes: Vec<String>,
+}
+
+/// Changes of times by more than the noise of the device, by the method of `profile --compare`. `runs`: old, new.
+fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> TimeChanges {
+    let times: Vec<&Pair> = pairs.iter().filter(|p| p.new.unit == Unit::Ns).collect();
+    if times.is_empty() {
+        return TimeChanges::default();
+    }
+    let both = times.iter().filter(|p| !usable(p.old).is_empty() && !usable(p.new).is_empty()).count();
+    let blocks = profile::blocks_needed(both, ALPHA);
+    let tick = runs[0].device.timestamp_period_ns.max(runs[1].device.timestamp_period_ns);
+    let series = |figure| Some(Series { stage: "", runs: 1, times: usable(figure) });
+    let lines = times.iter().map(|p| profile::Pair {
+        kind: Kind::Pass,
+        name: &p.new.what,
+        old: series(p.old),
+        new: series(p.new),
+    });
+    let criteria = profile::CompareOptions { threshold: options.threshold(), alpha: ALPHA, force: true };
+    let lines = match profile::judge(lines.collect(), blocks, tick, &criteria) {
+        Ok(lines) => lines,
+        Err(fault) => {
+            return TimeChanges { changes: Vec::new(), notes: vec![format!("times are not compared: {fault}")] };
+        }
+    };
+    let because = incomparable(runs);
+    let mut found = TimeChanges::default();
+    let mut left: BTreeMap<String, usize> = BTreeMap::new();
+    for (pair, line) in times.iter().zip(&lines) {
+        match &line.note {
+            Some(why) if line.verdict == profile::Verdict::NotComparable => *left.entry(why.clone()).or_default() += 1,
+            _ => found.changes.extend(time_change(pair, line, options, because.is_some())),
+        }
+    }
+    found.notes.extend(because.map(|why| format!("{why}: times are told, and fail nothing")));
+    found.notes.extend(left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}")));
+    found.notes.extend(profile::common_shift(&lines));
+    found
+}
+
+/// The times; empty if one is not finite, since a file may contain anything.
+fn usable(figure: &Figure) -> &[f64] {
+    if figure.samples.iter().all(|ns| ns.is_finite()) { &figure.samples } else { &[] }
+}
+
+/// Why the times of the runs cannot fail the new one.
+fn incomparable([old, new]: [&Run; 2]) -> Option<&'static str> {
+    match () {
+        _ if old.device.name != new.device.name => Some("the devices differ"),
+        _ if old.validation != new.validation => Some("the validation layer watched one run only"),
+        _ => None,
+    }
+}
+
+fn time_change(pair: &Pair, line: &Line, options: &BaselineOptions, is_informative: bool) -> Option<Change> {
+    let ratio = line.ratio?;
+    let class = match line.verdict {
+        profile::Verdict::Slower if line.is_regression && !is_informative => Class::Worse,
+        profile::Verdict::Slower => Class::Changed,
+        profile::Verdict::Faster => Class::Better,
+        _ => return None,
+    };
+    let (share, word) = match ratio.estimate {
+        r if r >= 1.0 => (r - 1.0, "slower"),
+        r => (1.0 - r, "faster"),
+    };
+    let medians = line.old_ns.zip(line.new_ns).map_or_else(String::new, |(old, new)| change(old, new, Unit::Ns));
+    let under = match line.verdict == profile::Verdict::Slower && !line.is_regression {
+        true => format!(", within the threshold of {} %", number(100.0 * (options.threshold() - 1.0))),
+        false => String::new(),
+    };
+    let what = format!(
+        "{} {} % {word} ({:.2}..{:.2}), {medians}{under}",
+        escaped(&pair.new.what),
+        rounded(100.0 * share),
+        ratio.low,
+        ratio.high
+    );
+    Some(Change::new(class, pair.of, what))
+}
+
+/// Without decimals from 10 %.
+fn rounded(percent: f64) -> String {
+    if percent >= 10.0 { format!("{percent:.0}") } else { format!("{percent:.1}") }
+}
