@@ -98,8 +98,8 @@ pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> 
         let image = if bind.slot.is_multibuffered() { args.image } else { 0 };
         Access::of_slot(bind.slot, image, parts, write, PipelineStage::Compute)
     };
-    let reads = (pass.reads)(scene, args).into_iter().map(|b| access(b, false));
-    let writes = (pass.writes)(scene, args).into_iter().map(|b| access(b, true));
+    let reads = pass.reads(scene, args).into_iter().map(|b| access(b, false));
+    let writes = pass.writes(scene, args).into_iter().map(|b| access(b, true));
     reads.chain(writes).collect()
 }
 

@@ -11,7 +11,7 @@ const GRAPH: [usize; 2] = [512, 256];
 /// Draws a slot: colours unchanged, a volume as a sheet of its slices, a distance map with near bright and far dark, a table as
 /// curves. A single channel is stretched from its minimum to its maximum unless it is within 0..1.
 pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
-    match (texels, slot.filled()) {
+    match (texels, slot.initializer()) {
         (Some(texels), _) if texels.channels == 4 => colours(texels),
         (Some(texels), _) if matches!(slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB) => {
             sheet(texels, &distances(texels))

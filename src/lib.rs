@@ -127,8 +127,8 @@
 //! // A dark slice with one bright pixel, which the median filter removes.
 //! let median = by_name("median_slice").ok_or("no such pass")?;
 //! let args = DispatchArgs::default();
-//! let source = (median.reads)(&scene, &args)[0].name;
-//! let target = (median.writes)(&scene, &args)[0].name;
+//! let source = median.reads(&scene, &args)[0].name;
+//! let target = median.writes(&scene, &args)[0].name;
 //! let mut inputs = Arrays::default();
 //! inputs.insert(source, Texels::from_fn([8, 8, 1], 1, |at, _| if at == [4, 4, 0] { 1.0 } else { 0.25 }));
 //! let context = Context::new(&ContextOptions::default())?;

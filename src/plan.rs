@@ -1,6 +1,5 @@
 //! Plans a scene: which passes and slots it needs, and after a change of scene, what has to run again. Needs no GPU.
 
-use crate::passes::slots::Initializer;
 use crate::passes::{DispatchArgs, Frequency, PASSES, Part, Pass, Slot, chain};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -63,7 +62,7 @@ impl Plan {
                 stage = Some(pass.stage);
                 let _ = writeln!(text, "stage {}: {}", pass.stage as u32 + 1, pass.stage.name());
             }
-            match (pass.needed)(scene) {
+            match pass.needed(scene) {
                 Ok(why) => {
                     let [x, y, z] =
                         pass.invocations(scene, &DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() });
@@ -85,10 +84,10 @@ impl Plan {
                     for args in
                         (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() })
                     {
-                        let shader = (pass.shader)(scene, &args);
+                        let shader = pass.shader(scene, &args);
                         if !listed.contains(&shader) {
                             listed.push(shader);
-                            let (reads, writes) = ((pass.reads)(scene, &args), (pass.writes)(scene, &args));
+                            let (reads, writes) = (pass.reads(scene, &args), pass.writes(scene, &args));
                             let _ = writeln!(text, "    {:<19} {shader}: {} -> {}", "", names(reads), names(writes));
                         }
                     }
@@ -140,19 +139,19 @@ impl Plan {
             return Rerun::Frames;
         }
         let old = &Scene { seen: new.seen, ..old.clone() };
-        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| content_changes(*s, old, new)).collect();
+        let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| s.differs(old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             let same = before.steps.iter().any(|s| s.is_same(step) && s.same_work(step, old, new));
-            let reads = (step.pass.reads)(new, &step.args());
+            let reads = step.pass.reads(new, &step.args());
             if same && !reads.iter().any(|b| changed.contains(&b.slot)) {
                 continue;
             }
             if step.pass.frequency == Frequency::Frame {
                 return Rerun::Frames;
             }
-            changed.extend((step.pass.writes)(new, &step.args()).iter().map(|b| b.slot));
+            changed.extend(step.pass.writes(new, &step.args()).iter().map(|b| b.slot));
             steps.push(i);
         }
         Rerun::Steps { steps, slots }
@@ -189,7 +188,7 @@ impl Plan {
                 if !stale[i] {
                     continue;
                 }
-                for bind in (step.pass.reads)(scene, &step.args()) {
+                for bind in step.pass.reads(scene, &step.args()) {
                     let writer = self.steps[..i].iter().rposition(|s| s.writes(scene).contains(&bind.slot));
                     let Some(j) = writer.filter(|j| self.steps[*j].pass.frequency != Frequency::Frame) else {
                         continue;
@@ -222,7 +221,7 @@ pub fn affected(changed: &[bool], reach: u32) -> Vec<Range<u32>> {
 impl Step {
     /// Number of neighbouring slices on either side that a pass over the volume reads.
     pub fn reach(&self, scene: &Scene) -> u32 {
-        let reads = (self.pass.reads)(scene, &self.args());
+        let reads = self.pass.reads(scene, &self.args());
         reads.iter().map(|b| if let Part::Around(more) = b.part { more } else { 0 }).max().unwrap_or(0)
     }
 
@@ -233,12 +232,12 @@ impl Step {
 
     /// The slots that it reads.
     pub fn reads(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.reads)(scene, &self.args()).iter().map(|b| b.slot).collect()
+        self.pass.reads(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
     /// The slots that it writes.
     pub fn writes(&self, scene: &Scene) -> Vec<Slot> {
-        (self.pass.writes)(scene, &self.args()).iter().map(|b| b.slot).collect()
+        self.pass.writes(scene, &self.args()).iter().map(|b| b.slot).collect()
     }
 
     /// Its dispatch arguments, for layer, slice and image 0.
@@ -247,8 +246,8 @@ impl Step {
     }
 
     fn slots(&self, scene: &Scene) -> Vec<Slot> {
-        let reads = (self.pass.reads)(scene, &self.args());
-        let writes = (self.pass.writes)(scene, &self.args());
+        let reads = self.pass.reads(scene, &self.args());
+        let writes = self.pass.writes(scene, &self.args());
         reads.iter().chain(&writes).map(|b| b.slot).collect()
     }
 
@@ -259,36 +258,13 @@ impl Step {
     fn same_work(&self, other: &Step, old: &Scene, new: &Scene) -> bool {
         let (a, b) = (self.pass, other.pass);
         let args = self.args();
-        (a.shader)(old, &args) == (b.shader)(new, &args)
+        a.shader(old, &args) == b.shader(new, &args)
             && (a.constants)(old, &args) == (b.constants)(new, &args)
             && a.numbers(old, &args) == b.numbers(new, &args)
             && a.invocations(old, &args) == b.invocations(new, &args)
-            && (a.reads)(old, &args) == (b.reads)(new, &args)
-            && (a.writes)(old, &args) == (b.writes)(new, &args)
+            && a.reads(old, &args) == b.reads(new, &args)
+            && a.writes(old, &args) == b.writes(new, &args)
     }
-}
-
-/// True if the content of a slot that the CPU computes differs between the scenes.
-fn content_changes(slot: Slot, old: &Scene, new: &Scene) -> bool {
-    let Initializer::ByScene(make) = slot.filled() else { return false };
-    match slot {
-        Slot::Tgc | Slot::Transfer | Slot::Tiles | Slot::Block | Slot::OpaqueBefore => return make(old) != make(new),
-        // Computed from the transfer table, which is shorter.
-        Slot::PreIntegrated => return content_changes(Slot::Transfer, old, new),
-        Slot::BrickTable => {
-            return !old.geometry.equals_except_direction(&new.geometry) || old.brick_basis() != new.brick_basis();
-        }
-        Slot::SliceTable => return old.geometry != new.geometry,
-        _ => {}
-    }
-    // The rest are computed from the geometry, and their content is too long to compare. The motor's direction during a frame changes
-    // the span of the sweep and nothing else.
-    let lattice = |s: &Scene| (s.grid, s.apron, s.decimation(), s.settings.ray.entries);
-    let stays = match slot {
-        Slot::SweepLut => old.geometry.equals_except_direction(&new.geometry),
-        _ => old.geometry.equals_except_advance(&new.geometry),
-    };
-    !stays || lattice(old) != lattice(new)
 }
 
 #[cfg(test)]

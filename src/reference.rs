@@ -39,14 +39,14 @@ fn empty(slot: Slot, scene: &Scene) -> Texels {
         Shape::Buffer(bytes) => [bytes as usize / 4, 1, 1],
     };
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
-    if let Initializer::ByScene(make) = slot.filled() {
+    if let Initializer::ByScene(make) = slot.initializer() {
         texels.values = make(scene).into_iter().map(f64::from).collect();
     }
     texels
 }
 
 fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>) {
-    let (reads, writes) = ((step.pass.reads)(scene, args), (step.pass.writes)(scene, args));
+    let (reads, writes) = (step.pass.reads(scene, args), step.pass.writes(scene, args));
     let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
     // A plan lists every slot of its steps, and no step reads a slot that it writes.
     let missing = || Texels::untouched([0; 3], 1);
@@ -56,7 +56,7 @@ fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slo
     for bind in &writes {
         outputs.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(missing));
     }
-    (step.pass.reference)(scene, args, &inputs, &mut outputs);
+    step.pass.reference(scene, args, &inputs, &mut outputs);
     for bind in writes {
         slots.insert(bind.slot, outputs.get(bind.name).clone());
     }

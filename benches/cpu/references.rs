@@ -46,7 +46,7 @@ fn one(
     slots: &std::cell::LazyCell<BTreeMap<Slot, Texels>, impl FnOnce() -> BTreeMap<Slot, Texels>>,
 ) -> Result<(), String> {
     let pass = by_name(name).ok_or_else(|| format!("references: there is no pass '{name}'"))?;
-    (pass.needed)(scene).map_err(|why| format!("references: the scene does not need '{name}': {why}"))?;
+    pass.needed(scene).map_err(|why| format!("references: the scene does not need '{name}': {why}"))?;
     let args = match pass.frequency {
         Frequency::Frame => DispatchArgs { slice: scene.slices() / 2, slices: 1, ..DispatchArgs::default() },
         _ => DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() },
@@ -60,9 +60,9 @@ fn one(
                 binds.iter().for_each(|b| arrays.insert(b.name, slots[&b.slot].clone()));
                 arrays
             };
-            (taken((pass.reads)(scene, &args)), taken((pass.writes)(scene, &args)))
+            (taken(pass.reads(scene, &args)), taken(pass.writes(scene, &args)))
         });
-        b.iter(|| (pass.reference)(scene, &args, reads, writes));
+        b.iter(|| pass.reference(scene, &args, reads, writes));
     });
     Ok(())
 }

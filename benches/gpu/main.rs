@@ -142,11 +142,11 @@ fn render(context: &Arc<Context>, scene: &Scene, frames: &[Frame]) -> Result<Ren
 fn contents(renderer: &mut Renderer, pass: &Pass) -> Result<Vec<(Slot, Texels)>, String> {
     let scene = renderer.scene().clone();
     let turns = (0..(pass.repeat)(&scene)).map(|iteration| DispatchArgs { iteration, ..DispatchArgs::default() });
-    let mut slots: Vec<Slot> = turns.flat_map(|t| (pass.reads)(&scene, &t)).map(|b| b.slot).collect();
+    let mut slots: Vec<Slot> = turns.flat_map(|t| pass.reads(&scene, &t)).map(|b| b.slot).collect();
     slots.sort();
     slots.dedup();
     let mut contents = Vec::new();
-    for slot in slots.into_iter().filter(|s| !matches!(s.filled(), Initializer::ByScene(_))) {
+    for slot in slots.into_iter().filter(|s| !matches!(s.initializer(), Initializer::ByScene(_))) {
         let Some(texels) = renderer.read(slot).map_err(|e| e.to_string())? else { continue };
         let first = texels.get([0; 3]);
         if texels.values.chunks_exact(texels.channels).all(|t| t == first) {
@@ -172,5 +172,5 @@ fn noise(scene: &Scene, pass: &Pass) -> Vec<(Slot, Texels)> {
         texels.values.fill_with(&mut next);
         (slot, texels)
     };
-    (pass.reads)(scene, &DispatchArgs::default()).iter().map(|b| filled(b.slot)).collect()
+    pass.reads(scene, &DispatchArgs::default()).iter().map(|b| filled(b.slot)).collect()
 }

@@ -47,8 +47,8 @@ pub const SCENES: &[Stated] = &[
             "gaussian_elevation",
             "tile_ranges",
             "brick_ranges",
-            "classify_surface",
-            "leap_surface",
+            "classify_bricks_surface",
+            "brick_distance_surface",
             "raycast_surface",
             "median_distance",
             "bilateral_distance",
@@ -97,9 +97,9 @@ pub const SCENES: &[Stated] = &[
     sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
     sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
     sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
-    sweep("quads", &["ray.sampling=quads"], &["quads", "raycast_surface"]),
+    sweep("quads", &["ray.sampling=quads"], &["packed_neighbours", "raycast_surface"]),
     sweep("hardware sampling", &["ray.sampling=hardware"], &["raycast_surface"]),
-    sweep("corrected", &["mode=vr"], &["classify_volume", "leap_volume", "raycast_volume"]),
+    sweep("corrected", &["mode=vr"], &["classify_bricks_volume", "brick_distance_volume", "raycast_volume"]),
     sweep("every sample", &["mode=vr", "ray.brick=0"], &["raycast_volume"]),
     sweep("every sample, surface", &["ray.brick=0"], &["raycast_surface"]),
     sweep("pre-integrated", &["mode=vr", "volume.compositing=pre-integrated"], &["raycast_volume"]),
@@ -136,7 +136,7 @@ impl Stated {
         let find = |name: &&str| {
             let pass = PASSES.iter().find(|p| p.name == *name);
             let pass = pass.ok_or_else(|| format!("scene '{}': there is no pass '{name}'", self.name))?;
-            match (pass.needed)(scene) {
+            match pass.needed(scene) {
                 Ok(_) => Ok(pass),
                 Err(why) => Err(format!("scene '{}' does not need '{name}': {why}", self.name)),
             }

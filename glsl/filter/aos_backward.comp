@@ -1,5 +1,5 @@
-// Backward substitution along a row or a column: u[i] = forward[i] + shares[i] u[i+1]. That of the columns averages with what
-// the rows gave, which ends a step of the AOS scheme.
+// Backward substitution along a row or a column: u[i] = forward[i] + shares[i] u[i+1]. The columns' result is averaged with the
+// rows' result, which ends a step of the AOS scheme.
 // variants: rows; plane COLUMNS; slice COLUMNS SLICE; picture_rows PICTURE; picture COLUMNS PICTURE
 #version 460
 #include "aos.glsl"

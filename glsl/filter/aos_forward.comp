@@ -19,7 +19,7 @@ void main() {
     if (line >= size[1 - AXIS]) return;
     int count = size[AXIS];
     T here = LOADED(texelFetch(source, texel(line, 0), 0)), before = T(0.0);
-    // The diagonal is 1 + back + on, less back times the last share. That share's complement to 1 is carried instead, so that
+    // The diagonal is 1 + back + on, minus back times the last share. The complement of that share to 1 is carried instead, so that
     // all terms are positive: nothing cancels, and the maximum principle holds at any tau (Grassmann, Taksar and Heyman 1985).
     float back = 0.0, kept = 1.0;
     for (int i = 0; i < count; ++i) {

@@ -1,5 +1,5 @@
-// Gaussian in place and in distance (Tomasi and Manduchi 1998). A miss stays a miss and weighs nothing, so no edge is
-// drawn or moved. An invocation makes four pixels, one below the other, whose windows share most of their texels.
+// Gaussian in position and in distance (Tomasi and Manduchi 1998). A miss stays a miss and has no weight, so that no edge is
+// created or moved. An invocation makes four vertically adjacent pixels, whose windows share most of their texels.
 // variants: distance DISTANCE
 #version 460
 layout(constant_id = 0) const int RADIUS = 8;
@@ -26,7 +26,7 @@ void main() {
         centre[i] = read_at(ivec3(at.x, min(at.y + i, last.y), at.z));
         hit = hit || VALID(centre[i]);
     }
-    // exp2 is what exp is made of.
+    // exp is computed from exp2.
     const float LOG2_E = 1.442695041;
     float place_fall = -LOG2_E * place_narrowness, distance_fall = -LOG2_E * distance_narrowness;
     int top = max(at.y - RADIUS, 0), bottom = min(at.y + RUN - 1 + RADIUS, last.y);

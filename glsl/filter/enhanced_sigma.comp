@@ -1,10 +1,10 @@
-// The sigma filter with a growing window (thesis 5.4, 5.5): while fewer pixels than the starting window holds lie within the
-// range of the estimated centre, the window grows by one on every side. Colours go by their brightness. A miss stays a miss
-// and counts nowhere. Variant growth writes by how many rings the window grew instead.
+// The sigma filter with a growing window (thesis 5.4, 5.5): while fewer pixels than the starting window holds are within the
+// range of the estimated centre, the window grows by one on every side. Colours are compared by their brightness. A miss stays
+// a miss and is ignored elsewhere. Variant growth writes the number of rings that the window grew.
 // variants: plane; slice SLICE; distance DISTANCE; picture PICTURE; growth GROWTH
 #version 460
-layout(constant_id = 0) const int RADIUS = 2;  // to start with
-layout(constant_id = 1) const int LARGEST = 9;
+layout(constant_id = 0) const int RADIUS = 2;  // of the starting window
+layout(constant_id = 1) const int MAX_RADIUS = 9;
 layout(constant_id = 2) const int ESTIMATOR = 0;
 layout(constant_id = 3) const int MULTIPLICATIVE = 0; // the range is a share of the centre
 #extension GL_EXT_scalar_block_layout : require
@@ -12,7 +12,7 @@ layout(scalar) uniform Params {
     float range; // 2 sigma, at most 1e30
     float few;   // K
     float edge;  // k of a Perona-Malik centre
-    float least; // difference that a gradient-inverse centre takes for none
+    float least; // smallest difference that a gradient-inverse centre distinguishes
 #include "slice_params.glsl"
 };
 #include "filter.glsl"
@@ -39,14 +39,14 @@ void main() {
     float within = MULTIPLICATIVE != 0 ? range * abs(centre) : range;
     // Sums of differences from the pixel: a distance of 100 mm keeps its micrometres in f32.
     T sum = T(0.0);
-    float count = 0.0, wanted = 0.0;
+    float count = 0.0, start_count = 0.0;
     int rings = 0;
-    for (int r = 0; r <= LARGEST; ++r) {
-        // The starting window whole, then a ring at a time: whoever has enough is done.
-        if (r > RADIUS && count >= wanted) break;
+    for (int r = 0; r <= MAX_RADIUS; ++r) {
+        // The complete starting window, then one ring at a time until enough pixels are within the range.
+        if (r > RADIUS && count >= start_count) break;
         rings = max(r - RADIUS, 0);
         for (int i = 0; i < max(8 * r, 1); ++i) {
-            // Round the ring of radius r: four sides of 2r pixels.
+            // Around the ring of radius r: four sides of 2r pixels.
             int side = r > 0 ? i / (2 * r) : 0, along = r > 0 ? i % (2 * r) : 0;
             ivec2 away = side == 0 ? ivec2(along - r, -r) : side == 1 ? ivec2(r, along - r) : side == 2 ? ivec2(r - along, r) : ivec2(-r, r - along);
             ivec2 tap = at.xy + away;
@@ -56,15 +56,15 @@ void main() {
             float inside = abs(brightness(value) - centre) <= within ? 1.0 : 0.0;
             sum += inside * (value - here);
             count += inside;
-            wanted += r <= RADIUS ? 1.0 : 0.0;
+            start_count += r <= RADIUS ? 1.0 : 0.0;
         }
     }
 #ifdef GROWTH
     write_at(at, float(rings));
 #else
     T result = sum / max(count, 1.0);
-    // Beyond the border are no pixels that could be alike: all there are is enough.
-    if (count <= min(few, wanted - 1.0)) {
+    // Near the border fewer pixels exist: all of them are enough.
+    if (count <= min(few, start_count - 1.0)) {
         sum = T(0.0);
         count = 0.0;
         for (int i = 0; i < 4; ++i) {

@@ -1,11 +1,11 @@
-// A local estimator as a filter of its own: median, Perona-Malik, gradient-inverse, Nagao-Matsuyama (thesis 5.4).
+// A local estimator as a filter: median, Perona-Malik, gradient-inverse, Nagao-Matsuyama (thesis 5.4).
 // variants: plane; slice SLICE
 #version 460
 layout(constant_id = 0) const int ESTIMATOR = 0;
 #extension GL_EXT_scalar_block_layout : require
 layout(scalar) uniform Params {
     float edge;  // k of Perona-Malik
-    float least; // difference that gradient-inverse takes for none
+    float least; // smallest difference that gradient-inverse distinguishes
 #include "slice_params.glsl"
 };
 #include "filter.glsl"

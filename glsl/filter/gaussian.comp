@@ -1,5 +1,5 @@
-// One axis of a separable Gaussian. Taps beyond the border are left out and the rest renormalised. An invocation makes four texels
-// in a row along the axis, whose taps slide through registers.
+// One axis of a separable Gaussian. Taps beyond the border are omitted and the weights renormalised. An invocation makes four
+// adjacent texels along the axis and passes their taps through registers.
 // variants: plane; slice SLICE; volume VOLUME
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
@@ -7,10 +7,10 @@ layout(constant_id = 1) const int AXIS = 0;
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
 layout(scalar) uniform Params {
-    float narrowness; // 1 / (2 sigma^2), a texel
+    float narrowness; // 1 / (2 sigma^2), 1/texel^2
 #include "slice_params.glsl"
 #ifdef VOLUME
-    int slices; // that are made anew, from `slice` on
+    int slices; // updated slices, from `slice` on
 #endif
 };
 #include "filter.glsl"
@@ -21,13 +21,13 @@ void main() {
     ivec3 at = made_run(AXIS, RUN);
     ivec3 size = source_size();
 #ifdef VOLUME
-    at.z += slice; // the first that is made anew
+    at.z += slice; // the first updated slice
     size.z = min(size.z, slice + slices);
 #endif
     if (any(greaterThanEqual(at, size))) return;
     int length = source_size()[AXIS];
     vec4 sum = vec4(0.0), weight = vec4(0.0);
-    // The taps that are i away from each of the four, and whether they are there.
+    // The taps at offset i from each of the four, and 1 where they exist.
     vec4 taps = vec4(0.0), there = vec4(0.0);
     [[unroll]] for (int i = -RADIUS - RUN + 1; i <= RADIUS; ++i) {
         ivec3 tap = at;

@@ -1,6 +1,6 @@
-// Median of a square window; beyond the border the nearest pixel stands in. Of distances: hits and misses vote, and where
-// hits win, the (lower) median of the hits, so that a pinhole is closed and no rim is drawn towards a miss. An invocation
-// makes four pixels, one below the other, whose windows share most of their texels.
+// Median of a square window; beyond the border the nearest pixel repeats. For distances, where more pixels are hits than misses,
+// the (lower) median of the hits: this closes pinholes and draws no rim towards a miss. An invocation makes four vertically
+// adjacent pixels, whose windows share most of their texels.
 // variants: plane; slice SLICE; distance DISTANCE
 #version 460
 #ifdef DISTANCE
@@ -24,7 +24,7 @@ vec3 sorted(vec3 v) {
     return vec3(min(low, v.z), min(high, rest), max(high, rest));
 }
 
-// Of 3x3, from rows that are sorted: the middle of the largest least, the middle middle and the smallest largest.
+// Medians of 3x3 from sorted rows: the median of the largest minimum, the middle median and the smallest maximum.
 vec4 medians(ivec2 at, ivec2 last) {
     vec3 row[RUN + 2];
     for (int y = 0; y < RUN + 2; ++y) {

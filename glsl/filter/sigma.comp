@@ -1,6 +1,6 @@
-// Lee's sigma filter: the mean of the neighbours within `range` of the centre; where no more than `few` are, nor all that
-// there are, the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.) An invocation makes four pixels, one below
-// the other, whose windows share most of their texels.
+// Lee's sigma filter: the mean of the neighbours within `range` of the centre. Where at most `few` are, and not all that exist,
+// the mean of the four immediate neighbours. (Lee 1983; thesis 5.3.) An invocation makes four vertically adjacent pixels, whose
+// windows share most of their texels.
 // variants: plane; slice SLICE; distance DISTANCE; picture PICTURE
 #version 460
 layout(constant_id = 0) const int RADIUS = 3;
@@ -44,7 +44,7 @@ void main() {
             int column = clamp(at.x + x, 0, last.x);
             T value = read_at(ivec3(column, y, at.z));
             bool is_there = column == at.x + x && VALID(value);
-            // Further away than `range` can be, as a miss is from any hit.
+            // Further from the centre than any `range`.
             if (!is_there) value = T(MISS);
             row_there += is_there ? 1.0 : 0.0;
             [[unroll]] for (int i = 0; i < RUN; ++i) {

@@ -1,4 +1,4 @@
-// What the two sweeps of the AOS scheme share: one invocation a row (AXIS 0) or a column (AXIS 1).
+// Shared by the two sweeps of the AOS scheme: one invocation per row (AXIS 0) or per column (AXIS 1).
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_samplerless_texture_functions : require
 layout(local_size_x = 64) in;

@@ -1,2 +1,2 @@
 #include "ray_block.glsl"
-    float cliff; // mm between neighbours that are two surfaces
+    float cliff; // neighbours further apart than this are two surfaces, mm

@@ -1,4 +1,4 @@
-// How well a texel passes on to its neighbour, from their difference. Colours share one conductance, by the root mean square
+// Conductance between a texel and its neighbour, from their difference. Colours share one conductance, from the root mean square
 // of their three differences (Gerig et al. 1992), which for a grey is the grey's difference.
 #include "conductance.glsl"
 float across(T away) {

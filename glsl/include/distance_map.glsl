@@ -1,4 +1,4 @@
-// The distance map in space: places and normals of what each pixel sees.
+// The distance map in space: positions and normals of the surface at each pixel.
 uniform texture2D distance_map;
 
 vec3 ray_direction(vec2 at) { return normalize(direction + direction_dx * at.x + direction_dy * at.y); }
@@ -10,8 +10,8 @@ float distance_at(ivec2 pixel) {
     return texelFetch(distance_map, pixel, 0).x;
 }
 
-// Change of place over one pixel along `along`: central where both neighbours belong to the same surface, one-sided where
-// one does, and a plane facing the viewer where none does. Nothing is taken across a cliff.
+// Displacement over one pixel along `along`: central where both neighbours belong to the same surface, one-sided where one does,
+// and that of a plane facing the viewer where none does. No difference is taken across a cliff.
 vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 facing) {
     float back = distance_at(pixel - along), on = distance_at(pixel + along);
     bool use_back = abs(back - here) <= cliff, use_on = abs(on - here) <= cliff;
@@ -20,13 +20,13 @@ vec3 slope(ivec2 pixel, ivec2 along, float here, vec3 facing) {
     float near = use_back ? back : here, far = use_on ? on : here;
     vec3 first_ray = ray_direction(vec2(first) + 0.5), second_ray = ray_direction(vec2(second) + 0.5);
     vec2 steps = vec2(second - first);
-    // The difference of two places, term by term: subtracting the places would cancel all but a few of f32's digits.
+    // The difference of two positions, term by term: subtracting the positions would cancel most of f32's digits.
     return origin_dx * steps.x + origin_dy * steps.y + second_ray * (far - near) + (second_ray - first_ray) * near;
 }
 
-// Unit normal at a pixel that sees a surface, towards the viewer.
+// Unit normal at a pixel with a surface, towards the viewer.
 vec3 normal_at(ivec2 pixel, float here, vec3 along_ray) {
-    // Pixel axes in space at unit distance: what a surface that faces the viewer spans.
+    // The pixel's axes in space at unit distance, for a surface that faces the viewer.
     vec3 sx = slope(pixel, ivec2(1, 0), here, origin_dx + direction_dx);
     vec3 sy = slope(pixel, ivec2(0, 1), here, origin_dy + direction_dy);
     vec3 normal = cross(sy, sx);

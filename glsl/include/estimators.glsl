@@ -1,6 +1,6 @@
-// Local estimators of a pixel from those around it (thesis 5.4). Whoever includes this declares `constant ESTIMATOR`, the
-// parameters `edge` and `least`, and `float level(ivec2)`: a pixel as one number. Beyond the border the nearest pixel stands in.
-// A miss counts nowhere. `at` itself must be no miss.
+// Local estimators of a pixel from its neighbours (thesis 5.4). The including shader declares `constant ESTIMATOR`, the parameters
+// `edge` and `least`, and `float level(ivec2)`: a pixel as one number. Beyond the border the nearest pixel repeats. Misses are
+// ignored. `at` itself must not be a miss.
 #include "conductance.glsl"
 
 float level_near(ivec2 at, ivec2 last) { return level(clamp(at, ivec2(0), last)); }
@@ -13,8 +13,8 @@ float median_of(ivec2 at, ivec2 last) {
         v[i] = level_near(at + ivec2(i % 3 - 1, i / 3 - 1), last);
         hits += VALID(v[i]) ? 1 : 0;
     }
-    // Every round of bubbling brings the largest that is left to its place: five reach the middle of nine, and a miss is
-    // larger than any hit, so that eight reach the middle of the hits.
+    // Every round of bubble sort puts the largest remaining value in its place: five rounds reach the middle of nine. A miss is
+    // larger than any hit, so that eight rounds reach the middle of the hits.
 #ifdef DISTANCE
     const int ROUNDS = 8;
 #else
@@ -53,10 +53,10 @@ float gradient_inverse_of(ivec2 at, ivec2 last) {
     return weight > 0.0 ? here + 0.5 * sum / weight : here;
 }
 
-// The nine masks of 5x5, bit 5 row + column: the square of 3x3, four that lean to an edge and four to a corner, of 7 pixels.
+// The nine masks of 5x5, bit 5 row + column: the square of 3x3, and of 7 pixels each four towards an edge and four towards a corner.
 const int MASKS[9] = int[9](0x739c0, 0x11ce, 0xc7300, 0xe71000, 0x19c60, 0x18e3, 0x3398, 0x18e3000, 0x339800);
 
-// Mean of the mask of least variance (Nagao and Matsuyama 1979); a mask with a miss is none.
+// Mean of the mask of least variance (Nagao and Matsuyama 1979). Masks with a miss are ignored.
 float nagao_matsuyama_of(ivec2 at, ivec2 last) {
     float here = level(at), v[25];
     for (int i = 0; i < 25; ++i) v[i] = level_near(at + ivec2(i % 5 - 2, i / 5 - 2), last);
@@ -64,17 +64,17 @@ float nagao_matsuyama_of(ivec2 at, ivec2 last) {
     for (int m = 0; m < 9; ++m) {
         // Differences from the middle, whose square in f32 is exact enough to order the variances.
         float sum = 0.0, squares = 0.0, count = 0.0;
-        bool whole = true;
+        bool complete = true;
         for (int i = 0; i < 25; ++i) {
             if ((MASKS[m] >> i & 1) == 0) continue;
-            whole = whole && VALID(v[i]);
+            complete = complete && VALID(v[i]);
             float away = VALID(v[i]) ? v[i] - here : 0.0;
             sum += away;
             squares += away * away;
             count += 1.0;
         }
         float mean = sum / count, variance = squares / count - mean * mean;
-        if (whole && variance < least_variance) {
+        if (complete && variance < least_variance) {
             least_variance = variance;
             best = mean;
         }

@@ -1,5 +1,5 @@
-// What a filter reads and writes, by variant. T is what one texel holds.
-//   plane     2D to 2D, one channel            slices on their way
+// What a filter reads and writes, by variant. T is the type of one texel.
+//   plane     2D to 2D, one channel            slices between filters
 //   slice     2D to one slice of a 3D texture  the last filter of stage 1
 //   volume    3D to 3D                         across slices
 //   distance  2D to 2D, one channel with misses
@@ -38,7 +38,7 @@ uniform writeonly image3D target;
 uniform writeonly image2D target;
 #endif
 
-// The first of the `run` texels along an axis that this invocation makes: of a slice, what can be seen begins at its first.
+// The first of the `run` texels along an axis that this invocation makes, relative to the visible rectangle of a slice.
 ivec3 made_run(int axis, int run) {
     ivec3 at = ivec3(gl_GlobalInvocationID);
     at[axis] *= run;

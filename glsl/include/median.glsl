@@ -1,13 +1,13 @@
-// Exact medians of the hits in the windows of four pixels one below the other. Eight thresholds at a time are counted over
-// the rows that the windows share, each for all four; they close in on the ranks wanted, and once at most three values lie
-// between a threshold and the rank, one more look keeps the four least above it. Nothing is held but counts, at any window.
-// Whoever includes this declares RADIUS and `float tap(ivec2, ivec2)`.
+// Exact medians of the hits in the windows of four vertically adjacent pixels. Eight thresholds at a time are counted over the
+// rows that the windows share, each for all four windows. The thresholds converge to the ranks, and once at most three values
+// are between a threshold and the rank, a last pass keeps the four least values above it. Only counts are stored, at any window
+// size. The including shader declares RADIUS and `float tap(ivec2, ivec2)`.
 const vec4 PLACE = vec4(0.0, 1.0, 2.0, 3.0);
 const int ROUNDS = 6;
 
 vec4 ones(bvec4 which) { return mix(vec4(0.0), vec4(1.0), which); }
 bvec4 both(bvec4 a, bvec4 b) { return bvec4(ivec4(a) & ivec4(b)); }
-// The windows that hold a row, counted from the uppermost pixel's.
+// The windows that contain a row, counted from the uppermost pixel's.
 bvec4 holding(int row) { return lessThanEqual(abs(float(row) - PLACE), vec4(RADIUS)); }
 
 struct Counts {
@@ -46,8 +46,8 @@ Counts counted(ivec2 at, ivec2 last, vec4 a, vec4 b, bool first) {
     return c;
 }
 
-// Where values repeat so often that no threshold comes within three of the rank: by narrowing the range (after Torben
-// Mogensen's method). Every round ends on values that are there. The guess goes by rank, as if values lay evenly; every other
+// For values that repeat so often that no threshold comes within three of the rank: narrows the range (after Torben Mogensen's
+// method). Every round ends on values of the window. The guess interpolates by rank, as for uniformly spread values; every other
 // round halves the range, so that a cliff costs no more than a logarithm.
 float narrowed(ivec2 at, ivec2 last, float rank, float low, float high, float under_low, float within) {
     float found = low;
@@ -55,7 +55,7 @@ float narrowed(ivec2 at, ivec2 last, float rank, float low, float high, float un
     while (low < high) {
         float share = halve ? 0.5 : clamp((rank - under_low + 0.5) / within, 0.0, 1.0);
         halve = !halve;
-        // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value that is there.
+        // Clamped: the smallest numbers may be flushed to zero, and then no round would end on a value of the window.
         float guess = clamp(mix(low, high, share), low, high);
         float below = 0.0, equal = 0.0, under = low, over = high;
         for (int y = -RADIUS; y <= RADIUS; ++y) {
@@ -90,18 +90,18 @@ float narrowed(ivec2 at, ivec2 last, float rank, float low, float high, float un
 }
 
 vec4 medians(ivec2 at, ivec2 last) {
-    // The first thresholds are values of the window, around its middle.
+    // The first thresholds are values of the window around its middle.
     vec4 a, b;
     for (int i = 0; i < 4; ++i) {
         vec2 inner = float(RADIUS) * vec2(0.1, 0.3), outer = float(RADIUS) * vec2(0.65, -0.25);
-        mat2 turn = i == 0 ? mat2(1, 0, 0, 1) : i == 1 ? mat2(0, 1, -1, 0) : i == 2 ? mat2(-1, 0, 0, -1) : mat2(0, -1, 1, 0);
-        a[i] = tap(at + ivec2(0, 1) + ivec2(round(turn * inner)), last);
-        b[i] = tap(at + ivec2(0, 1) + ivec2(round(turn * outer)), last);
+        mat2 rotation = i == 0 ? mat2(1, 0, 0, 1) : i == 1 ? mat2(0, 1, -1, 0) : i == 2 ? mat2(-1, 0, 0, -1) : mat2(0, -1, 1, 0);
+        a[i] = tap(at + ivec2(0, 1) + ivec2(round(rotation * inner)), last);
+        b[i] = tap(at + ivec2(0, 1) + ivec2(round(rotation * outer)), last);
     }
     Counts c = counted(at, last, a, b, true);
     bvec4 surface = greaterThan(2.0 * c.hits, vec4((2 * RADIUS + 1) * (2 * RADIUS + 1)));
     if (!any(surface)) return vec4(MISS);
-    // The value of rank `rank` lies from low to high; `under` lie below low, `upto` not above high.
+    // The value of rank `rank` is from low to high; `under` values are below low, `upto` values are not above high.
     vec4 low = c.least, high = c.most, under = vec4(0.0), upto = c.hits, rank = floor((c.hits - 1.0) * 0.5);
     for (int round = 0; round < ROUNDS; ++round) {
         for (int i = 0; i < 8; ++i) {
@@ -115,13 +115,13 @@ vec4 medians(ivec2 at, ivec2 last) {
         }
         vec4 above = rank - under, within = max(upto - under, vec4(1.0));
         if (!any(both(surface, both(greaterThan(above, vec4(3.0)), lessThan(low, high))))) break;
-        // Where the rank would be if values lay evenly, a little below it so that the last look is from below.
+        // The position of the rank for uniformly spread values, minus a margin so that the last pass starts from below.
         vec4 margin = 0.25 * sqrt(within);
         a = mix(low, high, clamp((above - 1.0 - margin) / within, 0.0, 1.0));
         b = mix(low, high, clamp((above - 1.0 + margin) / within, 0.0, 1.0));
         c = counted(at, last, a, b, false);
     }
-    // Of the values from low on the four least, in order.
+    // The four least values from low on, in order.
     vec4 v0 = vec4(MISS), v1 = v0, v2 = v0, v3 = v0;
     for (int y = -RADIUS; y < RADIUS + 4; ++y) {
         vec4 from = mix(vec4(MISS), low, holding(y));

@@ -1,30 +1,30 @@
-// Rays, the sweep map, and sampling of the volume: what both ray casters share. Variants:
-//   plain   Cartesian or a single frame: no table
-//   SWEPT   fan or translated: the sweep look-up table
-//   MOVED   the motor travels while a frame is acquired: the line look-up table
-//   UNEVEN  slices at uneven places or of mixed directions: the slice table
+// Rays, the map from space to the sweep, and sampling of the volume: shared by all ray casters. Variants:
+//   plain               Cartesian or a single frame: no table
+//   SWEPT               fan or translated: the sweep look-up table
+//   INTRA_FRAME_MOTION  the motor moves while a frame is acquired: the line look-up table
+//   NON_UNIFORM         slices at non-uniform positions or of mixed directions: the slice table
 
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
 layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved
-layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two of four neighbours
-                                                // each: 2 bytes, 3 16 bits of 0..1, 4 half floats
-layout(constant_id = 20) const int CLIPS = 0;   // planes that cut
-layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the samples of a convex sweep do
+layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two loads of four packed
+                                                // neighbours: 2 of bytes, 3 of 16 bits of 0..1, 4 of half floats
+layout(constant_id = 20) const int CLIPS = 0;   // clip planes
+layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
 uniform sampler3D volume;
-uniform utexture3D quads;
+uniform utexture3D packed_neighbours;
 #ifdef SWEPT
 readonly buffer SweepLut { float entry[]; } sweep_lut;
 #endif
-#ifdef MOVED
+#ifdef INTRA_FRAME_MOTION
 readonly buffer LineLut { float entry[]; } line_lut;
 #endif
-#ifdef UNEVEN
+#ifdef NON_UNIFORM
 readonly buffer SliceTable { vec2 entry[]; } slice_table; // position and advance, in mean pitches
 #endif
 
-// Asked once: every sample needs it.
+// Queried once, because every sample needs it.
 ivec3 volume_last = textureSize(volume, 0) - 1;
 
 struct Ray {
@@ -32,7 +32,7 @@ struct Ray {
     vec3 direction;
     float enter;
     float leave;
-    // Steps that grow: the n-th is `first` exp(n `growth`) mm long.
+    // Steps that grow: step n is `first` exp(n `growth`) mm long.
     float first;
     float growth;
 };
@@ -43,13 +43,13 @@ float growth_over(float x) {
     return abs(x) < 0.5 ? series : (exp(x) - 1.0) / x;
 }
 
-// ln(1 + x) / x, likewise.
+// ln(1 + x) / x without losing a small x.
 float decline_over(float x) {
     float series = 1.0 - x * (1.0 / 2.0 - x * (1.0 / 3.0 - x * (1.0 / 4.0 - x * (1.0 / 5.0 - x * (1.0 / 6.0 - x / 7.0)))));
     return abs(x) < 0.1 ? series : log(1.0 + x) / x;
 }
 
-// How much longer than `step_length` a step is at a place: in proportion to the range from the array's apex, at most 8.
+// Ratio of the step to `step_length` at a point: proportional to the range from the array's apex, at most 8.
 float widening(vec3 p) {
     float x = p.x, y = p.y;
     if (SWEEP == 1) {
@@ -59,7 +59,7 @@ float widening(vec3 p) {
     return 1.0 + spread * (clamp(sqrt(x * x + y * y) / spread_range, 1.0, 8.0) - 1.0);
 }
 
-// mm behind the ray's entry after n steps.
+// Distance from the ray's entry after n steps, mm.
 float offset_of(Ray ray, float n) {
     return SPREAD == 0 ? n * step_length : ray.first * n * growth_over(n * ray.growth) / growth_over(ray.growth);
 }
@@ -67,16 +67,16 @@ float offset_of(Ray ray, float n) {
 // Length of the step that begins after n steps, mm.
 float length_of(Ray ray, float n) { return SPREAD == 0 ? step_length : ray.first * exp(n * ray.growth); }
 
-// Steps to an offset: the inverse of `offset_of`.
+// Number of steps to an offset: the inverse of `offset_of`.
 float steps_to(Ray ray, float offset) {
     if (SPREAD == 0) return offset / step_length;
     float n = offset * growth_over(ray.growth) / ray.first;
     return n * decline_over(max(n * ray.growth, -0.999999));
 }
 
-// The ray of a pixel and where it lies in the box, on the near side of every clip plane; leave < enter is a miss. A ray
-// parallel to a face divides by zero: the infinities are ordered rightly by min and max, and the 0/0 of a ray within the
-// face's plane is avoided by the nudge.
+// The ray of a pixel, and its interval inside the box and on the near side of every clip plane; leave < enter is a miss. A ray
+// parallel to a face would divide by zero: min and max order the infinities correctly, and the smallest component of 1e-12
+// avoids the 0/0 of a ray within the face's plane.
 Ray ray_of(ivec2 pixel) {
     vec2 at = vec2(pixel) + 0.5;
     Ray ray;
@@ -91,16 +91,16 @@ Ray ray_of(ivec2 pixel) {
     for (int i = 0; i < CLIPS; ++i) {
         vec4 plane = i == 0 ? clip_0 : i == 1 ? clip_1 : i == 2 ? clip_2 : clip_3;
         float towards = dot(plane.xyz, ray.direction);
-        float room = plane.w - dot(plane.xyz, ray.origin);
-        // Parallel to the plane: all of the ray is kept, or none.
-        if (abs(towards) < 1e-12) ray.leave = room < 0.0 ? -1.0 : ray.leave;
-        else if (towards > 0.0) ray.leave = min(ray.leave, room / towards);
-        else ray.enter = max(ray.enter, room / towards);
+        float clearance = plane.w - dot(plane.xyz, ray.origin);
+        // Parallel to the plane: keep all of the ray, or none.
+        if (abs(towards) < 1e-12) ray.leave = clearance < 0.0 ? -1.0 : ray.leave;
+        else if (towards > 0.0) ray.leave = min(ray.leave, clearance / towards);
+        else ray.enter = max(ray.enter, clearance / towards);
     }
     ray.first = step_length;
     ray.growth = 0.0;
     if (SPREAD == 1 && ray.leave > ray.enter) {
-        // Linear between the ray's ends, so that the place of step n has a closed form.
+        // Linear between the ray's ends, so that the position of step n has a closed form.
         float low = widening(ray.origin + ray.direction * ray.enter);
         float high = widening(ray.origin + ray.direction * ray.leave);
         ray.growth = step_length * (high - low) / (ray.leave - ray.enter);
@@ -109,8 +109,8 @@ Ray ray_of(ivec2 pixel) {
     return ray;
 }
 
-// Texture indices (column, row, slice) of a place in space; false outside the insonified region. No trigonometry: the
-// angle about the wobble axis enters as the tangent of its half, z / (rho + y), through the look-up table.
+// Texture indices (column, row, slice) of a point in space; false outside the insonified region. No trigonometry: the look-up
+// table takes the tangent of half the angle about the wobble axis, z / (rho + y).
 bool locate(vec3 p, out vec3 texel) {
     if (SWEEP == 0) {
         texel = vec3((p.xy - grid_origin) * grid_density, (p.z - slice_origin) * slice_density);
@@ -136,16 +136,16 @@ bool locate(vec3 p, out vec3 texel) {
     inside = inside && e >= 0.0 && e <= float(last);
     int i = clamp(int(e), 0, last - 1);
     k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
-#ifdef MOVED
-    // Share of the frame's lines fired before this one.
+#ifdef INTRA_FRAME_MOTION
+    // Share of the frame's lines that fired before this one.
     float l = clamp((line - line_low) * line_density, 0.0, float(line_lut.entry.length() - 1));
     int j = clamp(int(l), 0, line_lut.entry.length() - 2);
     float share = mix(line_lut.entry[j], line_lut.entry[j + 1], l - float(j));
 #else
     const float share = 0.0;
 #endif
-#ifdef UNEVEN
-    // Bracketing: positions rise from slice to slice for every line, and the even guess is rarely more than one off.
+#ifdef NON_UNIFORM
+    // Bracketing: positions increase from slice to slice for every line, and the uniform guess is rarely off by more than one.
     int slices = slice_table.entry.length();
     int s = clamp(int(k), 0, slices - 2);
     while (s > 0 && slice_table.entry[s].x + slice_table.entry[s].y * share > k) --s;
@@ -158,7 +158,7 @@ bool locate(vec3 p, out vec3 texel) {
     k -= advance * share;
     float final_slice = float(volume_last.z);
 #endif
-    // An index that is off by rounding at the outermost frame is still inside.
+    // An index that rounding puts just beyond the outermost frame is still inside.
     inside = inside && k >= -1e-4 && k <= final_slice + 1e-4;
 #endif
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
@@ -167,16 +167,16 @@ bool locate(vec3 p, out vec3 texel) {
 
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 
-// A texel, the next column's, the next row's, and that of both, in units of QUAD_UNIT.
-const float QUAD_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
-vec4 quad_at(ivec3 at) {
-    uvec2 bits = texelFetch(quads, at, 0).xy;
+// A texel, the next column's, the next row's, and the diagonal neighbour's, in units of NEIGHBOUR_UNIT.
+const float NEIGHBOUR_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
+vec4 neighbours_at(ivec3 at) {
+    uvec2 bits = texelFetch(packed_neighbours, at, 0).xy;
     if (SAMPLING == 2) return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255);
     if (SAMPLING == 3) return vec4(ivec4(bits.xxyy >> uvec4(0, 16, 0, 16)) & 65535);
     return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
-// The volume at texture indices; beyond the border the nearest texel.
+// The volume at texture indices; beyond the border it repeats the nearest texel.
 float raw_volume(vec3 texel) {
     if (SAMPLING == 0) return textureLod(volume, (texel + 0.5) / vec3(volume_last + 1), 0.0).x;
     vec3 at = clamp(texel, vec3(0.0), vec3(volume_last));
@@ -184,15 +184,15 @@ float raw_volume(vec3 texel) {
     vec3 w = at - vec3(low);
     vec4 near, far;
     if (SAMPLING > 1) {
-        near = quad_at(low);
-        far = quad_at(ivec3(low.xy, high.z));
+        near = neighbours_at(low);
+        far = neighbours_at(ivec3(low.xy, high.z));
     } else {
         near = vec4(fetch(low), fetch(ivec3(high.x, low.yz)), fetch(ivec3(low.x, high.y, low.z)), fetch(ivec3(high.xy, low.z)));
         far = vec4(fetch(ivec3(low.xy, high.z)), fetch(ivec3(high.x, low.y, high.z)), fetch(ivec3(low.x, high.yz)), fetch(high));
     }
     vec4 plane = mix(near, far, w.z);
     vec2 row = mix(plane.xz, plane.yw, w.x);
-    return mix(row.x, row.y, w.y) * QUAD_UNIT;
+    return mix(row.x, row.y, w.y) * NEIGHBOUR_UNIT;
 }
 
 float windowed(float value) { return clamp((value - window_low) * window_scale, 0.0, 1.0); }

@@ -1,4 +1,4 @@
-    // Rays, affine in the pixel's place.
+    // Rays, affine in the pixel's coordinates.
     vec3 origin;
     vec3 origin_dx;
     vec3 origin_dy;

@@ -1,21 +1,21 @@
 #include "ray_block.glsl"
-    // What is rendered, mm.
+    // The rendered box, mm.
     vec3 box_low;
     vec3 box_high;
     float step_length; // mm
-    float spread;       // 0: even steps, 1: in proportion to the range
-    float spread_range; // mm at which a step is not longer yet
-    vec4 clip_0; // what lies beyond is cut away: dot(xyz, p) > w
+    float spread;       // 0: uniform steps, 1: proportional to the range
+    float spread_range; // range up to which steps have their shortest length, mm
+    vec4 clip_0; // points with dot(xyz, p) > w are cut away
     vec4 clip_1;
     vec4 clip_2;
     vec4 clip_3;
     vec3 brick_low;     // corner of the first brick, mm
-    vec3 brick_density; // bricks a mm
+    vec3 brick_density; // bricks per mm
     float window_low;
     float window_scale;
     // Space to texture.
     vec2 grid_origin;  // in-plane mm of pixel (0, 0)
-    vec2 grid_density; // pixels a mm
+    vec2 grid_density; // pixels per mm
     float slice_origin; // Cartesian: mm of slice 0
     float slice_density;
     // The sector: ranges in mm, lines as half tangents (curved) or mm (linear).

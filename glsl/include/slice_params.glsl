@@ -1,5 +1,5 @@
     int slice;
 #if !defined(DISTANCE) && !defined(PICTURE)
-    int first_column; // of what is made of a slice
+    int first_column; // of the rectangle that is made
     int first_row;
 #endif

@@ -1,21 +1,21 @@
-// The 3D filter of the thesis (4.3): a Gaussian about each sample of the ray, across it and along it, made while the ray is
-// cast. Only the front slice is new at each step; the sums of the slices behind it are kept. Taps outside the insonified
-// region are left out and the rest renormalised.
+// The 3D filter of the thesis (4.3): a Gaussian around each sample of the ray, across and along it, computed while the ray is
+// cast. Each step adds the front slice only; the sums of the slices behind it are kept. Taps outside the insonified region are
+// omitted and the weights renormalised.
 
-const float SAMPLE_AT = 0.5; // samples lie in the middle of their steps
+const float SAMPLE_AT = 0.5; // samples are in the middle of their steps
 
 struct Slices {
     vec2 a, b, c, d, e; // weighted sums and weights of the last slices, the newest last
     int newest;
 };
 
-// Deviation sqrt(n - 1) / 2 steps, as the binomial of that length has.
+// Deviation sqrt(n - 1) / 2 steps, as of the binomial of that length.
 float tap_weight(int away) { return exp(-float(away * away) * 2.0 / float(max(SLIDING - 1, 1))); }
 
 vec2 front_slice(Ray ray, int i, float sample_at) {
     float at = float(i) + sample_at;
     vec3 p = ray.origin + ray.direction * (ray.enter + offset_of(ray, at));
-    // Across the ray, a step apart as along it.
+    // Across the ray, with the same spacing as along it.
     vec3 sideways = origin_dx + direction_dx;
     vec3 across = normalize(sideways - ray.direction * dot(sideways, ray.direction));
     vec3 upwards = cross(across, ray.direction);
@@ -33,12 +33,12 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
 
 Slices no_slices() { return Slices(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), -0x40000000); }
 
-// The filtered sample i of a ray. Steps may be skipped or taken back: what is missing is summed anew.
+// The filtered sample i of a ray. Steps may be skipped or taken back: missing slices are summed again.
 //
-// Slices move to their places before the loop, and the loop only fills places. A loop that hands each slice on to the next
-// place, as `a = b; b = c; ...`, and that rays leave after different numbers of rounds, is compiled wrongly by llvmpipe
-// (Mesa 22.3): what is in use behind a loop without having been computed in it is copied at the start of every round,
-// whether a ray is still in the loop or not, and by then the place it is copied from holds the next slice.
+// The slices are shifted before the loop, and the loop only fills empty places. llvmpipe (Mesa 22.3) miscompiles a loop that
+// shifts them, as `a = b; b = c; ...`, and that rays leave after different numbers of iterations: a value used after the loop
+// but not computed in it is copied at the start of every iteration, whether or not the ray is still in the loop, and by then
+// its source holds the next slice.
 float slid(Ray ray, int i, float sample_at, inout Slices s) {
     const int half_width = SLIDING / 2;
     int missing = i + half_width - s.newest;
@@ -60,7 +60,7 @@ float slid(Ray ray, int i, float sample_at, inout Slices s) {
     return sum.y > 0.0 ? windowed(sum.x / sum.y) : 0.0;
 }
 
-// Sample i, whose own place has these texture indices.
+// Sample i, which has these texture indices.
 float sample_along(Ray ray, int i, float sample_at, vec3 texel, inout Slices s) {
     return SLIDING == 0 ? sample_volume(texel) : slid(ray, i, sample_at, s);
 }

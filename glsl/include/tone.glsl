@@ -1,9 +1,9 @@
-// A colour as the screen shows it: contrast about the middle grey, brightness, gamma, colour map; over planes also cross-lines and
-// frames, which no colour map changes.
+// A colour as the screen shows it: contrast around middle grey, brightness, gamma, colour map; over planes also cross-lines and
+// frames, to which no colour map is applied.
 vec3 toned(vec3 c) {
     c = clamp((c - 0.5) * contrast + 0.5 + brightness, 0.0, 1.0);
     if (GAMMA != 0) {
-        // pow(0, x) of a driver may be anything that log2(0) * x makes.
+        // A driver's pow(0, x) may be any result of log2(0) * x.
         c = mix(pow(max(c, vec3(1e-8)), vec3(exponent)), vec3(0.0), lessThanEqual(c, vec3(1e-8)));
     }
     if (COLOUR_MAP == 1) {
@@ -25,7 +25,7 @@ vec3 with_lines(vec3 c, ivec2 pixel, ivec2 size) {
     vec2 at = vec2(pixel - corner) + 0.5;
     for (int i = 0; i < CROSSING; ++i) {
         vec4 line = tile_line(n, i);
-        // As much of the pixel as a line one pixel wide covers.
+        // The share of the pixel that a line one pixel wide covers.
         float cover = clamp(1.0 - abs(dot(line.xy, at) + line.z), 0.0, 1.0) * line.w;
         c = mix(c, tile_line_colour(n, i).rgb, line_strength * cover);
     }

@@ -1,4 +1,4 @@
-// How fast the device reads and writes a picture when nothing else is to be done.
+// Measures how fast the device reads and writes a picture without computing.
 #version 460
 #include "common.glsl"
 uniform texture2D source;

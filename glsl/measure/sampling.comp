@@ -1,4 +1,4 @@
-// How fast the device takes samples when nothing else is to be done: neighbours side by side, straight through the volume.
+// Measures how fast the device takes samples without computing: adjacent pixels, straight through the volume.
 // variants: plain
 #version 460
 #include "common.glsl"

@@ -1,5 +1,5 @@
-// From what was rendered to the picture: the mean of several rays a pixel, or what lies between the
-// rays where one makes four pixels, and its place beside the planes of a 4-up picture.
+// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes four
+// pixels; in a 4-up picture, the rendering next to the planes.
 // variants: alone; four FOUR
 #version 460
 #include "common.glsl"

@@ -23,7 +23,7 @@ void main() {
     ivec2 size = imageSize(screen);
     if (any(greaterThanEqual(pixel, size))) return;
     vec4 lit = texelFetch(picture, pixel, 0);
-    // Where nothing was hit the picture stays black, whatever the brightness.
+    // Pixels without a hit stay black, whatever the brightness.
     vec3 c = lit.a > 0.0 ? toned(lit.rgb) : vec3(0.0);
 #ifdef LINES
     c = with_lines(c, pixel, size);

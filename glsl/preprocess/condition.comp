@@ -1,20 +1,20 @@
-// The samples of a polar frame before scan conversion: time gain compensation, Gaussian low pass and decimation along the
+// Conditions the lines of a polar frame before scan conversion: time gain compensation, Gaussian low pass and decimation along the
 // line, log compression (thesis 4.3). Output j is centred on input j FACTOR.
 // variants: plain; gained GAINED
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RADIUS = 0; // taps of the low pass on one side
-layout(constant_id = 1) const int FACTOR = 1; // samples that become one
-layout(constant_id = 2) const int LOG = 0;    // 0 compressed already, 1 linear envelopes
+layout(constant_id = 1) const int FACTOR = 1; // decimation factor
+layout(constant_id = 2) const int LOG = 0;    // 0 input is log-compressed, 1 input is linear envelopes
 layout(scalar) uniform Params {
     float gain; // stored value to 0..1
     float offset;
-    float narrowness; // of the low pass: 1 / (2 sigma^2), a sample
+    float narrowness; // of the low pass: 1 / (2 sigma^2), 1/sample^2
     float per_octave; // 20 log10(2) / dynamic range
 };
 uniform texture2D frames; // one layer of the frame array
 #ifdef GAINED
-readonly buffer Tgc { float entry[]; } tgc; // a sample's gain: a factor of envelopes, an addend of what is compressed
+readonly buffer Tgc { float entry[]; } tgc; // gain per sample: a factor of envelopes, an addend of compressed samples
 #endif
 uniform writeonly image2D conditioned;
 
@@ -30,7 +30,7 @@ void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, imageSize(conditioned)))) return;
     int last = textureSize(frames, 0).x - 1;
-    // Taps beyond the ends of the line are left out and the rest renormalised.
+    // Taps beyond the ends of the line are omitted and the weights renormalised.
     float sum = 0.0, weight = 0.0;
     for (int i = -RADIUS; i <= RADIUS; ++i) {
         int tap = at.x * FACTOR + i;
@@ -39,7 +39,7 @@ void main() {
         weight += w;
     }
     float value = sum / weight;
-    // No logarithm of 0: what is less than the smallest normal float lies far below any range.
+    // No logarithm of 0: values below the smallest normal float are far below any dynamic range.
     if (LOG == 1) value = 1.0 + per_octave * log2(max(value, 1.2e-38));
     imageStore(conditioned, at, vec4(clamp(value, 0.0, 1.0), 0.0, 0.0, 0.0));
 }

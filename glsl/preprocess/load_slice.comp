@@ -1,4 +1,4 @@
-// A slice of a volume that is Cartesian already: scaled to 0..1, nothing else.
+// A slice of a Cartesian volume, scaled to 0..1.
 // variants: plane; slice SLICE
 #version 460
 #include "common.glsl"

@@ -1,5 +1,5 @@
-// One polar frame into one slice: the look-up table says between which samples and lines a pixel lies; pixels outside the
-// sector are left out (thesis Fig. 31), or black where filters read next.
+// Converts one polar frame into one slice. The look-up table gives the fractional sample and line of each pixel. Pixels outside
+// the sector are not written (thesis Fig. 31), or are black where a filter reads the slice next.
 // variants: plane; slice SLICE
 #version 460
 #include "common.glsl"
@@ -18,9 +18,9 @@ void main() {
     ivec2 at = made_texel();
     if (any(greaterThanEqual(at, textureSize(scan_lut, 0)))) return;
     vec2 index = texelFetch(scan_lut, at, 0).xy;
-    if (index.x < 0.0) { // the inside flag
+    if (index.x < 0.0) { // outside the sector
 #ifndef SLICE
-        // Filters that carry far must not see what an earlier frame left there.
+        // Filters with a large reach must not read what an earlier frame left there.
         write_slice(at, 0.0);
 #endif
         return;

@@ -1,6 +1,6 @@
-// The volume as a solid block: each ray shows the sample where it enters. Where that is outside the insonified region it
-// goes on until it is inside: the sector's own border is a face then.
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+// The volume as a solid block: each ray shows the sample where it enters the block. Where that is outside the insonified
+// region, the ray continues until it is inside: the sector's border is then a face.
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EDGES = 1; // lines where two faces meet
@@ -17,7 +17,7 @@ readonly buffer Block { vec4 entry[]; } block; // outward normals and limits
 uniform writeonly image2D picture;
 
 const int HALVINGS = 6; // 1/64 of a step
-// Pixels from an edge at which its line has faded, on either side: at the block's outline there is only one, and a narrower
+// Pixels on either side of an edge over which its line fades. At the block's outline only one side exists, and a narrower
 // line would be a row of dots.
 const float EDGE_WIDTH = 1.5;
 
@@ -27,9 +27,9 @@ const int BORDERS = 6;
 const int BORDERS = SWEEP == 0 ? 0 : 4;
 #endif
 
-// Outward normal of one of the sector's borders near a place, and in w how far inside that lies, mm: first and last range,
-// line and slice. `slice` is the place's slice index. The motor's way over the lines of a frame turns the slices by less
-// than a degree and is left out of their normals.
+// Outward normal of one of the sector's borders near a point, and in w the distance from the point to the border, mm: first
+// and last range, line and slice. `slice` is the point's slice index. The motor's motion during a frame rotates the slices by
+// less than a degree and is ignored in their normals.
 vec4 border(int n, vec3 p, float slice) {
     float beyond = p.y - axis_depth, rho = SWEEP == 1 ? max(sqrt(beyond * beyond + p.z * p.z), 1e-20) : 1.0;
     // The frame's own depth axis in space.
@@ -50,7 +50,7 @@ vec4 border(int n, vec3 p, float slice) {
     vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
     // In mean pitches from the first slice.
     float position = slice, last = float(textureSize(volume, 0).z - 1);
-#ifdef UNEVEN
+#ifdef NON_UNIFORM
     int s = clamp(int(slice), 0, slice_table.entry.length() - 2);
     position = mix(slice_table.entry[s].x, slice_table.entry[s + 1].x, slice - float(s));
     last = slice_table.entry[slice_table.entry.length() - 1].x;
@@ -66,22 +66,22 @@ float beyond_angle(vec2 p, float half_tangent) {
     return (p.x * (1.0 - t2) - p.y * 2.0 * half_tangent) / (1.0 + t2);
 }
 
-// At least as far as this is the way to the insonified region, mm: each border is a distance from a sphere, a plane or a
-// cone that holds it, and no such distance shrinks faster than a ray goes.
-float way_to_sector(vec3 p) {
-    float y = p.y, x = p.x, away = 0.0;
+// Lower bound of the distance to the insonified region, mm. Each border is bounded by a sphere, a plane or a cone, and the
+// distance to those shrinks no faster than a ray advances.
+float distance_to_sector(vec3 p) {
+    float y = p.y, x = p.x, distance = 0.0;
     if (SWEEP == 1) y = length(vec2(p.y - axis_depth, p.z)) + axis_depth;
     float range = ARRAY == 1 ? length(vec2(x, y)) : y;
-    away = max(away, max(range - range_high, range_low - range));
-    away = max(away, ARRAY == 1 ? max(beyond_angle(vec2(x, y), line_high), -beyond_angle(vec2(x, y), line_low))
+    distance = max(distance, max(range - range_high, range_low - range));
+    distance = max(distance, ARRAY == 1 ? max(beyond_angle(vec2(x, y), line_high), -beyond_angle(vec2(x, y), line_low))
                                 : max(x - line_high, line_low - x));
 #ifdef SWEPT
     float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
     vec2 q = vec2(p.z, p.y - axis_depth);
-    away = max(away, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
+    distance = max(distance, SWEEP == 1 ? max(beyond_angle(q, sweep_high), -beyond_angle(q, sweep_low))
                                 : max(p.z - sweep_high, sweep_low - p.z));
 #endif
-    return away;
+    return distance;
 }
 
 void main() {
@@ -95,12 +95,12 @@ void main() {
     int face = -1; // the half-space that the ray enters last
     for (int i = 0; i < block.entry.length(); ++i) {
         float towards = dot(block.entry[i].xyz, along);
-        float room = block.entry[i].w - dot(block.entry[i].xyz, from);
-        // Parallel to the face: all of the ray is within, or none.
-        if (abs(towards) < 1e-12) leave = room < 0.0 ? -1.0 : leave;
-        else if (towards > 0.0) leave = min(leave, room / towards);
-        else if (room / towards > enter) {
-            enter = room / towards;
+        float clearance = block.entry[i].w - dot(block.entry[i].xyz, from);
+        // Parallel to the face: all of the ray is inside, or none.
+        if (abs(towards) < 1e-12) leave = clearance < 0.0 ? -1.0 : leave;
+        else if (towards > 0.0) leave = min(leave, clearance / towards);
+        else if (clearance / towards > enter) {
+            enter = clearance / towards;
             face = i;
         }
     }
@@ -108,7 +108,7 @@ void main() {
     if (leave > enter) {
         int steps = max(int(ceil((leave - enter) / stride)), 1);
         float step = (leave - enter) / float(steps);
-        // A little inside: where a face is the sector's own border, rounding must not put it outside.
+        // Slightly inside: where a face is the sector's border, rounding must not put the sample outside.
         enter += 0.02 * step;
         int found = -1;
         vec3 texel;
@@ -118,8 +118,8 @@ void main() {
                 found = i;
                 break;
             }
-            // Steps that are outside for certain are left out.
-            i += max(int(way_to_sector(p) / step - 0.01), 1);
+            // Skip steps that are certainly outside.
+            i += max(int(distance_to_sector(p) / step - 0.01), 1);
         }
         if (found >= 0) {
             float outside = enter + float(found - 1) * step, inside = enter + float(found) * step;
@@ -149,7 +149,7 @@ void main() {
             float grey = sample_volume(texel) * (1.0 - shading * (1.0 - abs(dot(normal, along))));
             colour = vec4(vec3(grey), 1.0);
             if (EDGES == 1 && (face >= 0 || own >= 0)) {
-                // Change of place on the face over one pixel.
+                // Displacement on the face over one pixel.
                 float scale = inside / length(unscaled);
                 vec3 ex = origin_dx + direction_dx * scale, ey = origin_dy + direction_dy * scale;
                 float facing = min(dot(normal, along), -1e-3);

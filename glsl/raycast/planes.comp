@@ -1,6 +1,6 @@
-// MPR: each pixel shows the place of its tile's plane, or what a slab about it amounts to. No ray is cast.
-// TONED: at once in 8 bits, where stage 4 has nothing else to do.
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED; toned_plain TONED LINES; toned_even TONED LINES SWEPT; toned_moved TONED LINES SWEPT MOVED; toned_uneven TONED LINES SWEPT UNEVEN; toned_uneven_moved TONED LINES SWEPT UNEVEN MOVED
+// MPR: each pixel shows a point of its tile's plane, or the mean, largest or smallest value of a slab around it. No ray is cast.
+// TONED: writes the final 8 bits directly, where stage 4 only tones.
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; toned_plain TONED LINES; toned_uniform TONED LINES SWEPT; toned_intra_frame_motion TONED LINES SWEPT INTRA_FRAME_MOTION; toned_non_uniform TONED LINES SWEPT NON_UNIFORM; toned_non_uniform_intra_frame_motion TONED LINES SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int SAMPLES = 1; // through the slab
@@ -28,7 +28,7 @@ uniform writeonly image2D picture;
 #define TARGET picture
 #endif
 
-// Within what is rendered, on the near side of every clip plane.
+// True inside the rendered box and on the near side of every clip plane.
 bool is_kept(vec3 p) {
     bool kept = all(greaterThanEqual(p, box_low)) && all(lessThanEqual(p, box_high));
     for (int i = 0; i < CLIPS; ++i) {

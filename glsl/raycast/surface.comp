@@ -1,7 +1,7 @@
 // SR: the first surface on each ray (thesis 4-3). D is the mean of the newer half of the last eight samples minus the mean
-// of the older half. A rough detector with longer steps rides over specks; where it fires, the ray steps back and a fine
-// one finds the place.
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED
+// of the older half. A rough detector with longer steps ignores specks; where it fires, the ray steps back and a fine
+// detector finds the position.
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
 layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
@@ -10,18 +10,18 @@ layout(scalar) uniform Params {
     float threshold;
     float rough_threshold;
     float polarity; // +1 bright tissue in dark fluid, -1 a dark cavity
-    float noise;    // deviations of the noise that an edge stands out by
-    float silence;  // samples that do not exceed it cannot fire the detector
+    float noise;    // an edge must exceed this many standard deviations of the noise
+    float quiet_level;  // samples that do not exceed this cannot fire the detector
 };
 #include "ray.glsl"
 #include "sliding.glsl"
 #include "detector.glsl"
-#include "skip.glsl"
+#include "empty_space.glsl"
 uniform writeonly image2D distance_map;
 uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
 
-// Samples of one search, where nothing is leapt over.
-const int LONGEST = 64;
+// Samples of one search where no empty space is skipped.
+const int MAX_SEARCH_SAMPLES = 64;
 
 vec3 place_of(Ray ray, int i) { return ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT)); }
 
@@ -30,8 +30,8 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
     Ray ray = ray_of(pixel);
     int count = ray.leave > ray.enter ? int(steps_to(ray, ray.leave - ray.enter)) : 0;
-    // The region bounds where surfaces lie, not what the detector may look at: its ring is filled before the region begins,
-    // and an edge that rises inside may peak behind it. Nothing lies behind the camera.
+    // The region limits where surfaces may be, not which samples the detector uses: its ring is filled in front of the region,
+    // and an edge that begins inside may peak behind it. Samples behind the camera are not used.
     int first = max(-RING / 2 * ROUGH, int(ceil(steps_to(ray, -ray.enter) - 0.5)));
     int end = count > 0 ? count + RING / 2 * ROUGH + RING : first;
 
@@ -40,36 +40,36 @@ void main() {
     bool goes_on = true;
     for (int i = first; goes_on && (i < end || look_again(i));) {
         if (SKIP == 1) {
-            Stretch here = stretch_at(ray, i, SAMPLE_AT);
-            while (here.kind == NOTHING && state == START && !again && i < end) {
-                // As if each sample had been found to lie outside.
+            RaySegment here = segment_at(ray, i, SAMPLE_AT);
+            while (here.kind == EMPTY && state == START && !second_look && i < end) {
+                // The same as if each sample were outside.
                 i += (here.stop - i + ROUGH - 1) / ROUGH * ROUGH;
                 restart(i);
-                here = stretch_at(ray, i, SAMPLE_AT);
+                here = segment_at(ray, i, SAMPLE_AT);
             }
-            if (here.kind == KNOWN && DETECTOR == 0 && state == START && !again && filled >= RING) {
+            if (here.kind == HOMOGENEOUS && DETECTOR == 0 && state == START && !second_look && filled >= RING) {
                 vec4 most = max(older, newer);
-                bool calm = max(max(most.x, most.y), max(most.z, most.w)) <= silence;
-                // The ring is filled anew with the last samples of the stretch: what follows finds it as it would have been.
+                bool is_quiet = max(max(most.x, most.y), max(most.z, most.w)) <= quiet_level;
+                // Refill the ring with the last samples of the segment, so that it holds what it would hold without skipping.
                 int stop = min(here.stop, end);
                 int steps = (stop - i + stride - 1) / stride, left = stop == end ? 0 : RING;
-                if (calm && steps > left) {
+                if (is_quiet && steps > left) {
                     i += (steps - left) * stride;
                     filled = 0;
                 }
             }
         }
-        // The search that a ray begins with, by itself: on a device that runs rays side by side under masks each sample would else pay for
-        // every state that it is not in. What ends it is left in the ring for the other loop.
-        int n = SKIP == 1 ? BLOCK : LONGEST;
+        // The initial search has its own loop: on a device that runs rays under masks, each sample would otherwise pay for all states.
+        // The sample that ends it stays in the ring for the second loop.
+        int n = SKIP == 1 ? SAMPLES_PER_LOOKUP : MAX_SEARCH_SAMPLES;
         bool waits = false;
-        float difference = 0.0, doubt = 0.0;
-        for (bool searches = state == START && !again && !anew; searches && n > 0 && i < end; --n) {
+        float difference = 0.0, noise_bar = 0.0;
+        for (bool searches = state == START && !second_look && !after_speck; searches && n > 0 && i < end; --n) {
             vec3 texel;
             if (locate(place_of(ray, i), texel)) {
                 difference = push_sample(sample_along(ray, i, SAMPLE_AT, texel, slices));
-                doubt = doubt_at(i, difference);
-                if (is_event(difference, doubt)) {
+                noise_bar = noise_bar_at(i, difference);
+                if (is_event(difference, noise_bar)) {
                     waits = true;
                     searches = false;
                 } else {
@@ -81,26 +81,26 @@ void main() {
                 restart(i);
             }
         }
-        for (; waits || ((state != START || again || anew) && n > 0 && i < end); --n) {
+        for (; waits || ((state != START || second_look || after_speck) && n > 0 && i < end); --n) {
             vec3 texel;
             if (waits || locate(place_of(ray, i), texel)) {
                 if (!waits) {
                     difference = push_sample(sample_along(ray, i, SAMPLE_AT, texel, slices));
-                    doubt = doubt_at(i, difference);
+                    noise_bar = noise_bar_at(i, difference);
                 }
                 waits = false;
-                goes_on = judge(difference, doubt, i);
+                goes_on = step_detector(difference, noise_bar, i);
             } else {
                 goes_on = skip_sample(i);
             }
             if (!goes_on) break;
         }
     }
-    // The ray ended before the second look was through: nothing says that this edge lasts.
-    if (again && seen < NUMBER) found = false;
+    // The ray ended during the second look: nothing confirms that the echo lasts.
+    if (second_look && surfaces_passed < NUMBER) found = false;
     float distance = MISS;
     float behind = 0.0;
-    if (found && seen + 1 >= NUMBER) {
+    if (found && surfaces_passed + 1 >= NUMBER) {
         float at = offset_of(ray, surface_place() + SAMPLE_AT);
         found = at >= 0.0 && at <= ray.leave - ray.enter;
         if (found) {

@@ -1,7 +1,7 @@
 // VR: emission and absorption, front to back (thesis 4-1, 4-2). Variants add to those of the sweep:
-//   VEIL  the ray ends at the surface, and what lies before it is a veil over it
-//   HIT   the place where the ray becomes opaque enough is stored, to be lit
-// variants: plain; even SWEPT; moved SWEPT MOVED; uneven SWEPT UNEVEN; uneven_moved SWEPT UNEVEN MOVED; veil_plain VEIL; veil_even VEIL SWEPT; veil_moved VEIL SWEPT MOVED; veil_uneven VEIL SWEPT UNEVEN; veil_uneven_moved VEIL SWEPT UNEVEN MOVED; hit_plain HIT; hit_even HIT SWEPT; hit_moved HIT SWEPT MOVED; hit_uneven HIT SWEPT UNEVEN; hit_uneven_moved HIT SWEPT UNEVEN MOVED
+//   LAYER  the ray ends at the surface; the result is a layer in front of it
+//   HIT    the position where the ray becomes opaque enough is stored, to be lit
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; layer_plain LAYER; layer_uniform LAYER SWEPT; layer_intra_frame_motion LAYER SWEPT INTRA_FRAME_MOTION; layer_non_uniform LAYER SWEPT NON_UNIFORM; layer_non_uniform_intra_frame_motion LAYER SWEPT NON_UNIFORM INTRA_FRAME_MOTION; hit_plain HIT; hit_uniform HIT SWEPT; hit_intra_frame_motion HIT SWEPT INTRA_FRAME_MOTION; hit_non_uniform HIT SWEPT NON_UNIFORM; hit_non_uniform_intra_frame_motion HIT SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EARLY_END = 1;
@@ -10,9 +10,9 @@ layout(constant_id = 5) const int DEPTH_CODED = 0; // 1: colours go from near to
 layout(constant_id = 6) const int ENTRIES = 256;   // of the transfer table, along each side
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
-    float absorption_scale; // step over the length that opacities are given for
+    float absorption_scale; // step divided by the length that opacities refer to
     float opaque_enough;    // a ray ends at this opacity
-    float hit_opacity;      // and is taken to hit something at this one
+    float hit_opacity;      // a hit is recorded at this opacity
     vec3 near_tint;
     vec3 far_tint;
     vec3 depth_axis; // depth along the view: dot(place, axis) - depth_near is 0 at the nearest, 1 at the farthest
@@ -20,11 +20,11 @@ layout(scalar) uniform Params {
 };
 #include "ray.glsl"
 #include "sliding.glsl"
-#include "skip.glsl"
-// Colour and absorption at a sample value; pre-integrated: their mean between two values, a row for each front value.
+#include "empty_space.glsl"
+// Colour and absorption over the sample value; pre-integrated: their mean between two values, one row per front value.
 readonly buffer TransferTable { vec4 entry[]; } transfer;
 uniform writeonly image2D picture;
-#ifdef VEIL
+#ifdef LAYER
 uniform texture2D distance_map;
 #endif
 #ifdef HIT
@@ -57,7 +57,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     Ray ray = ray_of(pixel);
-#ifdef VEIL
+#ifdef LAYER
     ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
 #endif
     float path = ray.leave - ray.enter;
@@ -74,35 +74,35 @@ void main() {
             front_inside = locate(ray.origin + ray.direction * ray.enter, texel);
             if (front_inside) front = sample_along(ray, 0, sample_at, texel, slices);
         }
-        // One more than there are, where their number comes from a logarithm.
-        int whole = int(steps_to(ray, path)) + SPREAD;
-        // The last steps are not what their numbers say: they are taken in any case.
-        int last = whole - 1 - SPREAD;
-        for (int i = 0; i <= whole;) {
-            int stop = whole + 1;
-            bool known = false;
+        // One more than there are where their number comes from a logarithm, which rounding may lower.
+        int complete = int(steps_to(ray, path)) + SPREAD;
+        // The last steps have other lengths: they are always taken.
+        int last = complete - 1 - SPREAD;
+        for (int i = 0; i <= complete;) {
+            int stop = complete + 1;
+            bool front_known = false;
             if (SKIP == 1) {
                 const float place = COMPOSITING == 2 ? 1.0 : SAMPLE_AT;
-                Stretch here = stretch_at(ray, i, place);
+                RaySegment here = segment_at(ray, i, place);
                 int to = i;
-                while (here.kind == NOTHING && to < last) {
+                while (here.kind == EMPTY && to < last) {
                     to = min(here.stop, last);
-                    here = stretch_at(ray, to, place);
+                    here = segment_at(ray, to, place);
                 }
                 bool more = to < last;
                 if (COMPOSITING != 2) {
                     i = to;
                 } else if (to > i) {
-                    // A step sees the sample in front of it, too: the first one behind what is seen is taken, the last one fetches
-                    // the front of what follows.
-                    known = front_inside;
-                    if (!known) i = to - 1;
+                    // A step also uses the sample in front of it: the first step after a visible sample is taken, and the last skipped
+                    // step fetches the front sample of the next one.
+                    front_known = front_inside;
+                    if (!front_known) i = to - 1;
                 }
-                if (more) stop = min(stop, i + (known ? 1 : BLOCK));
-                else if (known) stop = i + 1;
+                if (more) stop = min(stop, i + (front_known ? 1 : SAMPLES_PER_LOOKUP));
+                else if (front_known) stop = i + 1;
             }
             for (; i < stop; ++i) {
-                // Midpoints of the steps, or their ends; the last step is as long as what is left.
+                // Midpoints of the steps, or their ends. The last step has the remaining length.
                 float from = offset_of(ray, float(i));
                 float length = min(length_of(ray, float(i)), path - from);
                 vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
@@ -128,14 +128,14 @@ void main() {
                 colour += (1.0 - opacity) * a * entry.rgb;
                 opacity += (1.0 - opacity) * a;
 #ifdef HIT
-                // Between two samples in proportion, so that the surface has no terraces.
+                // Interpolated between two samples, so that the surface has no terraces.
                 if (hit == MISS && opacity >= hit_opacity) {
                     hit = ray.enter + from + length * clamp((hit_opacity - before) / max(opacity - before, 1e-12), 0.0, 1.0);
                 }
 #endif
-                if (EARLY_END == 1 && opacity >= opaque_enough) whole = stop = -1;
+                if (EARLY_END == 1 && opacity >= opaque_enough) complete = stop = -1;
             }
-            if (known) front_inside = false;
+            if (front_known) front_inside = false;
         }
     }
     imageStore(picture, pixel, vec4(colour, opacity));

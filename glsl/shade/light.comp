@@ -1,13 +1,13 @@
-// Normals from the distance map, and Blinn-Phong (thesis 4-4..4-7); shadow and occlusion where the scene has them; skin.
-// Variants by what is lit: a surface; VEILED, a surface behind a composited volume; COMPOSITED, the volume itself.
-// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED; veiled_plain VEILED; veiled_shadowed VEILED SHADOWED; veiled_occluded VEILED OCCLUDED; veiled_shadowed_occluded VEILED SHADOWED OCCLUDED; composited_plain COMPOSITED; composited_shadowed COMPOSITED SHADOWED; composited_occluded COMPOSITED OCCLUDED; composited_shadowed_occluded COMPOSITED SHADOWED OCCLUDED
+// Blinn-Phong with normals from the distance map (thesis 4-4..4-7), shadow and occlusion where the scene has them, and skin.
+// Variants by what is lit: a surface; BEHIND_LAYER, a surface behind a composited volume; COMPOSITED, the volume itself.
+// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED; behind_layer_plain BEHIND_LAYER; behind_layer_shadowed BEHIND_LAYER SHADOWED; behind_layer_occluded BEHIND_LAYER OCCLUDED; behind_layer_shadowed_occluded BEHIND_LAYER SHADOWED OCCLUDED; composited_plain COMPOSITED; composited_shadowed COMPOSITED SHADOWED; composited_occluded COMPOSITED OCCLUDED; composited_shadowed_occluded COMPOSITED SHADOWED OCCLUDED
 #version 460
 #include "common.glsl"
-layout(constant_id = 0) const int POINT = 0; // 0: the light is far away, 1: it is at a place
+layout(constant_id = 0) const int POINT = 0; // 0: directional light, 1: point light
 layout(constant_id = 1) const int SKIN = 0;
 layout(scalar) uniform Params {
 #include "camera_params.glsl"
-    vec3 light_at; // unit direction to a light far away, or its place in mm
+    vec3 light_at; // unit direction to a directional light, or position of a point light in mm
     float ambient;
     float diffuse;
     float specular;
@@ -16,16 +16,16 @@ layout(scalar) uniform Params {
     vec3 surface_colour;
     float texture_share;
     float shadow_strength;
-    vec3 wrap;          // a channel
+    vec3 wrap;          // per channel
     vec3 through;       // colour of light through thin tissue, times translucency
-    float veil_share;   // of the composited volume over a surface
+    float layer_share;   // weight of the composited volume over a surface
 };
 #include "distance_map.glsl"
 #ifndef COMPOSITED
 uniform texture2D surface; // echo, found, mean echo behind
 #endif
-#if defined(VEILED) || defined(COMPOSITED)
-uniform texture2D veil; // colours times opacity, opacity
+#if defined(BEHIND_LAYER) || defined(COMPOSITED)
+uniform texture2D volume_layer; // colours times opacity, opacity
 #endif
 #ifdef SHADOWED
 uniform texture2D shadow; // light that arrives, 0..1
@@ -40,11 +40,11 @@ void main() {
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
     float distance = distance_at(pixel);
     vec4 before = vec4(0.0);
-#ifdef VEILED
-    before = veil_share * texelFetch(veil, pixel, 0);
+#ifdef BEHIND_LAYER
+    before = layer_share * texelFetch(volume_layer, pixel, 0);
 #endif
 #ifdef COMPOSITED
-    before = texelFetch(veil, pixel, 0);
+    before = texelFetch(volume_layer, pixel, 0);
 #endif
     if (!is_hit(distance)) {
         imageStore(picture, pixel, before);
@@ -54,10 +54,10 @@ void main() {
     vec3 normal = normal_at(pixel, distance, along_ray);
     vec3 to_light = light_at;
     if (POINT == 1) {
-        // A light on the surface itself shines along the normal.
-        vec3 way = light_at - (ray_origin(vec2(pixel) + 0.5) + along_ray * distance);
-        float far = length(way);
-        to_light = far > 1e-6 ? way / far : normal;
+        // A light on the surface shines along the normal.
+        vec3 towards = light_at - (ray_origin(vec2(pixel) + 0.5) + along_ray * distance);
+        float far = length(towards);
+        to_light = far > 1e-6 ? towards / far : normal;
     }
 
     float cosine = dot(normal, to_light);
@@ -65,10 +65,10 @@ void main() {
     vec3 halfway = to_light - along_ray;
     float half_length = length(halfway);
     float gloss = half_length > 1e-6 ? clamp(dot(normal, halfway) / half_length, 0.0, 1.0) : 0.0;
-    // pow(0, 0) is undefined: a gloss of 0 shines nowhere unless the exponent is 0, when it shines evenly.
+    // pow(0, 0) is undefined. A gloss of 0 has no highlight, unless the exponent is 0: then the highlight is constant.
     float shine = shininess == 0.0 ? 1.0 : (gloss > 0.0 ? min(pow(gloss, shininess), 1.0) : 0.0);
 #ifdef COMPOSITED
-    const vec4 echo = vec4(1.0, 1.0, 1.0, 0.0); // nothing is known to be thin
+    const vec4 echo = vec4(1.0, 1.0, 1.0, 0.0); // thickness is unknown
     const vec3 colour = vec3(1.0);
 #else
     vec4 echo = texelFetch(surface, pixel, 0);
@@ -85,7 +85,7 @@ void main() {
     vec3 diffused = vec3(facing) * lit;
     vec3 glow = vec3(0.0);
     if (SKIN == 1) {
-        // Wrapped diffuse light, a channel as far as its share; what a shadow leaves is red first, as light under skin is.
+        // Wrapped diffuse light with a share per channel. Shadows turn red first, as light under skin does.
         vec3 wrapped = max((vec3(cosine) + wrap) / (1.0 + wrap), vec3(0.0));
         diffused = wrapped * mix(vec3(lit), vec3(1.0), 0.5 * wrap);
         // Thin where few echoes follow the surface; strongest with the light behind.
@@ -95,7 +95,7 @@ void main() {
     vec3 sum = colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3)) + glow * open;
     vec3 highlight = vec3(specular * shine * lit * (facing > 0.0 ? 1.0 : 0.0));
 #ifdef COMPOSITED
-    // The less opaque, the less there is to be lit.
+    // Lighting is weighted by opacity.
     imageStore(picture, pixel, vec4(before.rgb * mix(vec3(1.0), light_colour * sum, before.a) + before.a * light_colour * highlight, before.a));
 #else
     imageStore(picture, pixel, vec4(before.rgb + (1.0 - before.a) * light_colour * (sum + highlight), 1.0));

@@ -1,5 +1,5 @@
-// Ambient light that corners keep out, in image space: places of the distance map around a pixel, on a spiral, that stand out
-// of its tangent plane take away sky. (After Mittring 2007 and Bavoil and Sainz 2008: horizon by samples, falling off to the radius.)
+// Ambient occlusion in image space: points of the distance map on a spiral around a pixel occlude it where they rise above its
+// tangent plane. (After Mittring 2007 and Bavoil and Sainz 2008: horizon by samples, with falloff to the radius.)
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int SAMPLES = 32;
@@ -21,23 +21,23 @@ void main() {
         vec3 along_ray = ray_direction(at);
         vec3 here = ray_origin(at) + along_ray * distance;
         vec3 normal = normal_at(pixel, distance, along_ray);
-        // Pixels that the radius spans where the surface is.
+        // The radius in pixels at the surface's distance.
         float pixels = radius / max(length(origin_dx + direction_dx * distance), 1e-9);
         float taken = 0.0;
         for (int i = 0; i < SAMPLES; ++i) {
-            // Even over the disc's area; the golden angle keeps directions apart.
+            // Uniform over the disc's area; the golden angle keeps directions apart.
             float share = sqrt((float(i) + 0.5) / float(SAMPLES));
-            float turn = 2.39996323 * float(i);
-            ivec2 tap = ivec2(floor(at + pixels * share * vec2(cos(turn), sin(turn))));
+            float angle = 2.39996323 * float(i);
+            ivec2 tap = ivec2(floor(at + pixels * share * vec2(cos(angle), sin(angle))));
             float other = distance_at(tap);
             if (!is_hit(other)) continue;
             vec2 there = vec2(tap) + 0.5;
-            vec3 way = ray_origin(there) + ray_direction(there) * other - here;
-            float far = length(way);
+            vec3 towards = ray_origin(there) + ray_direction(there) * other - here;
+            float far = length(towards);
             if (far < 1e-6) continue;
             float falls = max(1.0 - far * far / (radius * radius), 0.0);
-            // A tenth: what the map's own roughness raises is no corner.
-            taken += max(dot(normal, way) / far - 0.1, 0.0) * falls;
+            // The bias of 0.1 ignores the map's own roughness.
+            taken += max(dot(normal, towards) / far - 0.1, 0.0) * falls;
         }
         open = clamp(1.0 - strength * 2.0 * taken / float(SAMPLES), 0.0, 1.0);
     }

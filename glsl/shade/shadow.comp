@@ -1,5 +1,5 @@
-// Shadow by tracing the distance map towards the light (thesis Fig. 41): a place on the way lies in matter where the map says
-// that its pixel sees something nearer. A soft edge widens with the distance to what casts it.
+// Shadow by tracing the distance map towards the light (thesis Fig. 41). A sample on the segment to the light is in matter
+// where the map has a nearer surface at the sample's pixel. A soft edge widens with the distance to the occluder.
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int POINT = 0;
@@ -13,25 +13,25 @@ layout(scalar) uniform Params {
     float reach;     // mm
     float thickness; // mm
     float bias;      // mm
-    float softness;  // mm of edge a mm
+    float softness;  // mm of edge per mm
 };
 #include "distance_map.glsl"
 uniform writeonly image2D shadow;
 
-// Pixel place of a place in space, and its distance along that pixel's ray.
-vec3 seen_at(vec3 place) {
-    vec3 way = place - origin;
+// The pixel coordinates of a point in space, and its distance along that pixel's ray.
+vec3 projected(vec3 place) {
+    vec3 offset = place - origin;
     if (PERSPECTIVE == 1) {
-        float depth = dot(way, forward);
-        vec3 across = way / max(depth, 1e-6) - direction;
+        float depth = dot(offset, forward);
+        vec3 across = offset / max(depth, 1e-6) - direction;
         vec2 at = vec2(dot(across, direction_dx) / dot(direction_dx, direction_dx), dot(across, direction_dy) / dot(direction_dy, direction_dy));
-        return vec3(at, depth > 1e-6 ? length(way) : -1.0);
+        return vec3(at, depth > 1e-6 ? length(offset) : -1.0);
     }
-    vec2 at = vec2(dot(way, origin_dx) / dot(origin_dx, origin_dx), dot(way, origin_dy) / dot(origin_dy, origin_dy));
-    return vec3(at, dot(way, forward));
+    vec2 at = vec2(dot(offset, origin_dx) / dot(origin_dx, origin_dx), dot(offset, origin_dy) / dot(origin_dy, origin_dy));
+    return vec3(at, dot(offset, forward));
 }
 
-// The distance map between pixel centres; only what belongs to one surface is interpolated.
+// The distance map between pixel centres. Only pixels of the same surface are interpolated.
 float map_at(vec2 at) {
     vec2 place = at - 0.5;
     ivec2 base = ivec2(floor(place));
@@ -40,7 +40,7 @@ float map_at(vec2 at) {
     float c = distance_at(base + ivec2(0, 1)), d = distance_at(base + ivec2(1, 1));
     float low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
     if (high - low > cliff) return distance_at(ivec2(floor(at)));
-    // Differences from one of them: f32 keeps its digits.
+    // Differences from the smallest keep f32's digits.
     return low + mix(mix(a - low, b - low, w.x), mix(c - low, d - low, w.x), w.y);
 }
 
@@ -53,24 +53,24 @@ void main() {
         vec2 at = vec2(pixel) + 0.5;
         vec3 place = ray_origin(at) + ray_direction(at) * distance;
         vec3 to_light = light_at;
-        float way = reach;
+        float length_to_light = reach;
         if (POINT == 1) {
             to_light = light_at - place;
             float far = length(to_light);
             to_light = far > 1e-6 ? to_light / far : -ray_direction(at);
-            way = min(reach, far);
+            length_to_light = min(reach, far);
         }
-        float stride = way / float(STEPS);
+        float stride = length_to_light / float(STEPS);
         vec2 size = vec2(textureSize(distance_map, 0));
         for (int i = 1; i <= STEPS; ++i) {
-            float gone = float(i) * stride;
-            vec3 seen = seen_at(place + to_light * gone);
-            if (any(lessThan(seen.xy, vec2(0.0))) || any(greaterThanEqual(seen.xy, size)) || seen.z < 0.0) break;
-            float nearest = map_at(seen.xy);
-            // How far behind the surface the place lies; a miss is far in front of nothing.
-            float inside = is_hit(nearest) ? seen.z - nearest - bias : -1e6;
+            float travelled = float(i) * stride;
+            vec3 pixel_place = projected(place + to_light * travelled);
+            if (any(lessThan(pixel_place.xy, vec2(0.0))) || any(greaterThanEqual(pixel_place.xy, size)) || pixel_place.z < 0.0) break;
+            float nearest = map_at(pixel_place.xy);
+            // Depth of the sample behind the surface. A miss blocks nothing.
+            float inside = is_hit(nearest) ? pixel_place.z - nearest - bias : -1e6;
             if (inside > thickness) continue;
-            float blocked = SOFT == 1 ? clamp(0.5 + inside / (softness * gone), 0.0, 1.0) : (inside > 0.0 ? 1.0 : 0.0);
+            float blocked = SOFT == 1 ? clamp(0.5 + inside / (softness * travelled), 0.0, 1.0) : (inside > 0.0 ? 1.0 : 0.0);
             arrives = min(arrives, 1.0 - blocked);
             if (arrives <= 0.0) break;
         }

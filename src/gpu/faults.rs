@@ -192,7 +192,7 @@ impl Faults {
     pub(super) fn given(&self, slot: Slot, scene: &Scene, mut bytes: Vec<u8>) -> Vec<u8> {
         if slot == Slot::Frames {
             self.frame(scene, &mut bytes);
-        } else if self.change.get().is_some() && matches!(slot.filled(), Initializer::ByScene(_)) {
+        } else if self.change.get().is_some() && matches!(slot.initializer(), Initializer::ByScene(_)) {
             let values = bytemuck::pod_collect_to_vec(&bytes);
             bytes = bytemuck::cast_slice(&self.table(slot, scene, values)).to_vec();
         }

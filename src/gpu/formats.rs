@@ -96,9 +96,10 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -
     let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
     let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
     let scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
-    let format = vulkan(Slot::Quads.format(&scene));
-    let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::Quads));
-    let fits = fits.is_ok_and(|l| Slot::Quads.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
+    let format = vulkan(Slot::PackedNeighbours.format(&scene));
+    let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
+    let fits = fits
+        .is_ok_and(|l| Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
     if fits { scene } else { scene.without_quads() }
 }
 

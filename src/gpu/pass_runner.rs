@@ -61,7 +61,7 @@ impl PassRunner {
         poison: f64,
     ) -> Result<Arrays, GpuError> {
         let scene = &formats::adapt_scene(&self.context, self.texel_access, scene.clone());
-        let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
+        let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = Slots::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
@@ -180,7 +180,7 @@ impl PassTimer {
         let pipelines = Pipelines::new(context, embedded(), texel_access)?;
         let mut dispatches = Vec::new();
         for args in iterations {
-            let binds = [(pass.reads)(scene, &args), (pass.writes)(scene, &args)].concat();
+            let binds = [pass.reads(scene, &args), pass.writes(scene, &args)].concat();
             plan.slots.extend(binds.iter().map(|b| b.slot));
             dispatches.push((args, pipelines.get(pass, scene, &args)?));
         }
@@ -209,7 +209,7 @@ impl PassTimer {
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
             let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, t)| t.encode(slot.format(&self.scene)));
-            let bytes = match (given, slot.filled()) {
+            let bytes = match (given, slot.initializer()) {
                 (Some(bytes), _) => bytes,
                 (None, Initializer::ByScene(make)) => bytemuck::cast_slice(&make(&self.scene)).to_vec(),
                 _ => continue,
@@ -290,7 +290,7 @@ fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
     if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {
         return Some(texels.encode(format));
     }
-    match (bind.slot.filled(), bind.slot.shape(scene)) {
+    match (bind.slot.initializer(), bind.slot.shape(scene)) {
         (Initializer::ByScene(make), Shape::Two(_) | Shape::Buffer(_)) => {
             Some(bytemuck::cast_slice(&make(scene)).to_vec())
         }

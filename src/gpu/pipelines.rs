@@ -75,8 +75,8 @@ impl Pipelines {
     }
 
     pub(super) fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
-        let formats = (pass.reads)(scene, args).iter().map(|b| b.slot.format(scene)).collect();
-        ((pass.shader)(scene, args), (pass.constants)(scene, args), formats)
+        let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
+        (pass.shader(scene, args), (pass.constants)(scene, args), formats)
     }
 
     pub(super) fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {

@@ -281,7 +281,7 @@ impl Recorder {
     /// Binds the slots by the names that the shader gives them, and the parameters.
     fn bind(&mut self, dispatch: &Dispatch, params_offset: u64, params_size: u64) -> Result<(), GpuError> {
         let Dispatch { slots, pipeline, scene, pass, args } = *dispatch;
-        let binds = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+        let binds = [pass.reads(scene, args), pass.writes(scene, args)].concat();
         let mut images = Vec::with_capacity(binds.len());
         let mut buffers = Vec::with_capacity(binds.len());
         let mut texels = Vec::with_capacity(binds.len());

@@ -56,7 +56,7 @@ impl Slots {
     /// Writes a slot that the CPU computes from the scene, if it is a buffer. Images are uploaded through staging instead.
     pub fn fill(&mut self, slot: Slot, scene: &Scene) {
         if let (Initializer::ByScene(make), Some(Resource::Buffer(buffer))) =
-            (slot.filled(), self.resources.get_mut(&(slot, 0)))
+            (slot.initializer(), self.resources.get_mut(&(slot, 0)))
         {
             let values = self.context.faults.table(slot, scene, make(scene));
             let bytes: &[u8] = bytemuck::cast_slice(&values);

@@ -1,128 +1,93 @@
-//! Filter chains: which slot the n-th filter of a stage reads and writes. Two spare slots take turns between the first and
-//! the last, and a filter that is not needed leaves no copy behind.
+//! What a pass does at its place in [`PASSES`]: the slots that it reads and writes as a link of a filter chain, and the part of
+//! a slice that it makes. Between the first and the last slot of a chain its filters alternate between two spare slots. A
+//! filter that is not needed leaves no copy behind.
 
-use super::filter::aos;
-use super::slots::Format;
-use super::{DispatchArgs, PASSES, Pass, RUN, Slot};
-use crate::scene::{Estimator, Layout, Scene};
-use crate::source::StoredType;
-
-/// The slices of stage 1, the distance maps of stage 3, and the pictures of stage 4.
-struct Chain {
-    /// The links in order.
-    passes: &'static [&'static str],
-    first: fn(&Scene) -> Slot,
-    spare: [Slot; 2],
-    /// What the last link writes; none: whatever spare it is.
-    last: Option<fn(&Scene) -> Slot>,
-}
-
-/// Every pass of stage 1 that runs on each frame. The first reads the frame itself.
-const SLICES: Chain = Chain {
-    passes: &[
-        "load_slice",
-        "scan_convert",
-        "median_slice",
-        "estimator_slice",
-        "sigma_slice",
-        "enhanced_sigma_slice",
-        "perona_malik_slice",
-        "aos_slice",
-        "gaussian_lateral",
-        "gaussian_depth",
-    ],
-    first: |_| Slot::Frames,
-    spare: [Slot::SliceA, Slot::SliceB],
-    last: Some(|scene| if scene.smoothing()[2] > 0.0 { Slot::SharpVolume } else { Slot::Volume }),
-};
-
-const DISTANCES: Chain = Chain {
-    passes: &[
-        "median_distance",
-        "bilateral_distance",
-        "sigma_distance",
-        "enhanced_sigma_distance",
-        "perona_malik_distance",
-    ],
-    first: |_| Slot::Distance,
-    spare: [Slot::DistanceA, Slot::DistanceB],
-    last: None,
-};
-
-const PICTURES: Chain = Chain {
-    passes: &["sigma_picture", "enhanced_sigma_picture", "perona_malik_picture", "aos_picture"],
-    first: |_| Slot::Picture,
-    spare: [Slot::SmoothPicture, Slot::SmoothPictureB],
-    last: None,
-};
-
-/// Dispatches that make one link: what lies between them stays within the pass.
-fn dispatches(name: &str) -> u32 {
-    match name {
-        "aos_slice" | "aos_picture" => aos::DISPATCHES,
-        _ => 1,
-    }
-}
+use super::PASSES;
+use super::pass::{Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Link, Need, Params, Pass, RUN, Slot};
+use crate::scene::Scene;
 
 impl Chain {
-    fn needed(&self) -> impl Iterator<Item = &'static Pass> {
-        PASSES.iter().filter(|p| self.passes.contains(&p.name))
-    }
-
-    /// Links before the one that this pass's iteration works on, and links in all.
-    fn position(&self, scene: &Scene, name: &str, args: &DispatchArgs) -> (u32, u32) {
-        let (mut before, mut all) = (0, 0);
-        for pass in self.needed().filter(|p| p.is_needed(scene)) {
-            if pass.name == name {
-                before = all + args.iteration / dispatches(pass.name);
-            }
-            all += (pass.repeat)(scene) / dispatches(pass.name);
-        }
-        (before, all)
-    }
-
-    fn output(&self, scene: &Scene, link: u32, all: u32) -> Slot {
-        match self.last {
-            Some(last) if link + 1 == all => last(scene),
-            _ => self.spare[link as usize % 2],
+    /// What the first link reads.
+    fn first(self) -> Slot {
+        match self {
+            Chain::Slices => Slot::Frames,
+            Chain::Distances => Slot::Distance,
+            Chain::Pictures => Slot::Picture,
         }
     }
 
-    fn link(&self, scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
-        let (link, all) = self.position(scene, name, args);
-        let from = if link == 0 { (self.first)(scene) } else { self.output(scene, link - 1, all) };
-        (from, self.output(scene, link, all))
+    /// What the links between write, in turn.
+    fn spare(self) -> [Slot; 2] {
+        match self {
+            Chain::Slices => [Slot::SliceA, Slot::SliceB],
+            Chain::Distances => [Slot::DistanceA, Slot::DistanceB],
+            Chain::Pictures => [Slot::SmoothPicture, Slot::SmoothPictureB],
+        }
     }
 
-    fn end(&self, scene: &Scene) -> Slot {
-        let (_, all) = self.position(scene, "", &DispatchArgs::default());
-        if all == 0 { (self.first)(scene) } else { self.output(scene, all - 1, all) }
+    /// What the last link writes; none: the next spare slot.
+    fn last(self, scene: &Scene) -> Option<Slot> {
+        let slices = if scene.smoothing()[2] > 0.0 { Slot::SharpVolume } else { Slot::Volume };
+        (self == Chain::Slices).then_some(slices)
+    }
+
+    /// The filters that a scene asks for, in order.
+    fn asked(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter)> {
+        let filters = PASSES.iter().filter_map(|pass| match pass.link {
+            Link::Filter(filter) => Some((pass, filter)),
+            _ => None,
+        });
+        filters.filter(move |(pass, filter)| filter.chain == self && (pass.needed)(scene).is_ok())
+    }
+
+    /// The filters that run, each with its number of links.
+    fn filters(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter, u32)> {
+        let is_copied = self == Chain::Slices && copied(scene).is_some();
+        let filters = self.asked(scene).filter(move |_| !is_copied);
+        filters.map(|(pass, filter)| (pass, filter, (pass.repeat)(scene) / filter.dispatches))
+    }
+
+    /// Links before a pass, and links in all.
+    fn position(self, scene: &Scene, pass: &Pass) -> (u32, u32) {
+        let place = |name: &str| PASSES.iter().position(|p| p.name == name);
+        let own = place(pass.name);
+        self.filters(scene).fold((0, 0), |(before, all), (filter, _, links)| {
+            (before + if place(filter.name) < own { links } else { 0 }, all + links)
+        })
+    }
+
+    /// What the chain holds after so many of all its links.
+    fn after(self, scene: &Scene, links: u32, all: u32) -> Slot {
+        match self.last(scene) {
+            _ if links == 0 => self.first(),
+            Some(last) if links == all => last,
+            _ => self.spare()[(links - 1) as usize % 2],
+        }
+    }
+
+    /// The slot that holds the result of the chain's last filter.
+    fn end(self, scene: &Scene) -> Slot {
+        let all = self.filters(scene).map(|(_, _, links)| links).sum();
+        self.after(scene, all, all)
     }
 }
 
-/// Where frames are copied as they arrive, if there is nothing to do to them: slices of a Cartesian volume whose stored values are what
-/// the texture stores, and no filter looks at them. Floats may be beyond 0..1, so they go through a pass.
+/// The distance map after its filters.
+pub fn distance_end(scene: &Scene) -> Slot {
+    Chain::Distances.end(scene)
+}
+
+/// The picture after its filters.
+pub fn picture_end(scene: &Scene) -> Slot {
+    Chain::Pictures.end(scene)
+}
+
+/// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
+/// what it reads unchanged.
 pub fn copied(scene: &Scene) -> Option<Slot> {
-    let last = SLICES.last?(scene);
-    let same = match scene.input.stored {
-        StoredType::U8 => last.format(scene) == Format::R8 && scene.input.range == [0.0, 255.0],
-        StoredType::U16 => last.format(scene) == Format::R16 && scene.input.range == [0.0, 65535.0],
-        StoredType::F32 => false,
-    };
-    let is_filtered = SLICES.needed().any(|pass| pass.name != "load_slice" && pass.is_needed(scene));
-    (same && scene.probe().is_none() && !is_filtered).then_some(last)
-}
-
-/// What stages 2 and 3 render into: the picture itself, unless several rays make a pixel or one makes four, or planes stand beside it.
-pub fn rendered(scene: &Scene) -> Slot {
-    let is_picture =
-        scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
-    if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
-}
-
-/// What a pass of stage 1 reads and writes.
-pub fn slice_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
-    SLICES.link(scene, name, args)
+    let mut asked = Chain::Slices.asked(scene);
+    let (_, filter) = asked.next()?;
+    if asked.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
 }
 
 /// Columns and rows of a slice that a pass makes.
@@ -133,84 +98,127 @@ pub struct Rectangle {
 }
 
 /// Texels along an edge that a workgroup of the slices' filters makes, eight invocations of a run each: a rectangle begins and ends
-/// with whole ones, or at the slice's border.
+/// with complete workgroups, or at the slice's border.
 const WORKGROUP: u32 = 8 * RUN;
 
-/// Passes over the slices of the volume, behind those that run on each frame: nothing looks further than what they make.
-const BEHIND: [&str; 2] = ["gaussian_elevation", "quads"];
-
-/// What a pass over slices has to make of each: what is seen, and as far around it as the filters behind it look. None for
-/// passes that are not cut: lines of a frame, and the rows and columns of AOS, each of which depends on all of its own.
-pub fn rectangle(scene: &Scene, pass: &str, args: &DispatchArgs) -> Option<Rectangle> {
-    let whole = Rectangle { first: [0; 2], size: scene.grid.size };
-    match pass {
-        "growth_slice" => return Some(whole),
-        "aos_slice" => return None,
-        _ if BEHIND.contains(&pass) => {}
-        _ if !SLICES.passes.contains(&pass) => return None,
-        _ => {}
+impl Pass {
+    pub fn is_needed(&self, scene: &Scene) -> bool {
+        self.needed(scene).is_ok()
     }
-    let (link, _) = SLICES.position(scene, pass, args);
-    let mut around = [0, 0];
-    let mut before = 0;
-    for filter in SLICES.needed().filter(|p| p.is_needed(scene) && !BEHIND.contains(&pass)) {
-        let links = (filter.repeat)(scene) / dispatches(filter.name);
-        let behind = (before + links).saturating_sub((link + 1).max(before));
-        before += links;
-        match reach(scene, filter.name) {
-            _ if behind == 0 => {}
-            None => return Some(whole),
-            Some(reach) => (0..2).for_each(|axis| around[axis] += behind * reach[axis]),
+
+    /// Whether a scene needs the pass, and why or why not.
+    pub fn needed(&self, scene: &Scene) -> Need {
+        match self.link {
+            Link::Filter(filter) if filter.chain == Chain::Slices => match (self.needed)(scene) {
+                Ok(_) if copied(scene).is_some() => {
+                    Err("a frame is a slice as the volume stores it: it is copied there")
+                }
+                need => need,
+            },
+            _ => (self.needed)(scene),
         }
     }
-    let cut = |axis: usize| {
-        let (low, high) = (scene.seen.low[axis], scene.seen.high[axis]);
-        let first = low.saturating_sub(around[axis]) / WORKGROUP * WORKGROUP;
-        let end = high.saturating_add(around[axis]).next_multiple_of(WORKGROUP).min(scene.grid.size[axis]);
-        (first, end - first)
-    };
-    let (columns, rows) = (cut(0), cut(1));
-    Some(Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] })
-}
 
-/// How many columns and rows away a filter of slices looks at each step; none: from border to border.
-fn reach(scene: &Scene, name: &str) -> Option<[u32; 2]> {
-    let slices = &scene.settings.slices;
-    let estimator = |kind| if kind == Estimator::NagaoMatsuyama { 2 } else { 1 };
-    let [lateral, depth, _] = scene.smoothing_radius();
-    Some(match name {
-        "median_slice" | "perona_malik_slice" => [1; 2],
-        "estimator_slice" => [slices.estimator.map_or(0, estimator); 2],
-        "sigma_slice" => [slices.sigma.map_or(0, |s| s.window / 2); 2],
-        "enhanced_sigma_slice" => {
-            [slices.enhanced_sigma.map_or(0, |e| (e.largest / 2).max(estimator(scene.centre(e)))); 2]
+    /// What a dispatch reads and writes as a link of a chain; an observer writes slots of its own.
+    pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
+        let (chain, step) = match self.link {
+            Link::Filter(filter) => (filter.chain, args.iteration / filter.dispatches),
+            Link::Observer(chain) => (chain, 0),
+            Link::None | Link::AfterSlices => return None,
+        };
+        let (before, all) = chain.position(scene, self);
+        let link = before + step;
+        // A pass that the scene does not need is a link of no chain: it would write the next spare slot.
+        Some((chain.after(scene, link, all), chain.after(scene, link + 1, all)))
+    }
+
+    /// Path of the shader below glsl/, and variant.
+    pub fn shader(&self, scene: &Scene, args: &DispatchArgs) -> &'static str {
+        (self.shader)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
+    }
+
+    /// What a dispatch reads, by the names that the shader gives it.
+    pub fn reads(&self, scene: &Scene, args: &DispatchArgs) -> Vec<Bind> {
+        (self.reads)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
+    }
+
+    /// What a dispatch writes, by the names that the shader gives it.
+    pub fn writes(&self, scene: &Scene, args: &DispatchArgs) -> Vec<Bind> {
+        (self.writes)(scene, &Dispatch::new(args, self.link_slots(scene, args)))
+    }
+
+    /// What a dispatch makes of all its extent, from the formula in f64; texels that it leaves NaN stay untouched.
+    pub fn reference(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+        (self.reference)(scene, &Dispatch::new(args, self.link_slots(scene, args)), reads, writes);
+    }
+
+    /// What a pass over slices has to make of each: what is visible, and as far around it as the filters after it look. None for
+    /// passes that make all of their extent: lines of a frame, and the rows and columns of AOS, where each texel depends on all.
+    pub fn rectangle(&self, scene: &Scene, args: &DispatchArgs) -> Option<Rectangle> {
+        let all = Rectangle { first: [0; 2], size: scene.grid.size };
+        let mut around = [0, 0];
+        match self.link {
+            Link::Observer(Chain::Slices) => return Some(all),
+            Link::AfterSlices => {}
+            Link::Filter(filter) if filter.chain == Chain::Slices => {
+                (filter.reach)(scene)?;
+                let done = Chain::Slices.position(scene, self).0 + args.iteration / filter.dispatches + 1;
+                let mut before = 0;
+                for (_, filter, links) in Chain::Slices.filters(scene) {
+                    let after = (before + links).saturating_sub(done.max(before));
+                    before += links;
+                    match (filter.reach)(scene) {
+                        _ if after == 0 => {}
+                        None => return Some(all),
+                        Some(reach) => (0..2).for_each(|axis| around[axis] += after * reach[axis]),
+                    }
+                }
+            }
+            _ => return None,
         }
-        "aos_slice" => return None,
-        "gaussian_lateral" => [lateral, 0],
-        "gaussian_depth" => [0, depth],
-        _ => [0; 2],
-    })
-}
+        let cut = |axis: usize| {
+            let (low, high) = (scene.seen.low[axis], scene.seen.high[axis]);
+            let first = low.saturating_sub(around[axis]) / WORKGROUP * WORKGROUP;
+            let end = high.saturating_add(around[axis]).next_multiple_of(WORKGROUP).min(scene.grid.size[axis]);
+            (first, end - first)
+        };
+        let (columns, rows) = (cut(0), cut(1));
+        Some(Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] })
+    }
 
-/// Whether a pass of stage 1 writes into the 3D texture itself.
-pub fn writes_volume(scene: &Scene, name: &str, args: &DispatchArgs) -> bool {
-    matches!(SLICES.link(scene, name, args).1, Slot::Volume | Slot::SharpVolume)
-}
+    /// Invocations of a dispatch; of a slice only what is visible.
+    pub fn invocations(&self, scene: &Scene, args: &DispatchArgs) -> [u32; 3] {
+        let extent = (self.extent)(scene, args);
+        let Some(visible) = self.rectangle(scene, args) else { return extent };
+        // Some make a run of neighbours each.
+        let run = |axis: usize| if extent[axis] < scene.grid.size[axis] { RUN } else { 1 };
+        [visible.size[0].div_ceil(run(0)), visible.size[1].div_ceil(run(1)), extent[2]]
+    }
 
-pub fn distance_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
-    DISTANCES.link(scene, name, args)
-}
+    /// Numbers of a dispatch; of a slice, with the texel that its first invocation makes.
+    pub fn numbers(&self, scene: &Scene, args: &DispatchArgs) -> Params {
+        let params = (self.params)(scene, args);
+        match self.rectangle(scene, args) {
+            Some(r) => params.i32("first_column", r.first[0]).i32("first_row", r.first[1]),
+            None => params,
+        }
+    }
 
-/// The distance map after its filters.
-pub fn distance_end(scene: &Scene) -> Slot {
-    DISTANCES.end(scene)
-}
-
-pub fn picture_link(scene: &Scene, name: &str, args: &DispatchArgs) -> (Slot, Slot) {
-    PICTURES.link(scene, name, args)
-}
-
-/// The picture after its filters.
-pub fn picture_end(scene: &Scene) -> Slot {
-    PICTURES.end(scene)
+    /// What a dispatch leaves: the reference, and what was there before around the part of a slice that it makes.
+    pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+        let before = writes.clone();
+        self.reference(scene, args, reads, writes);
+        let Some(r) = self.rectangle(scene, args) else { return };
+        for (name, kept) in before.iter() {
+            let target = writes.get_mut(name);
+            for (x, y) in (0..kept.size[1]).flat_map(|y| (0..kept.size[0]).map(move |x| (x, y))) {
+                let made = [x, y]
+                    .iter()
+                    .zip(r.first)
+                    .zip(r.size)
+                    .all(|((at, first), size)| (first as usize..(first + size) as usize).contains(at));
+                (0..kept.size[2]).filter(|_| !made).for_each(|z| target.set([x, y, z], kept.get([x, y, z])));
+            }
+        }
+    }
 }

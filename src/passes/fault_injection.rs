@@ -1,20 +1,20 @@
-//! Faults that are planted on purpose, to see whether the checks notice: what the device is told or given is changed, what the f64
-//! reference is told stays. Pure: [`crate::gpu`] asks at the few places where it tells the device something.
+//! Fault injection: deliberate faults that test whether the checks detect them. A fault changes what the device gets; the input of the
+//! f64 reference stays the same. Pure: [`crate::gpu`] applies the changes where it passes data to the device.
 
+use super::pass::{DispatchArgs, Params, Pass, Slot};
 use super::slots::Initializer;
-use super::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use crate::spirv::SpirvError;
 
 /// A fault with its name.
 pub struct InjectedFault {
     pub name: &'static str,
-    /// What it stands for: in a driver, or in code of ours.
+    /// The real fault that it represents, in a driver or in this program.
     pub what: &'static str,
     pub change: Change,
 }
 
-/// What is changed. Of passes all are meant whose names begin so.
+/// What is changed. A pass name means all passes whose names begin with it.
 #[derive(Clone, Copy)]
 pub enum Change {
     /// Numbers of a dispatch.
@@ -23,22 +23,22 @@ pub enum Change {
     Constant { pass: &'static str, name: &'static str, by: fn(i32) -> i32 },
     /// Words of a shader.
     Shader { pass: &'static str, by: fn(&[u32]) -> Result<Vec<u32>, SpirvError> },
-    /// What a dispatch works on.
+    /// Arguments of a dispatch.
     DispatchArgs { pass: &'static str, by: fn(&Scene, &mut DispatchArgs) },
-    /// A dispatch that never runs: what it would have written holds what was there.
+    /// A dispatch that never runs: its outputs keep their old content.
     LeftOut { pass: &'static str, which: fn(&Scene, &DispatchArgs) -> bool },
     /// Invocations of a dispatch.
     Extent { pass: &'static str, by: fn(&mut [u32; 3]) },
     /// A table that the CPU makes from the scene.
     Table { slot: Slot, by: fn(&Scene, &mut [f32]) },
-    /// A frame's bytes on their way in: of so many bytes a texel, texels a line, lines.
+    /// The bytes of an uploaded frame; given are bytes per texel, texels per line, and lines.
     Frame(fn([usize; 3], &mut [u8])),
     /// The sampler takes the nearest texel.
     Nearest,
 }
 
 impl Change {
-    /// Each of these changes what it is given, and says whether it is another then.
+    /// Changes the numbers of a dispatch; true if they differ afterwards. The methods below do the same for other arguments.
     pub fn numbers(&self, pass: &Pass, scene: &Scene, params: &mut Params) -> bool {
         match self {
             Change::Numbers { pass: name, by } if pass.name.starts_with(name) => changed(params, |p| by(scene, p)),
@@ -71,7 +71,7 @@ impl Change {
         }
     }
 
-    pub fn leaves_out(&self, pass: &str, scene: &Scene, args: &DispatchArgs) -> bool {
+    pub(crate) fn leaves_out(&self, pass: &str, scene: &Scene, args: &DispatchArgs) -> bool {
         matches!(self, Change::LeftOut { pass: name, which } if pass.starts_with(name) && which(scene, args))
     }
 
@@ -98,11 +98,11 @@ impl Change {
         before != bytes
     }
 
-    /// Whether it can change what a pass makes of a scene.
-    pub fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
+    /// True if the fault can change the output of a pass for a scene.
+    pub(crate) fn concerns(&self, pass: &Pass, scene: &Scene) -> bool {
         let args = |iteration| DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: 1, iteration, image: 0 };
         let turns: Vec<DispatchArgs> = (0..(pass.repeat)(scene)).map(args).collect();
-        let reads = |slot: Slot| turns.iter().any(|t| (pass.reads)(scene, t).iter().any(|b| b.slot == slot));
+        let reads = |slot: Slot| turns.iter().any(|t| pass.reads(scene, t).iter().any(|b| b.slot == slot));
         pass.is_needed(scene)
             && match self {
                 Change::Numbers { .. } => turns.iter().any(|t| self.numbers(pass, scene, &mut pass.numbers(scene, t))),
@@ -114,10 +114,10 @@ impl Change {
                 Change::LeftOut { .. } => turns.iter().any(|t| self.leaves_out(pass.name, scene, t)),
                 Change::Table { slot, .. } => {
                     let made = |make: fn(&Scene) -> Vec<f32>| self.table(*slot, scene, &mut make(scene));
-                    reads(*slot) && matches!(slot.filled(), Initializer::ByScene(make) if made(make))
+                    reads(*slot) && matches!(slot.initializer(), Initializer::ByScene(make) if made(make))
                 }
                 Change::Frame(_) => reads(Slot::Frames),
-                Change::Nearest => (pass.reads)(scene, &turns[0]).iter().any(|b| b.filtered),
+                Change::Nearest => pass.reads(scene, &turns[0]).iter().any(|b| b.filtered),
             }
     }
 }

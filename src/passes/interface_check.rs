@@ -1,7 +1,7 @@
-//! What a pass declares, held against what its shader says: names, types, access and dimensions. Needs no GPU.
+//! Checks a pass's declaration against its shader: names, types, access and dimensions. Needs no GPU.
 
+use super::pass::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use super::slots::{Format, Shape};
-use super::{Bind, DispatchArgs, Params, Part, Pass, Slot, Value};
 use crate::scene::Scene;
 use crate::spirv::hoist_uniforms::hoist_uniforms;
 use crate::spirv::storage_to_texel_buffer::storage_to_texel_buffer;
@@ -9,15 +9,16 @@ use crate::spirv::strip_bindings::strip_bindings;
 use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// Textures that a shader has and a pass need not: what rays leap by, and quads. Specialization constants say whether they are read.
-const OPTIONAL: [&str; 2] = ["bricks", "quads"];
+/// Textures that a shader declares and a pass may not bind: bricks and packed neighbours. Specialization constants say whether
+/// they are read.
+const OPTIONAL: [&str; 2] = ["bricks", "packed_neighbours"];
 
-/// A pass's shader without the textures that this scene has not.
+/// A pass's shader without the textures that this scene does not have.
 ///
 /// # Errors
 /// A module that breaks the format.
 pub fn for_scene(pass: &Pass, scene: &Scene, args: &DispatchArgs, words: &[u32]) -> Result<Vec<u32>, String> {
-    let bound = [(pass.reads)(scene, args), (pass.writes)(scene, args)].concat();
+    let bound = [pass.reads(scene, args), pass.writes(scene, args)].concat();
     let absent: Vec<_> = OPTIONAL.into_iter().filter(|name| bound.iter().all(|b| b.name != *name)).collect();
     strip_bindings(words, &absent).map_err(|e| e.to_string())
 }
@@ -39,14 +40,15 @@ pub fn for_cpu(
         let binding = module.bindings.iter().find(|b| b.name == bind.name);
         binding.is_some_and(|b| matches!(b.kind, Kind::Sampled | Kind::Filtered))
     };
-    let textures: Vec<_> = (pass.reads)(scene, args)
+    let textures: Vec<_> = pass
+        .reads(scene, args)
         .into_iter()
         .filter(|bind| !bind.filtered && stores(bind.slot) && is_texture(bind))
         .filter_map(|bind| Some((bind.name, image_format(bind.slot.format(scene))?)))
         .collect();
     let words =
         hoist_uniforms(words).and_then(|words| texture_to_storage(&words, &textures)).map_err(|e| e.to_string())?;
-    let reads = (pass.reads)(scene, args);
+    let reads = pass.reads(scene, args);
     storage_to_texel_buffer(&words, |name| reads.iter().any(|b| b.name == name && stores(b.slot)))
         .map_err(|e| e.to_string())
 }
@@ -71,7 +73,7 @@ fn image_format(format: Format) -> Option<ImageFormat> {
 
 /// The first disagreement, naming both sides.
 pub fn check(pass: &Pass, scene: &Scene, args: &DispatchArgs, module: &Module) -> Result<(), String> {
-    let (reads, writes) = ((pass.reads)(scene, args), (pass.writes)(scene, args));
+    let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
     for bind in &reads {
         check_bind(scene, module, bind, Access::Read)?;
     }

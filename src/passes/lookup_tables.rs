@@ -1,14 +1,15 @@
-//! Tables that the CPU makes from the scene, in f64: what shaders look up instead of computing it for every sample.
+//! Tables that the CPU computes from the scene in f64, so that shaders need not compute them for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use crate::scene::{Scene, transfer};
+use crate::scene::{Bricks, Reach, Scene, Side, transfer};
+use rayon::prelude::*;
 
 fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
     values.into_iter().map(|v| v as f32).collect()
 }
 
-/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the PLUS toolkit's rule
-/// holds: both neighbours must exist in both directions, so the last sample and line themselves are out.
+/// (sample, line) of every slice pixel in f32, -1 where the pixel is left out. With an apron of 0 the rule of the PLUS toolkit
+/// applies: both neighbours must exist in both directions, so that the last sample and line are left out.
 pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let [width, height] = scene.grid.size;
@@ -23,7 +24,7 @@ pub fn scan_lut(scene: &Scene) -> Vec<f32> {
     lut
 }
 
-/// Gain of every sample of a line: a factor of linear envelopes, an addend of samples that are compressed already.
+/// Gain of every sample of a line: a factor for linear envelopes, an addend for log-compressed samples.
 pub fn tgc(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let c = &scene.settings.conditioning;
@@ -34,7 +35,7 @@ pub fn tgc(scene: &Scene) -> Vec<f32> {
 }
 
 /// Fractional (sample, line) that a slice pixel at in-plane (x, y) shows, or none. Samples are counted on the lattice that is
-/// scan-converted: decimated by M, sample j lies at sample j M of the frame, and what lies beyond the last takes the last.
+/// scan-converted: decimated by M, sample j is at sample j M of the frame, and pixels beyond the last sample take the last.
 pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, f64)> {
     let (sample, line) = probe.plane_indices(x, y);
     let factor = f64::from(scene.decimation());
@@ -51,8 +52,8 @@ pub fn scan_index(scene: &Scene, probe: &Probe, x: f64, y: f64) -> Option<(f64, 
     (away <= scene.apron).then_some((near_sample.min(kept) / factor, near_line))
 }
 
-/// The parameter that the sweep look-up table is entered by: the tangent of half the angle about the wobble axis, or mm.
-pub fn sweep_parameter(motion: Motion, position: f64) -> f64 {
+/// The parameter of the sweep look-up table: the tangent of half the angle about the wobble axis, or mm.
+fn sweep_parameter(motion: Motion, position: f64) -> f64 {
     match motion {
         Motion::Fan { .. } => (position / 2.0).tan(),
         _ => position,
@@ -66,8 +67,8 @@ fn sweep_position(motion: Motion, parameter: f64) -> f64 {
     }
 }
 
-/// The parameter that the line look-up table is entered by: the tangent of half the in-plane angle, or mm.
-pub fn line_parameter(array: Array, position: f64) -> f64 {
+/// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm.
+pub(super) fn line_parameter(array: Array, position: f64) -> f64 {
     match array {
         Array::Curved { .. } => (position / 2.0).tan(),
         Array::Linear => position,
@@ -75,12 +76,12 @@ pub fn line_parameter(array: Array, position: f64) -> f64 {
 }
 
 /// Lowest and highest parameter of the sweep table.
-pub fn sweep_span(probe: &Probe) -> (f64, f64) {
+pub(super) fn sweep_span(probe: &Probe) -> (f64, f64) {
     let (first, last) = probe.slice_bounds();
     (sweep_parameter(probe.motion, first), sweep_parameter(probe.motion, last))
 }
 
-/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index itself for an even sweep.
+/// Slice position in mean pitches from slice 0, over the sweep's parameter: the slice index for a uniform sweep.
 pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
@@ -121,8 +122,8 @@ pub fn slice_table(scene: &Scene) -> Vec<f32> {
     }))
 }
 
-/// Whether slices lie unevenly or were taken in mixed directions, so that a slice is found by bracketing.
-pub fn is_uneven(geometry: &Geometry) -> bool {
+/// True if slices have non-uniform positions or mixed directions, so that a slice is found by bracketing.
+pub(super) fn is_non_uniform(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Sweep(p) => matches!(p.slices, Axis::Table(_)) || matches!(p.advance, Advance::Each(_)),
         Geometry::Cartesian(_) => false,
@@ -155,11 +156,38 @@ fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
 }
 
 /// The tiles of a picture of planes, as `Sheet::table` lays them out.
-pub fn tile_table(scene: &Scene) -> Vec<f32> {
+pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
     floats(scene.sheet().table(scene.settings.planes.thickness))
 }
 
 /// Outward normal and limit of each half-space of the block.
-pub fn block_table(scene: &Scene) -> Vec<f32> {
+pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
     floats(scene.block().iter().flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, f.limit]))
+}
+
+/// The part of the texture that the samples of each brick may touch, x fastest.
+pub(super) fn brick_reaches(scene: &Scene, bricks: &Bricks) -> Vec<Reach> {
+    let [width, height, _] = bricks.count.map(u64::from);
+    let cell = |n: u64| [n % width, n / width % height, n / (width * height)].map(|n| n as u32);
+    (0..bricks.total()).into_par_iter().map(|n| scene.reach(bricks, cell(n))).collect()
+}
+
+fn side_code(side: Side) -> u32 {
+    match side {
+        Side::Outside => 0,
+        Side::Across => 1,
+        Side::Inside => 2,
+    }
+}
+
+/// Each brick's tile columns, tile rows and slices (first * 4096 + last, exact in f32), and the side.
+pub fn brick_table(scene: &Scene) -> Vec<f32> {
+    let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
+    let entry = |reach: &Reach| {
+        let [columns, rows] = reach.tiles;
+        // Bricks outside depend on no slice, and are written whichever slice is new.
+        let slices = if reach.side == Side::Outside { [0, 4095] } else { reach.slices };
+        [packed(columns), packed(rows), packed(slices), side_code(reach.side) as f32]
+    };
+    brick_reaches(scene, &scene.bricks()).iter().flat_map(entry).collect()
 }

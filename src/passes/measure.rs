@@ -1,9 +1,9 @@
-//! What bounds every pass on a device: how fast it samples, fetches and copies when nothing else is to be done. In no plan;
-//! `profile` runs them by themselves and puts the passes beside them.
+//! The device's limits for every pass: how fast it samples, fetches and copies without computing. These passes are in no plan;
+//! `profile` runs each alone and compares the other passes with them.
 
-use super::*;
+use super::pass::*;
 use crate::probe::{Geometry, Grid};
-use crate::scene::{Input, SceneError, Settings};
+use crate::scene::{Input, Scene, SceneError, Settings};
 use crate::source::StoredType;
 
 /// Samples of each invocation.
@@ -17,6 +17,7 @@ pub const FILTERED: Pass = Pass {
     name: "measure_filtered",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |_, _| "measure/sampling.plain",
     needed: |_| Err("measures the device, not a scene"),
     reads: |_, _| vec![Bind { filtered: true, ..whole("volume", Slot::Volume) }],

@@ -1,93 +1,30 @@
-//! Slots: the GPU resources that passes read and write. A slot's shape and format follow from the scene; a slot that no pass
-//! of a plan names does not exist.
+//! Slots: the GPU resources that passes read and write. Each is declared once, in the table below; its shape and format
+//! follow from the scene. A slot that no pass of a plan names does not exist.
 
-pub use super::format::{Format, Shape};
-use super::{empty_space, lookup_tables};
+use super::lookup_tables;
 use crate::scene::planes::TILE_VECTORS;
-use crate::scene::{Scene, VolumeFormat, transfer};
+use crate::scene::{Layout, Scene, VolumeFormat, transfer};
 use crate::source::StoredType;
 
-/// Frames that may be on their way into slices at once: layers of the frame array, and slots of the staging ring.
+/// Frames that may be uploaded at once: layers of the frame array, and slots of the staging ring.
 pub const FRAMES_IN_FLIGHT: u32 = 4;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Slot {
-    /// Arriving frames, one a layer.
-    Frames,
-    /// Gain of every sample of a line.
-    Tgc,
-    /// The frame after line conditioning: decimated samples x lines.
-    Conditioned,
-    /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
-    ScanLut,
-    /// Slices between filters of stage 1.
-    SliceA,
-    SliceB,
-    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last slice.
-    Growth,
-    /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
-    SliceShares,
-    SliceForward,
-    /// A slice diffused along its rows.
-    SliceRows,
-    /// The volume before smoothing across slices.
-    SharpVolume,
-    /// The 3D texture that rays are cast through.
-    Volume,
-    /// Each texel of it with its neighbours one column and one row on, as their bits.
-    Quads,
-    /// Smallest and largest value of every tile of every slice.
-    TileRanges,
-    /// What each brick looks at of the tiles, and where it lies to the sector.
-    BrickTable,
-    /// Smallest and largest value that samples within each brick may have.
-    BrickRanges,
-    /// What each brick is to a mode.
-    BrickKinds,
-    /// The same with the distance to the nearest brick of another kind along x, and within x and y.
-    LeapsX,
-    LeapsXy,
-    /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
-    SurfaceLeaps,
-    VolumeLeaps,
-    /// Entries of the transfer function that are not transparent, before each.
-    OpaqueBefore,
-    SweepLut,
-    LineLut,
-    SliceTable,
-    Transfer,
-    /// The transfer function between every two sample values.
-    PreIntegrated,
-    /// The tiles of a picture of planes: what each shows, and its lines.
-    Tiles,
-    /// The half-spaces that bound the block of mode cube.
-    Block,
-    /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
-    Distance,
-    DistanceA,
-    DistanceB,
-    /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look wants it.
-    Surface,
-    /// Light that arrives at each pixel's surface, 0..1.
-    Shadow,
-    /// Ambient light that arrives, 0..1.
-    Occlusion,
-    /// The composited volume, where stage 3 lights it or lays it over a surface.
-    Veil,
-    /// What stages 2 and 3 rendered, where it becomes the picture only by averaging or beside planes.
-    Rendered,
-    /// The planes of a 4-up picture; black where the rendering goes.
-    Planes,
-    /// The picture of stages 2 and 3 before the filters of stage 4.
-    Picture,
-    SmoothPicture,
-    SmoothPictureB,
-    /// As of slices: elimination of the picture's rows or columns.
-    PictureShares,
-    PictureForward,
-    PictureRows,
-    /// 8-bit result.
-    Screen,
+/// What a slot is.
+struct Descriptor {
+    /// Debug name; also the GLSL variable's unless a pass gives an alias.
+    name: &'static str,
+    shape: fn(&Scene) -> Shape,
+    format: fn(&Scene) -> Format,
+    initializer: Initializer,
+    /// How to tell that two scenes make different content, where it is made from the scene.
+    differs: Differs,
+    /// True if each of the volume images has its own copy.
+    is_multibuffered: bool,
+    /// True if texels that no pass writes are read as 0: those of slices outside the sector.
+    starts_clear: bool,
+    /// True if different queues use it where the device has several; it is created CONCURRENT then. Stage 1 works on these
+    /// slots; new ones are cleared and filled where pictures are made.
+    crosses_queues: bool,
 }
 
 /// Who writes a slot first.
@@ -99,218 +36,387 @@ pub enum Initializer {
     ByScene(fn(&Scene) -> Vec<f32>),
 }
 
+/// How to tell that two scenes make different content of a slot.
+#[derive(Clone, Copy)]
+enum Differs {
+    /// Both are made and compared.
+    ByContent,
+    /// From what the content follows from: the content itself is too long to compare.
+    By(fn(&Scene, &Scene) -> bool),
+}
+
+impl Descriptor {
+    /// An image that passes write.
+    const fn image(name: &'static str, shape: fn(&Scene) -> Shape, format: fn(&Scene) -> Format) -> Descriptor {
+        Descriptor {
+            name,
+            shape,
+            format,
+            initializer: Initializer::ByPasses,
+            differs: Differs::ByContent,
+            is_multibuffered: false,
+            starts_clear: false,
+            crosses_queues: false,
+        }
+    }
+
+    /// A buffer of 32-bit floats made from the scene.
+    const fn table(
+        name: &'static str,
+        shape: fn(&Scene) -> Shape,
+        make: fn(&Scene) -> Vec<f32>,
+        differs: Differs,
+    ) -> Descriptor {
+        Descriptor::image(name, shape, |_| Format::Floats).by_scene(make, differs)
+    }
+
+    const fn by_frames(self) -> Descriptor {
+        Descriptor { initializer: Initializer::ByFrames, ..self }
+    }
+
+    const fn by_scene(self, make: fn(&Scene) -> Vec<f32>, differs: Differs) -> Descriptor {
+        Descriptor { initializer: Initializer::ByScene(make), differs, ..self }
+    }
+
+    const fn multibuffered(self) -> Descriptor {
+        Descriptor { is_multibuffered: true, ..self }
+    }
+
+    const fn clear(self) -> Descriptor {
+        Descriptor { starts_clear: true, ..self }
+    }
+
+    const fn across_queues(self) -> Descriptor {
+        Descriptor { crosses_queues: true, ..self }
+    }
+}
+
+/// Declares the enum of slots and the descriptor of each.
+macro_rules! slots {
+    ($($(#[$doc:meta])* $slot:ident = $descriptor:expr;)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Slot { $($(#[$doc])* $slot,)* }
+
+        const DESCRIPTORS: &[Descriptor] = &[$($descriptor,)*];
+
+        impl Slot {
+            pub const ALL: &'static [Slot] = &[$(Slot::$slot,)*];
+        }
+    };
+}
+
+use Descriptor as D;
+use Differs::{By, ByContent};
+
+slots! {
+    /// Arriving frames, one a layer.
+    Frames = D::image("frames", frame_layers, frame_format).by_frames().across_queues();
+    /// Gain of every sample of a line.
+    Tgc = D::table("tgc", |s| Shape::Buffer(4 * s.frame_size()[0]), lookup_tables::tgc, ByContent);
+    /// The frame after line conditioning: decimated samples x lines.
+    Conditioned = D::image("conditioned", |s| Shape::Two(s.line_lattice()), |_| Format::R32f).across_queues();
+    /// (sample, line) of every slice pixel on the lattice that is scan-converted; -1 outside the sector.
+    ScanLut = D::image("scan_lut", one_slice, |_| Format::Rg32f)
+        .by_scene(lookup_tables::scan_lut, By(lattice_differs))
+        .across_queues();
+    /// Slices between filters of stage 1.
+    SliceA = D::image("slice_a", one_slice, |_| Format::R32f).clear().across_queues();
+    SliceB = D::image("slice_b", one_slice, |_| Format::R32f).clear().across_queues();
+    /// How many rings the window of the enhanced sigma filter grew, at each pixel of the last slice.
+    Growth = D::image("growth", one_slice, |_| Format::R32f).across_queues();
+    /// Of a slice's rows or columns under elimination: u = forward + shares u of the next pixel.
+    SliceShares = D::image("slice_shares", one_slice, |_| Format::R32f).across_queues();
+    SliceForward = D::image("slice_forward", one_slice, |_| Format::R32f).across_queues();
+    /// A slice diffused along its rows.
+    SliceRows = D::image("slice_rows", one_slice, |_| Format::R32f).across_queues();
+    /// The volume before smoothing across slices.
+    SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// The 3D texture that rays are cast through.
+    Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
+    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
+    /// Smallest and largest value of every tile of every slice.
+    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered();
+    /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
+    BrickTable = D::table(
+        "brick_table",
+        |s| Shape::Buffer(16 * s.bricks().total() as u32),
+        lookup_tables::brick_table,
+        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || a.brick_basis() != b.brick_basis()),
+    );
+    /// Smallest and largest value that samples within each brick may have.
+    BrickRanges = D::image("brick_ranges", per_brick, |_| Format::Rg16).multibuffered();
+    /// The kind of each brick to a mode: active, empty or homogeneous.
+    BrickKinds = D::image("brick_kinds", per_brick, |_| Format::R8);
+    /// The same with the distance to the nearest brick of another kind along x, and within x and y.
+    BrickDistancesX = D::image("brick_distances_x", per_brick, |_| Format::R8);
+    BrickDistancesXy = D::image("brick_distances_xy", per_brick, |_| Format::R8);
+    /// The same in space: for the surface detector, and for the mode that composites or takes the mean.
+    SurfaceBrickDistances = D::image("surface_brick_distances", per_brick, |_| Format::R8);
+    VolumeBrickDistances = D::image("volume_brick_distances", per_brick, |_| Format::R8);
+    /// Entries of the transfer function that are not transparent, before each.
+    OpaqueBefore = D::table(
+        "opaque_before",
+        |_| Shape::Buffer(4 * (transfer::ENTRIES as u32 + 1)),
+        lookup_tables::opaque_before,
+        ByContent,
+    );
+    /// Slice position over the sweep parameter. The direction of the motor only stretches the span of the sweep.
+    SweepLut = D::table(
+        "sweep_lut",
+        entries,
+        lookup_tables::sweep_lut,
+        By(|a, b| !a.geometry.equals_except_direction(&b.geometry) || lattice(a) != lattice(b)),
+    );
+    /// Share of the lines that fired before each line.
+    LineLut = D::table("line_lut", entries, lookup_tables::line_lut, By(lattice_differs));
+    /// Position and advance of every slice.
+    SliceTable = D::table(
+        "slice_table",
+        |s| Shape::Buffer(8 * s.slices()),
+        lookup_tables::slice_table,
+        By(|a, b| a.geometry != b.geometry),
+    );
+    /// The transfer function: colour and absorption over the sample value.
+    Transfer = D::table(
+        "transfer",
+        |_| Shape::Buffer(16 * transfer::ENTRIES as u32),
+        lookup_tables::transfer_table,
+        ByContent,
+    );
+    /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
+    PreIntegrated = D::table(
+        "pre_integrated",
+        |_| Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),
+        lookup_tables::pre_integrated_table,
+        By(|a, b| Slot::Transfer.differs(a, b)),
+    );
+    /// The tiles of a picture of planes: what each shows, and its lines.
+    Tiles = D::table(
+        "tiles",
+        |s| Shape::Buffer(16 * TILE_VECTORS * s.tile_count()),
+        lookup_tables::tile_table,
+        ByContent,
+    );
+    /// The half-spaces that bound the block of mode cube.
+    Block = D::table(
+        "block",
+        |s| Shape::Buffer(16 * s.block().len() as u32),
+        lookup_tables::block_table,
+        ByContent,
+    );
+    /// Distance along each pixel's ray, mm; the largest float where nothing was hit.
+    Distance = D::image("distance_map", per_ray, |_| Format::R32f);
+    DistanceA = D::image("distance_a", per_ray, |_| Format::R32f);
+    DistanceB = D::image("distance_b", per_ray, |_| Format::R32f);
+    /// Echo at the surface, 1 where a surface was found, and the mean echo behind it where the skin look needs it.
+    Surface = D::image("surface", per_ray, |s| if s.samples_behind() > 0 { Format::Rgba16f } else { Format::Rg16f });
+    /// Light that arrives at each pixel's surface, 0..1.
+    Shadow = D::image("shadow", per_ray, |_| Format::R16f);
+    /// Ambient light that arrives, 0..1.
+    Occlusion = D::image("occlusion", per_ray, |_| Format::R16f);
+    /// The composited volume, where stage 3 lights it or shows it in front of a surface.
+    VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
+    /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes.
+    Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
+    /// The planes of a 4-up picture; black where the rendering goes.
+    Planes = D::image("planes", per_pixel, |_| Format::Rgba16f);
+    /// The picture of stages 2 and 3 before the filters of stage 4.
+    Picture = D::image("picture", per_pixel, |_| Format::Rgba16f);
+    SmoothPicture = D::image("smooth_picture", per_pixel, |_| Format::Rgba16f);
+    SmoothPictureB = D::image("smooth_picture_b", per_pixel, |_| Format::Rgba16f);
+    /// As of slices: elimination of the picture's rows or columns.
+    PictureShares = D::image("picture_shares", per_pixel, |_| Format::R32f);
+    PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f);
+    PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f);
+    /// 8-bit result.
+    Screen = D::image("screen", per_pixel, |_| Format::Rgba8);
+}
+
+fn frame_layers(scene: &Scene) -> Shape {
+    let [width, height] = scene.frame_size();
+    Shape::Layers([width, height, FRAMES_IN_FLIGHT])
+}
+
+fn frame_format(scene: &Scene) -> Format {
+    match scene.input.stored {
+        StoredType::U8 => Format::R8,
+        StoredType::U16 => Format::R16,
+        StoredType::F32 => Format::R32f,
+    }
+}
+
+fn one_slice(scene: &Scene) -> Shape {
+    Shape::Two(scene.grid.size)
+}
+
+fn volume(scene: &Scene) -> Shape {
+    Shape::Three(scene.volume_size())
+}
+
+fn volume_format(scene: &Scene) -> Format {
+    match scene.settings.slices.format {
+        VolumeFormat::R8 => Format::R8,
+        VolumeFormat::R16 => Format::R16,
+        VolumeFormat::R16f => Format::R16f,
+        VolumeFormat::R32f => Format::R32f,
+    }
+}
+
+/// The bits of four texels of the volume.
+fn four_texels(scene: &Scene) -> Format {
+    if scene.settings.slices.format == VolumeFormat::R8 { Format::R32u } else { Format::Rg32u }
+}
+
+fn per_brick(scene: &Scene) -> Shape {
+    Shape::Three(scene.bricks().count)
+}
+
+fn entries(scene: &Scene) -> Shape {
+    Shape::Buffer(4 * scene.settings.ray.entries)
+}
+
+fn per_ray(scene: &Scene) -> Shape {
+    Shape::Two(scene.ray_size())
+}
+
+fn per_pixel(scene: &Scene) -> Shape {
+    Shape::Two(scene.picture_size())
+}
+
+/// What look-up tables follow from besides the geometry.
+fn lattice(scene: &Scene) -> impl PartialEq + use<> {
+    (scene.grid, scene.apron, scene.decimation(), scene.settings.ray.entries)
+}
+
+fn lattice_differs(old: &Scene, new: &Scene) -> bool {
+    !old.geometry.equals_except_advance(&new.geometry) || lattice(old) != lattice(new)
+}
+
 impl Slot {
-    pub const ALL: &'static [Slot] = &[
-        Slot::Frames,
-        Slot::Tgc,
-        Slot::Conditioned,
-        Slot::ScanLut,
-        Slot::SliceA,
-        Slot::SliceB,
-        Slot::Growth,
-        Slot::SliceShares,
-        Slot::SliceForward,
-        Slot::SliceRows,
-        Slot::SharpVolume,
-        Slot::Volume,
-        Slot::Quads,
-        Slot::TileRanges,
-        Slot::BrickTable,
-        Slot::BrickRanges,
-        Slot::BrickKinds,
-        Slot::LeapsX,
-        Slot::LeapsXy,
-        Slot::SurfaceLeaps,
-        Slot::VolumeLeaps,
-        Slot::OpaqueBefore,
-        Slot::SweepLut,
-        Slot::LineLut,
-        Slot::SliceTable,
-        Slot::Transfer,
-        Slot::PreIntegrated,
-        Slot::Tiles,
-        Slot::Block,
-        Slot::Distance,
-        Slot::DistanceA,
-        Slot::DistanceB,
-        Slot::Surface,
-        Slot::Shadow,
-        Slot::Occlusion,
-        Slot::Veil,
-        Slot::Rendered,
-        Slot::Planes,
-        Slot::Picture,
-        Slot::SmoothPicture,
-        Slot::SmoothPictureB,
-        Slot::PictureShares,
-        Slot::PictureForward,
-        Slot::PictureRows,
-        Slot::Screen,
-    ];
+    fn descriptor(self) -> &'static Descriptor {
+        &DESCRIPTORS[self as usize]
+    }
 
     /// Debug name; also the GLSL variable's unless a pass gives an alias.
     pub fn name(self) -> &'static str {
-        match self {
-            Slot::Frames => "frames",
-            Slot::Tgc => "tgc",
-            Slot::Conditioned => "conditioned",
-            Slot::ScanLut => "scan_lut",
-            Slot::SliceA => "slice_a",
-            Slot::SliceB => "slice_b",
-            Slot::Growth => "growth",
-            Slot::SliceShares => "slice_shares",
-            Slot::SliceForward => "slice_forward",
-            Slot::SliceRows => "slice_rows",
-            Slot::SharpVolume => "sharp_volume",
-            Slot::Volume => "volume",
-            Slot::Quads => "quads",
-            Slot::TileRanges => "tile_ranges",
-            Slot::BrickTable => "brick_table",
-            Slot::BrickRanges => "brick_ranges",
-            Slot::BrickKinds => "brick_kinds",
-            Slot::LeapsX => "leaps_x",
-            Slot::LeapsXy => "leaps_xy",
-            Slot::SurfaceLeaps => "surface_leaps",
-            Slot::VolumeLeaps => "volume_leaps",
-            Slot::OpaqueBefore => "opaque_before",
-            Slot::SweepLut => "sweep_lut",
-            Slot::LineLut => "line_lut",
-            Slot::SliceTable => "slice_table",
-            Slot::Transfer => "transfer",
-            Slot::PreIntegrated => "pre_integrated",
-            Slot::Tiles => "tiles",
-            Slot::Block => "block",
-            Slot::Distance => "distance_map",
-            Slot::DistanceA => "distance_a",
-            Slot::DistanceB => "distance_b",
-            Slot::Surface => "surface",
-            Slot::Shadow => "shadow",
-            Slot::Occlusion => "occlusion",
-            Slot::Veil => "veil",
-            Slot::Rendered => "rendered",
-            Slot::Planes => "planes",
-            Slot::Picture => "picture",
-            Slot::SmoothPicture => "smooth_picture",
-            Slot::SmoothPictureB => "smooth_picture_b",
-            Slot::PictureShares => "picture_shares",
-            Slot::PictureForward => "picture_forward",
-            Slot::PictureRows => "picture_rows",
-            Slot::Screen => "screen",
-        }
+        self.descriptor().name
     }
 
     pub fn shape(self, scene: &Scene) -> Shape {
-        let [width, height] = scene.frame_size();
-        match self {
-            Slot::Frames => Shape::Layers([width, height, FRAMES_IN_FLIGHT]),
-            Slot::Tgc => Shape::Buffer(4 * width),
-            Slot::Conditioned => Shape::Two(scene.line_lattice()),
-            Slot::ScanLut | Slot::SliceA | Slot::SliceB => Shape::Two(scene.grid.size),
-            Slot::Growth | Slot::SliceShares | Slot::SliceForward | Slot::SliceRows => Shape::Two(scene.grid.size),
-            Slot::SharpVolume | Slot::Volume | Slot::Quads => Shape::Three(scene.volume_size()),
-            Slot::TileRanges => Shape::Three(scene.tile_counts()),
-            Slot::BrickTable => Shape::Buffer(16 * scene.bricks().total() as u32),
-            Slot::BrickRanges | Slot::BrickKinds | Slot::LeapsX | Slot::LeapsXy => Shape::Three(scene.bricks().count),
-            Slot::SurfaceLeaps | Slot::VolumeLeaps => Shape::Three(scene.bricks().count),
-            Slot::OpaqueBefore => Shape::Buffer(4 * (transfer::ENTRIES as u32 + 1)),
-            Slot::SweepLut | Slot::LineLut => Shape::Buffer(4 * scene.settings.ray.entries),
-            Slot::SliceTable => Shape::Buffer(8 * scene.slices()),
-            Slot::Transfer => Shape::Buffer(16 * transfer::ENTRIES as u32),
-            Slot::PreIntegrated => Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),
-            Slot::Tiles => Shape::Buffer(16 * TILE_VECTORS * scene.tile_count()),
-            Slot::Block => Shape::Buffer(16 * scene.block().len() as u32),
-            Slot::Distance | Slot::DistanceA | Slot::DistanceB | Slot::Surface => Shape::Two(scene.ray_size()),
-            Slot::Shadow | Slot::Occlusion | Slot::Veil | Slot::Rendered => Shape::Two(scene.ray_size()),
-            Slot::PictureShares | Slot::PictureForward | Slot::PictureRows => Shape::Two(scene.picture_size()),
-            Slot::Planes | Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB | Slot::Screen => {
-                Shape::Two(scene.picture_size())
-            }
-        }
+        (self.descriptor().shape)(scene)
     }
 
     pub fn format(self, scene: &Scene) -> Format {
-        match self {
-            Slot::Frames => match scene.input.stored {
-                StoredType::U8 => Format::R8,
-                StoredType::U16 => Format::R16,
-                StoredType::F32 => Format::R32f,
-            },
-            Slot::ScanLut => Format::Rg32f,
-            Slot::Conditioned | Slot::SliceA | Slot::SliceB | Slot::Growth => Format::R32f,
-            Slot::SliceShares | Slot::SliceForward | Slot::SliceRows | Slot::PictureShares => Format::R32f,
-            Slot::PictureForward | Slot::PictureRows => Format::Rgba32f,
-            Slot::SharpVolume | Slot::Volume => match scene.settings.slices.format {
-                VolumeFormat::R8 => Format::R8,
-                VolumeFormat::R16 => Format::R16,
-                VolumeFormat::R16f => Format::R16f,
-                VolumeFormat::R32f => Format::R32f,
-            },
-            Slot::Quads if scene.settings.slices.format == VolumeFormat::R8 => Format::R32u,
-            Slot::Quads => Format::Rg32u,
-            Slot::Tgc | Slot::SweepLut | Slot::LineLut | Slot::SliceTable | Slot::Transfer | Slot::PreIntegrated => {
-                Format::Floats
-            }
-            Slot::Tiles | Slot::Block | Slot::BrickTable | Slot::OpaqueBefore => Format::Floats,
-            Slot::TileRanges | Slot::BrickRanges => Format::Rg16,
-            Slot::BrickKinds | Slot::LeapsX | Slot::LeapsXy | Slot::SurfaceLeaps | Slot::VolumeLeaps => Format::R8,
-            Slot::Distance | Slot::DistanceA | Slot::DistanceB => Format::R32f,
-            Slot::Surface if scene.samples_behind() > 0 => Format::Rgba16f,
-            Slot::Surface => Format::Rg16f,
-            Slot::Shadow | Slot::Occlusion => Format::R16f,
-            Slot::Veil | Slot::Rendered | Slot::Planes => Format::Rgba16f,
-            Slot::Picture | Slot::SmoothPicture | Slot::SmoothPictureB => Format::Rgba16f,
-            Slot::Screen => Format::Rgba8,
+        (self.descriptor().format)(scene)
+    }
+
+    pub fn initializer(self) -> Initializer {
+        self.descriptor().initializer
+    }
+
+    /// True if each of the volume images has its own copy.
+    pub(crate) fn is_multibuffered(self) -> bool {
+        self.descriptor().is_multibuffered
+    }
+
+    /// True if texels that no pass writes are read as 0.
+    pub(crate) fn starts_clear(self) -> bool {
+        self.descriptor().starts_clear
+    }
+
+    /// True if different queues use it where the device has several.
+    pub(crate) fn crosses_queues(self) -> bool {
+        self.descriptor().crosses_queues
+    }
+
+    /// True if the CPU makes the slot's content from the scene, and makes it differently of these two.
+    pub fn differs(self, old: &Scene, new: &Scene) -> bool {
+        match (self.initializer(), self.descriptor().differs) {
+            (Initializer::ByScene(make), ByContent) => make(old) != make(new),
+            (Initializer::ByScene(_), By(differs)) => differs(old, new),
+            _ => false,
         }
     }
 
-    pub fn filled(self) -> Initializer {
-        match self {
-            Slot::Frames => Initializer::ByFrames,
-            Slot::Tgc => Initializer::ByScene(lookup_tables::tgc),
-            Slot::ScanLut => Initializer::ByScene(lookup_tables::scan_lut),
-            Slot::BrickTable => Initializer::ByScene(empty_space::table),
-            Slot::OpaqueBefore => Initializer::ByScene(lookup_tables::opaque_before),
-            Slot::SweepLut => Initializer::ByScene(lookup_tables::sweep_lut),
-            Slot::LineLut => Initializer::ByScene(lookup_tables::line_lut),
-            Slot::SliceTable => Initializer::ByScene(lookup_tables::slice_table),
-            Slot::Transfer => Initializer::ByScene(lookup_tables::transfer_table),
-            Slot::PreIntegrated => Initializer::ByScene(lookup_tables::pre_integrated_table),
-            Slot::Tiles => Initializer::ByScene(lookup_tables::tile_table),
-            Slot::Block => Initializer::ByScene(lookup_tables::block_table),
-            _ => Initializer::ByPasses,
-        }
-    }
-
-    /// Whether each of the volume images that take turns has its own.
-    pub fn is_multibuffered(self) -> bool {
-        matches!(self, Slot::SharpVolume | Slot::Volume | Slot::Quads | Slot::TileRanges | Slot::BrickRanges)
-    }
-
-    /// Whether texels that no pass writes are read as 0: those of slices outside the sector.
-    pub fn starts_clear(self) -> bool {
-        matches!(self, Slot::SliceA | Slot::SliceB | Slot::SharpVolume | Slot::Volume)
-    }
-
-    /// Used by different queues where the device has several, and created CONCURRENT then: all that stage 1 works on, since what is
-    /// new is cleared and filled where pictures are made.
-    pub fn crosses_queues(self) -> bool {
-        matches!(
-            self,
-            Slot::Frames
-                | Slot::Conditioned
-                | Slot::ScanLut
-                | Slot::SliceA
-                | Slot::SliceB
-                | Slot::Growth
-                | Slot::SliceShares
-                | Slot::SliceForward
-                | Slot::SliceRows
-                | Slot::SharpVolume
-                | Slot::Volume
-        )
-    }
-
+    /// Bytes of one copy.
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
+    }
+}
+
+/// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes four, or planes
+/// are shown next to the rendering.
+pub fn rendered(scene: &Scene) -> Slot {
+    let is_picture =
+        scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
+    if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Shape {
+    Two([u32; 2]),
+    Layers([u32; 3]),
+    Three([u32; 3]),
+    /// Bytes.
+    Buffer(u32),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    R8,
+    R16,
+    R16f,
+    R32f,
+    Rg16,
+    Rg16f,
+    Rg32f,
+    Rgba16f,
+    Rgba32f,
+    Rgba8,
+    /// Bits.
+    R32u,
+    Rg32u,
+    /// 32-bit floats of a buffer.
+    Floats,
+}
+
+impl Format {
+    pub fn channels(self) -> usize {
+        match self {
+            Format::R8 | Format::R16 | Format::R16f | Format::R32f | Format::R32u | Format::Floats => 1,
+            Format::Rg16 | Format::Rg16f | Format::Rg32f | Format::Rg32u => 2,
+            Format::Rgba16f | Format::Rgba32f | Format::Rgba8 => 4,
+        }
+    }
+
+    pub(super) fn channel_bytes(self) -> usize {
+        match self {
+            Format::R8 | Format::Rgba8 => 1,
+            Format::R16 | Format::Rg16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,
+            Format::R32f | Format::Rg32f | Format::Rgba32f | Format::Floats | Format::R32u | Format::Rg32u => 4,
+        }
+    }
+
+    pub(crate) fn texel_bytes(self) -> usize {
+        self.channels() * self.channel_bytes()
+    }
+}
+
+impl Shape {
+    pub fn texels(self) -> u64 {
+        match self {
+            Shape::Two([w, h]) => u64::from(w) * u64::from(h),
+            Shape::Layers(n) | Shape::Three(n) => n.iter().map(|n| u64::from(*n)).product(),
+            Shape::Buffer(bytes) => u64::from(bytes) / 4,
+        }
+    }
+
+    /// Slices of a 3D image, layers of an array, 1 otherwise: the parts that barriers distinguish.
+    pub fn parts(self) -> u32 {
+        match self {
+            Shape::Layers(n) | Shape::Three(n) => n[2],
+            _ => 1,
+        }
     }
 }

@@ -12,7 +12,7 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// All values NaN: what a reference leaves so is not written by the pass either.
+    /// All values NaN: texels that a reference leaves NaN are not written by the pass either.
     pub fn untouched(size: [usize; 3], channels: usize) -> Texels {
         Texels { size, channels, values: vec![f64::NAN; size.iter().product::<usize>() * channels] }
     }
@@ -112,7 +112,7 @@ impl Texels {
     pub fn spacing(format: Format, value: f64) -> f64 {
         match format {
             Format::R8 | Format::Rgba8 => 1.0 / 255.0,
-            // Whole numbers are themselves; of others the fraction is lost.
+            // Integers are exact; the fraction of other numbers is lost.
             Format::R32u | Format::Rg32u => 0.9,
             Format::R16 | Format::Rg16 => 1.0 / 65535.0,
             Format::R16f | Format::Rg16f | Format::Rgba16f => value.abs().max(6.2e-5) / 1024.0,

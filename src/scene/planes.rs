@@ -180,6 +180,26 @@ impl Scene {
 }
 
 impl Sheet {
+    /// The tile that holds a pixel; none where the grid has more cells than tiles.
+    pub fn tile_at(&self, x: usize, y: usize) -> Option<&Tile> {
+        self.tiles.iter().find(|tile| {
+            let within = |at: usize, axis: usize| {
+                let low = tile.corner[axis] as usize;
+                at >= low && at < low + tile.size[axis] as usize
+            };
+            within(x, 0) && within(y, 1)
+        })
+    }
+
+    /// The place in the tile's plane that a pixel's centre shows, mm in space.
+    pub fn place(&self, tile: &Tile, x: usize, y: usize) -> DVec3 {
+        let from_middle = |at: usize, axis: usize| {
+            let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
+            (at as f64 + 0.5 - middle) * self.pixel
+        };
+        tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
+    }
+
     /// The data of each tile for the shaders: the upper left corner in space and the vectors of one pixel right and down, the vector through
     /// the slab, the frame's colour and kind, and two cross-lines (a, b, c, present) with their colours, where a x + b y + c is the distance
     /// from the line in pixels, with (x, y) relative to the tile's corner.

@@ -143,13 +143,13 @@ mod tests {
             let same = old.iter().filter(kept).zip(new.iter().filter(kept));
             assert!(same.clone().count() > 0 && same.into_iter().all(|(o, n)| o.operands == n.operands), "{name}");
         }
-        let (early, late) = count_loads(&words(embedded("raycast/projection.even").unwrap()));
+        let (early, late) = count_loads(&words(embedded("raycast/projection.uniform").unwrap()));
         assert!(early + late > 40, "ray casting has that many uniform numbers");
     }
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/volume.uneven").unwrap());
+        let intact = words(embedded("raycast/volume.non_uniform").unwrap());
         for cut in 1..intact.len() {
             let _ = hoist_uniforms(&intact[..cut]);
         }

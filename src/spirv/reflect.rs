@@ -311,7 +311,7 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error_and_not_a_panic() {
-        let intact = words(embedded("raycast/surface.moved").unwrap());
+        let intact = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         assert!(reflect(&[]).is_err());
         for cut in 1..intact.len() {
             let _ = reflect(&intact[..cut]);

@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn tables_become_texel_buffers_and_nothing_else_changes() {
-        let before = words(embedded("raycast/volume.uneven_moved").unwrap());
+        let before = words(embedded("raycast/volume.non_uniform_intra_frame_motion").unwrap());
         let mut names = table_names(&before);
         names.sort();
         assert_eq!(names, ["line_lut", "slice_table", "sweep_lut", "transfer"]);
@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/volume.uneven").unwrap());
+        let intact = words(embedded("raycast/volume.non_uniform").unwrap());
         for cut in 1..intact.len() {
             let _ = storage_to_texel_buffer(&intact[..cut], |_| true);
         }

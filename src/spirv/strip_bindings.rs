@@ -92,10 +92,11 @@ mod tests {
 
     #[test]
     fn only_the_named_bindings_are_removed() {
-        let before = words(embedded("raycast/surface.moved").unwrap());
-        let after = strip_bindings(&before, &["bricks", "quads", "nothing"]).unwrap();
+        let before = words(embedded("raycast/surface.intra_frame_motion").unwrap());
+        let after = strip_bindings(&before, &["bricks", "packed_neighbours", "nothing"]).unwrap();
         let (old, new) = (reflect(&before).unwrap(), reflect(&after).unwrap());
-        let kept: Vec<_> = old.bindings.iter().filter(|b| !["bricks", "quads"].contains(&b.name.as_str())).collect();
+        let kept: Vec<_> =
+            old.bindings.iter().filter(|b| !["bricks", "packed_neighbours"].contains(&b.name.as_str())).collect();
         assert_eq!(old.bindings.len(), kept.len() + 2);
         assert_eq!(new.bindings.iter().collect::<Vec<_>>(), kept);
         assert_eq!((old.params, old.constants, old.local_size), (new.params, new.constants, new.local_size));
@@ -104,15 +105,15 @@ mod tests {
 
     #[test]
     fn a_sampled_texture_is_refused_and_a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/surface.moved").unwrap());
+        let intact = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         assert!(strip_bindings(&intact, &["volume"]).is_err(), "it is read with a filter");
         for cut in 1..intact.len() {
-            let _ = strip_bindings(&intact[..cut], &["bricks", "quads"]);
+            let _ = strip_bindings(&intact[..cut], &["bricks", "packed_neighbours"]);
         }
         for at in 3..intact.len() {
             let mut corrupted = intact.clone();
             corrupted[at] ^= 0x0003_0001;
-            let _ = strip_bindings(&corrupted, &["bricks", "quads"]);
+            let _ = strip_bindings(&corrupted, &["bricks", "packed_neighbours"]);
         }
     }
 }

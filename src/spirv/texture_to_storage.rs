@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_sampled_volume_becomes_a_storage_image() {
-        let before = words(embedded("raycast/surface.moved").unwrap());
+        let before = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         let after = texture_to_storage(&before, &[("volume", ImageFormat::R8)]).unwrap();
         let volume = reflect(&after).unwrap().bindings.into_iter().find(|b| b.name == "volume").unwrap();
         assert_eq!((volume.kind, volume.access, volume.dimension), (Kind::Storage, Access::Read, Dimension::Three));
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn other_bindings_are_refused_and_a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/surface.moved").unwrap());
+        let intact = words(embedded("raycast/surface.intra_frame_motion").unwrap());
         for name in ["distance_map", "sweep_lut", "Params", "nothing"] {
             assert!(texture_to_storage(&intact, &[(name, ImageFormat::R8)]).is_err(), "{name}");
         }

@@ -49,7 +49,7 @@ impl ExtraTolerance {
     /// For a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three axes, between
     /// neighbours that differ by at most 1. A threshold may then be reached a step earlier or later, and rarely in another voxel.
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
-        match (pass.reads)(scene, args).iter().any(|bind| bind.filtered) {
+        match pass.reads(scene, args).iter().any(|bind| bind.filtered) {
             true => ExtraTolerance { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers: 0.02 },
             false => ExtraTolerance::default(),
         }

@@ -460,10 +460,10 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let distances =
         Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| f64::from((60.0 - 12.0 * (-hill(x, y)).exp()) as f32));
     let (args, mut inputs, mut expected) = (DispatchArgs::default(), Arrays::default(), Arrays::default());
-    for bind in (shadow::PASS.reads)(&scene, &args) {
+    for bind in shadow::PASS.reads(&scene, &args) {
         inputs.insert(bind.name, distances.clone());
     }
-    let writes = (shadow::PASS.writes)(&scene, &args);
+    let writes = shadow::PASS.writes(&scene, &args);
     for bind in &writes {
         expected.insert(bind.name, Texels::untouched(shape_size(Slot::Shadow.shape(&scene)), 1));
     }

@@ -43,7 +43,7 @@ fn draw(context: &Arc<Context>, scene: &Scene, frames: &[Texels]) -> Result<Rend
     let picture = renderer.picture()?;
     let mut slots = Vec::new();
     for slot in renderer.plan().slots.clone() {
-        if let (Initializer::ByPasses, Some(texels)) = (slot.filled(), renderer.read(slot)?) {
+        if let (Initializer::ByPasses, Some(texels)) = (slot.initializer(), renderer.read(slot)?) {
             slots.push((slot, texels));
         }
     }

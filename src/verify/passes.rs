@@ -47,7 +47,7 @@ pub fn run_with_reference(
 ) -> Result<DispatchComparison, GpuError> {
     let args = dispatch_args_of(scene, iteration);
     let inputs = inputs_of(scene, pass, &args, kind, seed);
-    let writes = (pass.writes)(scene, &args);
+    let writes = pass.writes(scene, &args);
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
@@ -70,8 +70,8 @@ type Variant = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 /// What distinguishes a pipeline: its shader, its constants, and the formats of its bindings.
 fn variant(scene: &Scene, pass: &Pass) -> Variant {
     let args = dispatch_args_of(scene, 0);
-    let bound = (pass.reads)(scene, &args).into_iter().chain((pass.writes)(scene, &args));
-    ((pass.shader)(scene, &args), (pass.constants)(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
+    let bound = pass.reads(scene, &args).into_iter().chain(pass.writes(scene, &args));
+    (pass.shader(scene, &args), (pass.constants)(scene, &args), bound.map(|b| b.slot.format(scene)).collect())
 }
 
 fn check(dut: &mut DeviceUnderTest, n: usize, pass: &'static Pass) -> Result<Findings, GpuError> {
@@ -193,7 +193,7 @@ fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
         size[2] = 1;
     }
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
-    if let Initializer::ByScene(make) = bind.slot.filled() {
+    if let Initializer::ByScene(make) = bind.slot.initializer() {
         texels.values = make(scene).into_iter().map(f64::from).collect();
         return texels;
     }
@@ -245,20 +245,22 @@ fn blurred(noise: &Texels) -> Texels {
 /// The empty-space slots of a volume, computed by the references of their passes.
 fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     let mut slots = std::collections::BTreeMap::from([(Slot::Volume, volume.clone())]);
-    let made = |name: &str| ["tile_ranges", "brick_ranges", "classify", "leap"].iter().any(|p| name.starts_with(p));
+    let made = |name: &str| {
+        ["tile_ranges", "brick_ranges", "classify_bricks", "brick_distance"].iter().any(|p| name.starts_with(p))
+    };
     for step in Plan::new(scene).steps.iter().filter(|s| made(s.pass.name)) {
         let args = DispatchArgs { slices: scene.slices(), ..step.args() };
         let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
-        for bind in (step.pass.reads)(scene, &args) {
+        for bind in step.pass.reads(scene, &args) {
             let there = slots.get(&bind.slot).cloned();
             inputs.insert(bind.name, there.unwrap_or_else(|| input(scene, &bind, "zero", &mut Noise(1))));
         }
-        for bind in (step.pass.writes)(scene, &args) {
+        for bind in step.pass.writes(scene, &args) {
             let channels = bind.slot.format(scene).channels();
             outputs.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
         }
-        (step.pass.reference)(scene, &args, &inputs, &mut outputs);
-        for bind in (step.pass.writes)(scene, &args) {
+        step.pass.reference(scene, &args, &inputs, &mut outputs);
+        for bind in step.pass.writes(scene, &args) {
             slots.insert(bind.slot, outputs.get(bind.name).clone());
         }
         if slots.contains_key(&slot) {
@@ -278,7 +280,7 @@ pub fn dispatch_args_of(scene: &Scene, iteration: u32) -> DispatchArgs {
 pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, seed: u64) -> Arrays {
     let mut noise = Noise(seed);
     let mut inputs = Arrays::default();
-    let reads = (pass.reads)(scene, args);
+    let reads = pass.reads(scene, args);
     for (n, bind) in reads.iter().enumerate() {
         // An image bound under two names has the same contents.
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
@@ -286,16 +288,17 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     }
     if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
         // Empty space must be consistent with the volume.
-        let leaps = empty_space_of(scene, bricks.slot, inputs.get("volume"));
-        inputs.insert("bricks", leaps);
+        let distances = empty_space_of(scene, bricks.slot, inputs.get("volume"));
+        inputs.insert("bricks", distances);
     }
-    if reads.iter().any(|b| b.slot == Slot::Quads) {
-        let mut quads = Arrays::default();
-        let channels = Slot::Quads.format(scene).channels();
-        quads.insert("quads", Texels::untouched(shape_size(Slot::Quads.shape(scene)), channels));
+    if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
+        let mut packed = Arrays::default();
+        let channels = Slot::PackedNeighbours.format(scene).channels();
+        packed
+            .insert("packed_neighbours", Texels::untouched(shape_size(Slot::PackedNeighbours.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        (packed_neighbours::PASS.reference)(scene, &all, &inputs, &mut quads);
-        inputs.insert("quads", quads.get("quads").clone());
+        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut packed);
+        inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());
     }
     inputs
 }

@@ -318,25 +318,25 @@ fn every_detector_matches_its_reference_in_noise() {
             let blob = |y: usize| 0.5 + 0.5 * (y as f64 * 0.35).sin();
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
             let mut inputs = Arrays::default();
-            for bind in (pass.reads)(&scene, &args) {
+            for bind in pass.reads(&scene, &args) {
                 let size = shape_size(bind.slot.shape(&scene));
                 let mut texels = Texels::from_fn(size, bind.slot.format(&scene).channels(), |at, _| match bind.slot {
                     Slot::Volume => f64::from(value(at) as f32),
                     _ => 0.0,
                 });
-                if let Initializer::ByScene(make) = bind.slot.filled() {
+                if let Initializer::ByScene(make) = bind.slot.initializer() {
                     texels.values = make(&scene).into_iter().map(f64::from).collect();
                 }
                 inputs.insert(bind.name, texels);
             }
             assert_eq!(inputs.get("volume").size, [width, height, slices]);
             let mut expected = Arrays::default();
-            for bind in (pass.writes)(&scene, &args) {
+            for bind in pass.writes(&scene, &args) {
                 let channels = bind.slot.format(&scene).channels();
                 expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(&scene)), channels));
             }
             let mut mistaken = expected.clone();
-            (pass.reference)(&scene, &args, &inputs, &mut expected);
+            pass.reference(&scene, &args, &inputs, &mut expected);
             let got = single.run(&scene, pass, &args, &inputs, 0.5).expect("dispatch");
             let (expected, got) = (expected.get("distance_map"), got.get("distance_map"));
             let differ = |wanted: &Texels| {
@@ -347,7 +347,7 @@ fn every_detector_matches_its_reference_in_noise() {
             // With a quarter more noise, the reference must branch differently.
             let mut wrong = scene.clone();
             wrong.settings.surface.noise *= 1.25;
-            (pass.reference)(&wrong, &args, &inputs, &mut mistaken);
+            pass.reference(&wrong, &args, &inputs, &mut mistaken);
             noticed += differ(mistaken.get("distance_map"));
             let hits = expected.values.iter().filter(|e| is_hit(**e)).count();
             let share = off as f64 / expected.values.len() as f64;

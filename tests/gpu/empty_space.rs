@@ -89,7 +89,8 @@ const CAMERAS: [&str; 3] =
     ["azimuth = 25, elevation = -15, field_of_view = 35", "elevation = 90", "azimuth = 170, elevation = 3, zoom = 2"];
 
 /// The results of stage 2 that the scene has.
-const RESULTS: [Slot; 6] = [Slot::Distance, Slot::Surface, Slot::Veil, Slot::Rendered, Slot::Picture, Slot::Screen];
+const RESULTS: [Slot; 6] =
+    [Slot::Distance, Slot::Surface, Slot::VolumeLayer, Slot::Rendered, Slot::Picture, Slot::Screen];
 
 fn results(renderer: &mut Renderer) -> Vec<(Slot, Vec<u64>)> {
     renderer.picture().expect("picture");
@@ -101,7 +102,7 @@ fn results(renderer: &mut Renderer) -> Vec<(Slot, Vec<u64>)> {
 /// Bricks that rays skip, singly or several at once: their share of all.
 fn leapt(renderer: &mut Renderer) -> [f64; 2] {
     let mut shares = [0.0f64; 2];
-    for slot in [Slot::SurfaceLeaps, Slot::VolumeLeaps] {
+    for slot in [Slot::SurfaceBrickDistances, Slot::VolumeBrickDistances] {
         let Some(leaps) = renderer.read(slot).expect("read") else { continue };
         let share = |test: fn(u32) -> bool| {
             let codes = leaps.values.iter().map(|v| (v * 255.0).round() as u32);

@@ -35,13 +35,13 @@ fn filtered(
     mut run: impl FnMut(&'static Pass, &DispatchArgs, &Arrays) -> Arrays,
 ) -> Texels {
     let pass = by_name(name).expect("pass");
-    assert!(pass.is_needed(scene), "{name}: {:?}", (pass.needed)(scene));
+    assert!(pass.is_needed(scene), "{name}: {:?}", pass.needed(scene));
     let mut held = Arrays::default();
     held.insert("source", source.clone());
     for iteration in 0..(pass.repeat)(scene) {
         let args = DispatchArgs { iteration, ..DispatchArgs::default() };
         let written = run(pass, &args, &held);
-        for bind in (pass.writes)(scene, &args) {
+        for bind in pass.writes(scene, &args) {
             let name = match (bind.name, bind.slot) {
                 (_, Slot::SliceRows | Slot::PictureRows) => "rows",
                 ("target", _) => "source",
@@ -63,11 +63,11 @@ pub fn by_reference(scene: &Scene, name: &str, source: &Texels) -> Texels {
 
 fn reference(scene: &Scene, pass: &Pass, args: &DispatchArgs, inputs: &Arrays) -> Arrays {
     let mut written = Arrays::default();
-    for bind in (pass.writes)(scene, args) {
+    for bind in pass.writes(scene, args) {
         let size = shape_size(bind.slot.shape(scene));
         written.insert(bind.name, Texels::untouched(size, bind.slot.format(scene).channels()));
     }
-    (pass.reference)(scene, args, inputs, &mut written);
+    pass.reference(scene, args, inputs, &mut written);
     written
 }
 
@@ -242,12 +242,12 @@ pub fn run_by_references(scene: &Scene, frequency: Frequency, slots: &mut BTreeM
     for (_, step) in Plan::new(scene).steps_of(frequency) {
         let args = DispatchArgs { iteration: step.iteration, ..DispatchArgs::default() };
         let mut inputs = Arrays::default();
-        for bind in (step.pass.reads)(scene, &args) {
+        for bind in step.pass.reads(scene, &args) {
             inputs
                 .insert(bind.name, slots.get(&bind.slot).unwrap_or_else(|| panic!("{:?} is empty", bind.slot)).clone());
         }
         let written = reference(scene, step.pass, &args, &inputs);
-        for bind in (step.pass.writes)(scene, &args) {
+        for bind in step.pass.writes(scene, &args) {
             slots.insert(bind.slot, written.get(bind.name).clone());
         }
     }
@@ -285,9 +285,9 @@ fn a_plan_of_every_filter_is_what_its_references_make_in_a_row() {
             for iteration in 0..if pass.is_needed(&scene) { (pass.repeat)(&scene) } else { 0 } {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };
                 let mut inputs = Arrays::default();
-                (pass.reads)(&scene, &args).iter().for_each(|b| inputs.insert(b.name, slots[&b.slot].clone()));
+                pass.reads(&scene, &args).iter().for_each(|b| inputs.insert(b.name, slots[&b.slot].clone()));
                 let written = reference(&scene, pass, &args, &inputs);
-                (pass.writes)(&scene, &args).iter().for_each(|b| {
+                pass.writes(&scene, &args).iter().for_each(|b| {
                     slots.insert(b.slot, written.get(b.name).clone());
                 });
             }

@@ -4,7 +4,7 @@ use crate::common::gpu::*;
 use crate::filters::{by_reference, on_device, plane, texels};
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::filter::growth;
+use echolume::passes::filter::enhanced_sigma::growth_shares;
 use echolume::passes::{Slot, Texels};
 use echolume::plan::Plan;
 use echolume::probe::Geometry;
@@ -113,7 +113,7 @@ fn growth_is_what_a_count_by_brute_force_finds() {
         }
         let unsure = f64::from(unsure) / source.values.len() as f64;
         assert!(unsure < 0.01, "{unsure} of the pixels prove nothing");
-        let shares = growth::shares(&scene, &map);
+        let shares = growth_shares(&scene, &map);
         println!("{filter}: {:?}", shares.iter().map(|s| (s * 1000.0).round() / 10.0).collect::<Vec<_>>());
         assert_eq!(shares.len() as u32, (17 - window) / 2 + 1);
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
@@ -137,7 +137,7 @@ fn growth_beyond_the_sector_does_not_count() {
         if outside > 1.0 { 3.0 } else { 1.0 }
     });
     assert!(map.values.iter().filter(|v| **v == 3.0).count() > 500);
-    let shares = growth::shares(&scene, &map);
+    let shares = growth_shares(&scene, &map);
     assert_eq!((shares[0], shares[1], shares[3]), (0.0, 1.0, 0.0));
 }
 
@@ -163,7 +163,7 @@ fn the_larger_a_window_starts_the_more_often_it_grows() {
         let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
         renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         renderer.show(0).expect("show");
-        let shares = growth::shares(&scene, &renderer.read(Slot::Growth).expect("read").expect("there"));
+        let shares = growth_shares(&scene, &renderer.read(Slot::Growth).expect("read").expect("there"));
         println!(
             "{window:2} to {largest}: {:?} %",
             shares.iter().map(|s| (s * 1000.0).round() / 10.0).collect::<Vec<_>>()

@@ -16,28 +16,28 @@ fn of(toml: &str) -> Scene {
 const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'vr'",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut pre_integrated picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut pre_integrated picture screen",
     ),
     (
         "mode = 'vr'\nvolume = { shading = 'first-hit' }",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer distance_map veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
     ),
     (
         "mode = 'sr'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map surface picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map surface picture screen",
     ),
     (
         "mode = 'mixed'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface classify_volume leap_volume leap_volume leap_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps volume_leaps opaque_before sweep_lut transfer distance_map surface veil picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map surface volume_layer picture screen",
     ),
     (
         "mode = 'mip'",
@@ -51,8 +51,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ),
     (
         "mode = 'mean'",
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_projection tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps sweep_lut picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_projection tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances sweep_lut picture screen",
     ),
     (
         "mode = 'mip'\nray = { rays = 2 }",
@@ -73,8 +73,8 @@ const MODES: &[(&str, &str, &str)] = &[
     ("mode = 'cube'", "scan_convert raycast_cube tone", "frames scan_lut volume sweep_lut block picture screen"),
     (
         "mode = 'sr'\nlayout = '4up'",
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut tiles distance_map surface rendered planes picture screen",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut tiles distance_map surface rendered planes picture screen",
     ),
 ];
 
@@ -109,10 +109,10 @@ fn in_every_mode_a_change_reruns_only_the_affected_passes() {
             "raycast_planes",
             "tile_ranges",
             "brick_ranges",
-            "classify_surface",
-            "leap_surface",
-            "classify_volume",
-            "leap_volume",
+            "classify_bricks_surface",
+            "brick_distance_surface",
+            "classify_bricks_volume",
+            "brick_distance_volume",
         ];
         let moved = |p: &&str| !aside.contains(p);
         let seen_from_elsewhere = match base.is_flat() {
@@ -124,7 +124,7 @@ fn in_every_mode_a_change_reruns_only_the_affected_passes() {
             (
                 "transfer function",
                 |s| s.settings.volume.transfer = echolume::scene::Transfer::Named(echolume::scene::TransferName::Warm),
-                if base.composites() { from(&["classify_volume"]) } else { vec![] },
+                if base.composites() { from(&["classify_bricks_volume"]) } else { vec![] },
             ),
             ("light", |s| s.settings.light.ambient = 0.4, from(&["light"])),
             ("contrast", |s| s.settings.post.contrast = 1.5, vec![all[all.len() - 1]]),

@@ -46,9 +46,9 @@ fn storage_loads_and_texture_fetches_give_the_same_texels() {
         }
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             let reads: Vec<_> =
-                (pass.reads)(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
+                pass.reads(&scene, &DispatchArgs::default()).iter().map(|b| b.slot.format(&scene)).collect();
             // Once for each shader and formats of its inputs: these determine the rewritten shader.
-            if !seen.insert(((pass.shader)(&scene, &DispatchArgs::default()), reads)) {
+            if !seen.insert((pass.shader(&scene, &DispatchArgs::default()), reads)) {
                 continue;
             }
             let args = dispatch_args_of(&scene, 0);
@@ -141,7 +141,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
             let channels = bind.slot.format(told).channels();
             expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(told)), channels));
         }
-        (pass.reference)(wrong, &args, &right.inputs, &mut expected);
+        pass.reference(wrong, &args, &right.inputs, &mut expected);
         let compared = verify::compare_outputs(
             pass,
             told,
@@ -163,7 +163,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     inputs.insert("source", source);
     let mut expected = Arrays::default();
     expected.insert("target", Texels::untouched(shape_size(right.writes[0].slot.shape(&base)), 1));
-    (pass.reference)(&base, &DispatchArgs::default(), &inputs, &mut expected);
+    pass.reference(&base, &DispatchArgs::default(), &inputs, &mut expected);
     let compared =
         verify::compare_outputs(pass, &base, ExtraTolerance::default(), POISON, &expected, &right.got, &right.writes);
     assert!(compared.worst.is_some(), "changed pixels went unnoticed");

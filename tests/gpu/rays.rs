@@ -185,7 +185,7 @@ fn a_hit_is_where_opacity_reaches_the_threshold_and_the_volume_layer_ends_there(
     assert!(is_hit(distance));
     let (origin, _) = scene.rays.at(2.5, 2.5);
     assert!((origin.y + distance - 5.7).abs() < 0.05, "the surface lies at {}", origin.y + distance);
-    let veil = slot(&device, &scene, body, Slot::Veil).get([2, 2, 0])[3];
+    let veil = slot(&device, &scene, body, Slot::VolumeLayer).get([2, 2, 0])[3];
     let expected = -((origin.y + distance + 0.25) / 0.5 * (-0.03f64).ln_1p()).exp_m1();
     assert!((veil - expected).abs() < 5e-4, "{veil} for {expected}");
 }
@@ -234,7 +234,7 @@ fn a_start_depth_cuts_only_its_own_mode() {
         "the wall above the start is no surface: {}",
         origin.y + distance
     );
-    let veil = slot(&device, &mixed, body, Slot::Veil).get([4, 4, 0])[3];
+    let veil = slot(&device, &mixed, body, Slot::VolumeLayer).get([4, 4, 0])[3];
     let expected = -(7.25 / 0.5 * (-0.03f64).ln_1p()).exp_m1();
     assert!((veil - expected).abs() < 2e-3, "the veil begins at the region's top: {veil} for {expected}");
     let four = scene(block(20), FLOATS, &toml("mode = 'sr'\nlayout = '4up'"));

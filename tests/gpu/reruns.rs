@@ -107,25 +107,25 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     let (passes, slots) = names("mode = 'vr'");
     assert_eq!(
         passes,
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone"
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone"
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy volume_leaps opaque_before sweep_lut transfer picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy volume_brick_distances opaque_before sweep_lut transfer picture screen"
     );
     let (passes, slots) = names("mode = 'sr'\ndistance = { bilateral = { pixels = 1.0, distance = 1.0, repeat = 3 } }");
     assert_eq!(
         passes,
-        "scan_convert tile_ranges brick_ranges classify_surface leap_surface leap_surface leap_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface bilateral_distance bilateral_distance bilateral_distance light tone"
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds leaps_x leaps_xy surface_leaps sweep_lut distance_map distance_a distance_b surface picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map distance_a distance_b surface picture screen"
     );
     let (passes, slots) = names("mode = 'vr'\nslices = { sigma = { window = 5, sigma = 0.0 } }");
     assert_eq!(
         passes,
-        "scan_convert tile_ranges brick_ranges classify_volume leap_volume leap_volume leap_volume raycast_volume tone",
+        "scan_convert tile_ranges brick_ranges classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume tone",
         "a sigma of 0 changes nothing"
     );
     assert!(!slots.contains("slice_a"));

@@ -25,14 +25,14 @@ pub fn run(device: &Device, scene: &Scene, pass: &str, distances: &Texels) -> Te
     let pass = by_name(pass).expect("pass");
     let args = DispatchArgs::default();
     let mut inputs = Arrays::default();
-    for bind in (pass.reads)(scene, &args) {
+    for bind in pass.reads(scene, &args) {
         let channels = bind.slot.format(scene).channels();
         let ones = Texels::from_fn(distances.size, channels, |_, _| 1.0);
         let is_map = matches!(bind.slot, Slot::Distance | Slot::DistanceA | Slot::DistanceB);
         inputs.insert(bind.name, if is_map { distances.clone() } else { ones });
     }
     let outputs = PassRunner::new(device).expect("single").run(scene, pass, &args, &inputs, 0.5).expect("dispatch");
-    outputs.get((pass.writes)(scene, &args)[0].name).clone()
+    outputs.get(pass.writes(scene, &args)[0].name).clone()
 }
 
 /// A step of 10 mm on a plane, light from the left at 45 deg: its shadow is as long as its height, less the bias.

@@ -33,7 +33,7 @@ fn surfaces_are_where_the_reference_has_them_on_every_ray() {
             let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
             reads.insert("volume", read(Slot::Volume));
             let pass = by_name("raycast_surface").expect("pass");
-            for bind in (pass.writes)(&scene, &args) {
+            for bind in pass.writes(&scene, &args) {
                 writes.insert(bind.name, Texels::untouched(got.size, bind.slot.format(&scene).channels()));
             }
             pass.expected(&scene, &args, &reads, &mut writes);

@@ -22,7 +22,7 @@ fn a_timed_pass_works_on_the_contents_given() {
         let pass = by_name(name).expect("pass");
         let (first, last) =
             (DispatchArgs::default(), DispatchArgs { iteration: (pass.repeat)(&scene) - 1, ..DispatchArgs::default() });
-        let (from, to) = ((pass.reads)(&scene, &first)[0], (pass.writes)(&scene, &last)[0]);
+        let (from, to) = (pass.reads(&scene, &first)[0], pass.writes(&scene, &last)[0]);
         let mut timed = PassTimer::new(&devices[0], &scene, pass, &[(from.slot, picture.clone())]).expect("timed");
         assert!(timed.run().expect("run").expect("time stamps") > 0.0, "{name}");
         let got = timed.read(to.slot).expect("read").expect("an image");
@@ -32,12 +32,12 @@ fn a_timed_pass_works_on_the_contents_given() {
         for iteration in 0..=last.iteration {
             let args = DispatchArgs { iteration, ..first };
             let mut inputs = Arrays::default();
-            for bind in (pass.reads)(&scene, &args) {
+            for bind in pass.reads(&scene, &args) {
                 let (_, texels) = slots.iter().find(|(s, _)| *s == bind.slot).expect("written before");
                 inputs.insert(bind.name, texels.clone());
             }
             let outputs = single.run(&scene, pass, &args, &inputs, 0.0).expect("dispatch");
-            for bind in (pass.writes)(&scene, &args) {
+            for bind in pass.writes(&scene, &args) {
                 slots.retain(|(s, _)| *s != bind.slot);
                 slots.push((bind.slot, outputs.get(bind.name).clone()));
             }

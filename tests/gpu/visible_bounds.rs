@@ -4,8 +4,7 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use echolume::gpu::{Renderer, RendererOptions};
-use echolume::passes::chain::rectangle;
-use echolume::passes::{DispatchArgs, Slot, Texels};
+use echolume::passes::{DispatchArgs, Slot, Texels, by_name};
 use echolume::plan::Rerun;
 use echolume::probe::{Advance, Geometry, Probe};
 use echolume::scene::{Mode, RING, Scene, VisibleBounds};
@@ -274,7 +273,8 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
         .expect("recorded");
     assert_eq!(renderer.skipped_frames(), 9 - frames.len() as u64);
     for name in ["scan_convert", "median_slice", "gaussian_lateral", "gaussian_elevation"] {
-        let made = rectangle(&scene, name, &DispatchArgs::default()).expect("a pass over slices");
+        let made =
+            by_name(name).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let extents: Vec<[u32; 3]> = recorded.iter().filter(|(n, _)| *n == name).map(|(_, e)| *e).collect();
         // Some passes write four texels an invocation.
         let run = |axis: usize| {
@@ -289,7 +289,8 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
     for (slot, pass, slices) in
         [(Slot::SharpVolume, "gaussian_lateral", frames), (Slot::Volume, "gaussian_elevation", scene.seen.slices())]
     {
-        let made = rectangle(&scene, pass, &DispatchArgs::default()).expect("a pass over slices");
+        let made =
+            by_name(pass).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let volume = renderer.read(slot).expect("read").expect("there");
         let [width, height, depth] = volume.size;
         let mut written = 0;

@@ -103,9 +103,9 @@ fn packed_neighbours_give_the_samples_of_eight_texels() {
                 let (quads, exact) = (of("quads"), of("exact"));
                 let frames = body_frames(&quads, |p| if p.y > 25.0 && p.y < 31.0 { 0.8 } else { 0.1 } + 0.1 * blob(p));
                 let mut with = rendered(&device, quads.clone(), &frames);
-                assert!(with.plan().steps.iter().any(|s| s.pass.name == "quads"));
+                assert!(with.plan().steps.iter().any(|s| s.pass.name == "packed_neighbours"));
                 let mut without = rendered(&device, exact, &frames);
-                assert!(!without.plan().steps.iter().any(|s| s.pass.name == "quads"));
+                assert!(!without.plan().steps.iter().any(|s| s.pass.name == "packed_neighbours"));
                 let (a, b) = (with.picture().expect("picture"), without.picture().expect("picture"));
                 let (mean, largest) = difference(&a, &b);
                 let what = format!("geometry {g}, {format}, {mode}");
@@ -142,7 +142,7 @@ fn a_volume_that_stays_is_packed_without_new_frames_and_a_texture_of_floats_neve
     let frames = body_frames(&moving, blob);
     let mut renderer = rendered(&device, moving.clone(), &frames);
     let first = renderer.picture().expect("picture");
-    let packs = |r: &Renderer| r.plan().steps.iter().any(|s| s.pass.name == "quads");
+    let packs = |r: &Renderer| r.plan().steps.iter().any(|s| s.pass.name == "packed_neighbours");
     assert!(!packs(&renderer), "fewer than six samples a texel do not pay");
     let software = renderer.texel_access() == echolume::gpu::TexelAccess::Storage;
     assert!(matches!(renderer.change(still.clone()).expect("change"), Rerun::Steps { .. }));

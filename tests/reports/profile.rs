@@ -76,7 +76,7 @@ fn a_profile_is_consistent_and_round_trips() {
     let (profile, spans) = run(&context, &scene(SETTINGS), &frames(), &asked(6)).expect("profile");
     profile.check().expect("consistent");
     // Neighbours are packed where the device is a CPU.
-    let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "quads");
+    let names = profile.passes.iter().map(|p| p.name.as_str()).filter(|name| *name != "packed_neighbours");
     assert_eq!(
         names.collect::<Vec<_>>(),
         [
@@ -85,8 +85,8 @@ fn a_profile_is_consistent_and_round_trips() {
             "sigma_slice",
             "tile_ranges",
             "brick_ranges",
-            "classify_surface",
-            "leap_surface",
+            "classify_bricks_surface",
+            "brick_distance_surface",
             "raycast_surface",
             "median_distance",
             "light",

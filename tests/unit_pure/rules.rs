@@ -235,7 +235,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
         for pass in PASSES.iter().filter(|p| p.is_needed(&scene)) {
             for iteration in 0..(pass.repeat)(&scene) {
                 let args = DispatchArgs { iteration, ..DispatchArgs::default() };
-                let shader = (pass.shader)(&scene, &args);
+                let shader = pass.shader(&scene, &args);
                 let bytes =
                     spirv::embedded(shader).unwrap_or_else(|| panic!("{}: {shader} is not embedded", pass.name));
                 // As compiled, and with its textures as storage images.
@@ -256,7 +256,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
     }
     let scene = measure::scene(8, 8).expect("scene");
     for pass in measure::MEASURES {
-        let shader = (pass.shader)(&scene, &DispatchArgs::default());
+        let shader = pass.shader(&scene, &DispatchArgs::default());
         let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
         interface_check::check(pass, &scene, &DispatchArgs::default(), &module).expect("agreement");
         used.push(shader);

@@ -246,7 +246,7 @@ impl Renderer {
 
     /// Uploads a slot that the CPU computes from the scene. Nothing that reads it may be in flight.
     fn fill(&mut self, slot: Slot) -> Result<(), GpuError> {
-        let Initializer::ByScene(make) = slot.filled() else { return Ok(()) };
+        let Initializer::ByScene(make) = slot.initializer() else { return Ok(()) };
         if self.slots.image(slot, 0).is_none() {
             self.slots.fill(slot, &self.scene);
             return Ok(());

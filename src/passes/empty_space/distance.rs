@@ -1,19 +1,20 @@
-//! How many bricks away the nearest brick of another kind is, in Chebyshev's distance (Deakin and Knackstedt 2020): one axis a
+//! The Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020): one axis per
 //! dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
 
-use super::{NOTHING, WANTED};
-use crate::passes::*;
+use super::{ACTIVE, EMPTY};
+use crate::passes::pass::*;
 use crate::probe::Geometry;
 use crate::scene::Scene;
 
 pub const SURFACE: Pass = Pass {
-    name: "leap_surface",
+    name: "brick_distance_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
-    shader: |_, _| "skip/leap.plain",
-    needed: |s| (super::classify::SURFACE.needed)(s),
-    reads: |_, t| vec![whole("source", link(Slot::SurfaceLeaps, t).0)],
-    writes: |_, t| vec![whole("target", link(Slot::SurfaceLeaps, t).1)],
+    link: Link::None,
+    shader: |_, _| "empty_space/distance.plain",
+    needed: super::classify::SURFACE.needed,
+    reads: |_, t| vec![whole("source", link(Slot::SurfaceBrickDistances, t).0)],
+    writes: |_, t| vec![whole("target", link(Slot::SurfaceBrickDistances, t).1)],
     extent: |s, _| s.bricks().count,
     repeat: |_| 3,
     params: |_, _| Params::default(),
@@ -23,27 +24,27 @@ pub const SURFACE: Pass = Pass {
 };
 
 pub const VOLUME: Pass = Pass {
-    name: "leap_volume",
-    needed: |s| (super::classify::VOLUME.needed)(s),
-    reads: |_, t| vec![whole("source", link(Slot::VolumeLeaps, t).0)],
-    writes: |_, t| vec![whole("target", link(Slot::VolumeLeaps, t).1)],
-    constants: |_, t| constants(NOTHING, t),
-    reference: |_, t, reads, writes| reference(NOTHING, t, reads, writes),
+    name: "brick_distance_volume",
+    needed: super::classify::VOLUME.needed,
+    reads: |_, t| vec![whole("source", link(Slot::VolumeBrickDistances, t).0)],
+    writes: |_, t| vec![whole("target", link(Slot::VolumeBrickDistances, t).1)],
+    constants: |_, t| constants(EMPTY, t),
+    reference: |_, t, reads, writes| reference(EMPTY, t, reads, writes),
     ..SURFACE
 };
 
-/// What an axis' dispatch reads and writes.
+/// The slots that the dispatch of an axis reads and writes.
 fn link(last: Slot, args: &DispatchArgs) -> (Slot, Slot) {
     match args.iteration {
-        0 => (Slot::BrickKinds, Slot::LeapsX),
-        1 => (Slot::LeapsX, Slot::LeapsXy),
-        _ => (Slot::LeapsXy, last),
+        0 => (Slot::BrickKinds, Slot::BrickDistancesX),
+        1 => (Slot::BrickDistancesX, Slot::BrickDistancesXy),
+        _ => (Slot::BrickDistancesXy, last),
     }
 }
 
-/// The detector looks beyond the bricks, where a Cartesian volume repeats its last texels.
+/// The kind of the space beyond the bricks. The detector takes samples there, where a Cartesian volume repeats its last texels.
 fn beyond_surface(scene: &Scene) -> u32 {
-    if matches!(scene.geometry, Geometry::Cartesian(_)) { WANTED } else { NOTHING }
+    if matches!(scene.geometry, Geometry::Cartesian(_)) { ACTIVE } else { EMPTY }
 }
 
 fn constants(beyond: u32, args: &DispatchArgs) -> Vec<(&'static str, i32)> {

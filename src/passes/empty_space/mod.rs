@@ -1,96 +1,71 @@
-//! What lets rays leap: ranges of tiles and bricks, kept up to date slice by slice; what each brick is to a mode; and how far
-//! the nearest brick of another kind is. Each mode's rule is exact: the picture is the same bit for bit.
+//! Empty-space skipping: value ranges of tiles and bricks, updated slice by slice; the kind of each brick to a mode; and the
+//! distance to the nearest brick of another kind. Each mode's rule is exact: the picture is the same bit for bit.
 
-pub mod brick_ranges;
 pub mod classify;
 pub mod distance;
-pub mod tile_ranges;
+pub mod ranges;
 
-use crate::passes::{Need, Slot};
-use crate::scene::{Bricks, Mode, Reach, Scene, Side};
-use rayon::prelude::*;
+use crate::passes::pass::{Need, Slot};
+use crate::scene::{Mode, Scene};
 
-/// Kinds of bricks, as classify.comp has them.
-const WANTED: u32 = 0;
-const NOTHING: u32 = 1;
-const KNOWN: u32 = 2;
-/// Bricks that a distance goes up to; a kind has the two bits above.
-const FARTHEST: u32 = 16;
+/// Kinds of bricks, as in classify.comp. The samples of an active brick are needed.
+const ACTIVE: u32 = 0;
+/// Outside the insonified region, or transparent.
+const EMPTY: u32 = 1;
+/// Inside, and the result of its samples is known.
+const HOMOGENEOUS: u32 = 2;
+/// Largest distance that is stored, bricks; the kind is in the two bits above.
+const MAX_DISTANCE: u32 = 16;
 
-/// What a ray caster leaps by.
+/// How a ray caster skips empty space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leaps {
-    /// It takes every sample.
+pub(in crate::passes) enum Skipping {
+    /// Not at all: it takes every sample.
     None,
-    /// Kinds of bricks, and how far around they are the same.
+    /// By the kinds of bricks and the distance to the nearest brick of another kind, in this slot.
     Kinds(Slot),
-    /// What the largest sample so far is compared with.
+    /// By the value ranges of bricks, which are compared with the largest or smallest sample so far.
     Ranges,
 }
 
-impl Leaps {
+impl Skipping {
     /// The 3D texture that shaders name "bricks".
     pub fn slot(self) -> Option<Slot> {
         match self {
-            Leaps::None => None,
-            Leaps::Kinds(slot) => Some(slot),
-            Leaps::Ranges => Some(Slot::BrickRanges),
+            Skipping::None => None,
+            Skipping::Kinds(slot) => Some(slot),
+            Skipping::Ranges => Some(Slot::BrickRanges),
         }
     }
 
-    /// SKIP of skip.glsl.
+    /// SKIP of empty_space.glsl.
     pub fn constant(self) -> (&'static str, i32) {
         let value = match self {
-            Leaps::None => 0,
-            Leaps::Kinds(_) => 1,
-            Leaps::Ranges => 2,
+            Skipping::None => 0,
+            Skipping::Kinds(_) => 1,
+            Skipping::Ranges => 2,
         };
         ("SKIP", value)
     }
 }
 
-pub fn surface_leaps(scene: &Scene) -> Leaps {
-    if scene.skips() { Leaps::Kinds(Slot::SurfaceLeaps) } else { Leaps::None }
+/// How the surface detector skips empty space.
+pub(in crate::passes) fn surface_skipping(scene: &Scene) -> Skipping {
+    if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
 }
 
-pub fn volume_leaps(scene: &Scene) -> Leaps {
+/// How compositing and projections skip empty space.
+pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Skipping {
     match scene.settings.mode {
-        _ if !scene.skips() => Leaps::None,
-        Mode::Mip | Mode::MinIp => Leaps::Ranges,
-        _ => Leaps::Kinds(Slot::VolumeLeaps),
+        _ if !scene.skips() => Skipping::None,
+        Mode::Mip | Mode::MinIp => Skipping::Ranges,
+        _ => Skipping::Kinds(Slot::VolumeBrickDistances),
     }
 }
 
 fn asked(scene: &Scene) -> Need {
     match scene.skips() {
-        true => Ok("rays leap over bricks that cannot change the picture"),
-        false => Err("no ray leaps: none is cast, or every sample is asked for"),
+        true => Ok("rays skip bricks that cannot change the picture"),
+        false => Err("no ray skips bricks: none is cast, or every sample is asked for"),
     }
-}
-
-/// What each brick looks at, x fastest.
-fn reaches(scene: &Scene, bricks: &Bricks) -> Vec<Reach> {
-    let [width, height, _] = bricks.count.map(u64::from);
-    let cell = |n: u64| [n % width, n / width % height, n / (width * height)].map(|n| n as u32);
-    (0..bricks.total()).into_par_iter().map(|n| scene.reach(bricks, cell(n))).collect()
-}
-
-fn side_code(side: Side) -> u32 {
-    match side {
-        Side::Outside => 0,
-        Side::Across => 1,
-        Side::Inside => 2,
-    }
-}
-
-/// The table of bricks: tile columns, tile rows and slices (first * 4096 + last, exact in f32), and the side.
-pub fn table(scene: &Scene) -> Vec<f32> {
-    let packed = |[first, last]: [u32; 2]| (first * 4096 + last) as f32;
-    let entry = |reach: &Reach| {
-        let [columns, rows] = reach.tiles;
-        // Bricks outside look at nothing, and are written whatever slice is new.
-        let slices = if reach.side == Side::Outside { [0, 4095] } else { reach.slices };
-        [packed(columns), packed(rows), packed(slices), side_code(reach.side) as f32]
-    };
-    reaches(scene, &scene.bricks()).iter().flat_map(entry).collect()
 }

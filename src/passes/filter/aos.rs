@@ -5,12 +5,11 @@
 
 use super::estimator::storable_edge;
 use super::perona_malik::{asked, conductance, constant};
-use crate::passes::chain::{picture_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scheme};
 
-/// Of one step: rows forward and backward, columns forward and backward.
-pub const DISPATCHES: u32 = 4;
+/// Dispatches of one step: rows forward and backward, columns forward and backward.
+const DISPATCHES: u32 = 4;
 
 const TOLERANCE: Tolerance = Tolerance {
     absolute: 3e-5,
@@ -24,15 +23,16 @@ pub const SLICE: Pass = Pass {
     name: "aos_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| match turn_of(t) {
+    link: Link::Filter(Filter { dispatches: DISPATCHES, ..Filter::of_slices(|_| None) }),
+    shader: |_, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.plane",
         (0, Sweep::Backward) => "filter/aos_backward.rows",
-        _ if writes_volume(s, "aos_slice", t) => "filter/aos_backward.slice",
+        _ if t.writes_volume() => "filter/aos_backward.slice",
         _ => "filter/aos_backward.plane",
     },
     needed: |s| asked(s.settings.slices.perona_malik, Scheme::Aos),
-    reads: |s, t| SLICE_SLOTS.reads(slice_link(s, "aos_slice", t).0, t),
-    writes: |s, t| SLICE_SLOTS.writes(slice("target", slice_link(s, "aos_slice", t).1), t),
+    reads: |_, t| SLICE_SLOTS.reads(t.source(), t),
+    writes: |_, t| SLICE_SLOTS.writes(slice("target", t.target()), t),
     extent: |s, t| lines(s.grid.size, t),
     repeat: |s| DISPATCHES * s.settings.slices.perona_malik.unwrap_or_default().repeat,
     params: |s, t| params(s.settings.slices.perona_malik, t),
@@ -45,14 +45,15 @@ pub const PICTURE: Pass = Pass {
     name: "aos_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter { dispatches: DISPATCHES, ..Filter::of(Chain::Pictures) }),
     shader: |_, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.picture",
         (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
         _ => "filter/aos_backward.picture",
     },
     needed: |s| asked(s.settings.post.perona_malik, Scheme::Aos),
-    reads: |s, t| PICTURE_SLOTS.reads(picture_link(s, "aos_picture", t).0, t),
-    writes: |s, t| PICTURE_SLOTS.writes(whole("target", picture_link(s, "aos_picture", t).1), t),
+    reads: |_, t| PICTURE_SLOTS.reads(t.source(), t),
+    writes: |_, t| PICTURE_SLOTS.writes(whole("target", t.target()), t),
     extent: |s, t| lines(s.picture_size(), t),
     repeat: |s| DISPATCHES * s.settings.post.perona_malik.unwrap_or_default().repeat,
     params: |s, t| params(s.settings.post.perona_malik, t),
@@ -61,7 +62,7 @@ pub const PICTURE: Pass = Pass {
     reference: |s, t, reads, writes| reference(s.settings.post.perona_malik, t, reads, writes),
 };
 
-/// What lies between the sweeps.
+/// The slots between the sweeps.
 struct Between {
     shares: Slot,
     forward: Slot,
@@ -161,7 +162,7 @@ fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays,
     }
 }
 
-/// What elimination has to leave at pixel i, u[i] = forward + share u[i+1], told without eliminating: the last unknown of the
+/// The result of elimination at pixel i, u[i] = forward + share u[i+1], computed without elimination: the last unknown of the
 /// first i + 1 equations, whose solution is linear in u[i+1]. `forward` is that solution with u[i+1] = 0, and `share` what a
 /// u[i+1] of 1 adds to it.
 fn eliminated(weights: &[f64], values: &[&[f64]], i: usize) -> (f64, Vec<f64>) {

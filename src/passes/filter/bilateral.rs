@@ -1,23 +1,21 @@
 //! Bilateral filter of the distance map (Tomasi and Manduchi 1998), repeated if asked. Misses stay and weigh nothing.
 
-use crate::passes::chain::distance_link;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::{Bilateral, Scene};
 
-const NAME: &str = "bilateral_distance";
-
 pub const DISTANCE: Pass = Pass {
-    name: NAME,
+    name: "bilateral_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/bilateral.distance",
     needed: |s| match (s.has_distance(), s.distance.bilateral) {
         (false, _) => Err("no distance map in this mode"),
         (true, None) => Err("not asked for"),
         _ => Ok("asked for"),
     },
-    reads: |s, t| vec![whole("source", distance_link(s, NAME, t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, NAME, t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: |s| settings(s).repeat,
     params: |s, t| {

@@ -3,8 +3,7 @@
 
 use super::estimator::{self, LEAST, LEAST_DISTANCE};
 use super::sigma::{few, range};
-use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::{EnhancedSigma, Noise, Scene};
 
 const WHY: &str = "a mean of at most 63^2 values in f32; a pixel at exactly 2 sigma may count or not, and with it a whole ring; \
@@ -14,13 +13,14 @@ pub const SLICE: Pass = Pass {
     name: "enhanced_sigma_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| match writes_volume(s, "enhanced_sigma_slice", t) {
+    link: Link::Filter(Filter::of_slices(|s| Some([reach(s, s.settings.slices.enhanced_sigma); 2]))),
+    shader: |_, t| match t.writes_volume() {
         true => "filter/enhanced_sigma.slice",
         false => "filter/enhanced_sigma.plane",
     },
     needed: |s| asked(s.settings.slices.enhanced_sigma),
-    reads: |s, t| vec![whole("source", slice_link(s, "enhanced_sigma_slice", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "enhanced_sigma_slice", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
@@ -36,18 +36,19 @@ pub const DISTANCE: Pass = Pass {
     name: "enhanced_sigma_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
         true => asked(s.distance.enhanced_sigma),
         false => Err("no distance map in this mode"),
     },
-    reads: |s, t| vec![whole("source", distance_link(s, "enhanced_sigma_distance", t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, "enhanced_sigma_distance", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: ray_extent,
     repeat: once,
     params: |s, t| params(s.distance.enhanced_sigma, LEAST_DISTANCE, t),
     constants: |s, _| constants(s, s.distance.enhanced_sigma),
-    // A pixel of f32 in mm lies 4e-6 from where f64 has it, a hundred times as far as one in 0..1.
+    // A pixel in mm differs by 4e-6 between f32 and f64, a hundred times as much as one in 0..1.
     tolerance: Tolerance { absolute: 2e-5, relative: 1e-6, outliers: 5e-3, why: WHY },
     reference: |s, t, reads, writes| {
         let enhanced = Enhanced::new(s, s.distance.enhanced_sigma, LEAST_DISTANCE, is_hit);
@@ -59,10 +60,11 @@ pub const PICTURE: Pass = Pass {
     name: "enhanced_sigma_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/enhanced_sigma.picture",
     needed: |s| asked(s.settings.post.enhanced_sigma),
-    reads: |s, t| vec![whole("source", picture_link(s, "enhanced_sigma_picture", t).0)],
-    writes: |s, t| vec![whole("target", picture_link(s, "enhanced_sigma_picture", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: picture_extent,
     repeat: once,
     params: |s, t| params(s.settings.post.enhanced_sigma, LEAST, t),
@@ -74,8 +76,39 @@ pub const PICTURE: Pass = Pass {
     },
 };
 
+/// How far the window grew at each pixel of a slice: what Tables 7-9 of the thesis count. Reads the same slice as the filter, which
+/// runs next.
+pub const GROWTH: Pass = Pass {
+    name: "growth_slice",
+    stage: Stage::Preprocess,
+    frequency: Frequency::Frame,
+    link: Link::Observer(Chain::Slices),
+    shader: |_, _| "filter/enhanced_sigma.growth",
+    needed: |s| match s.settings.slices.enhanced_sigma {
+        Some(e) if e.growth && e.sigma > 0.0 => Ok("the windows' growth is asked for"),
+        Some(e) if e.growth => Err("a sigma of 0 grows no window"),
+        _ => Err("not asked for"),
+    },
+    reads: reads_source,
+    writes: |_, _| vec![whole("target", Slot::Growth)],
+    extent: slice_extent,
+    repeat: once,
+    params: |s, t| params(s.settings.slices.enhanced_sigma, LEAST, t),
+    constants: |s, _| constants(s, s.settings.slices.enhanced_sigma),
+    tolerance: Tolerance {
+        absolute: 0.0,
+        relative: 0.0,
+        outliers: 2e-3,
+        why: "whole rings; a pixel at exactly 2 sigma may count or not, and with it a ring",
+    },
+    reference: |s, t, reads, writes| {
+        let enhanced = Enhanced::new(s, s.settings.slices.enhanced_sigma, LEAST, |_| true);
+        enhanced.filter(t, reads, writes, |found| vec![f64::from(found.rings)]);
+    },
+};
+
 /// A sigma of 0 keeps every pixel: no pass.
-pub(super) fn asked(enhanced: Option<EnhancedSigma>) -> Need {
+fn asked(enhanced: Option<EnhancedSigma>) -> Need {
     match enhanced {
         Some(e) if e.sigma > 0.0 => Ok("asked for"),
         Some(_) => Err("a sigma of 0 changes nothing"),
@@ -83,29 +116,34 @@ pub(super) fn asked(enhanced: Option<EnhancedSigma>) -> Need {
     }
 }
 
-pub(super) fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> Params {
+/// How far the largest window, or the estimate of its centre, looks, texels.
+fn reach(scene: &Scene, enhanced: Option<EnhancedSigma>) -> u32 {
+    enhanced.map_or(0, |e| (e.largest / 2).max(estimator::reach(scene.centre(e))))
+}
+
+fn params(enhanced: Option<EnhancedSigma>, least: f64, args: &DispatchArgs) -> Params {
     let e = enhanced.unwrap_or_default();
     let params = Params::default().f32("range", range(e.sigma)).f32("few", f64::from(few(e.window)));
     estimator::params(params, e.edge, least).i32("slice", args.slice)
 }
 
-pub(super) fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(&'static str, i32)> {
+fn constants(scene: &Scene, enhanced: Option<EnhancedSigma>) -> Vec<(&'static str, i32)> {
     let e = enhanced.unwrap_or_default();
     vec![
         ("RADIUS", (e.window / 2) as i32),
-        ("LARGEST", (e.largest / 2) as i32),
+        ("MAX_RADIUS", (e.largest / 2) as i32),
         ("ESTIMATOR", estimator::constant(scene.centre(e))),
         ("MULTIPLICATIVE", i32::from(e.noise == Noise::Multiplicative)),
     ]
 }
 
-/// Rec. 709; a slice or a distance is its own.
+/// Brightness by Rec. 709; a slice or a distance has one channel.
 fn brightness(texel: &[f64]) -> f64 {
     if texel.len() < 3 { texel[0] } else { 0.2126 * texel[0] + 0.7152 * texel[1] + 0.0722 * texel[2] }
 }
 
 /// The filter's reference.
-pub(super) struct Enhanced {
+struct Enhanced {
     settings: EnhancedSigma,
     centre: crate::scene::Estimator,
     least: f64,
@@ -113,19 +151,19 @@ pub(super) struct Enhanced {
 }
 
 /// What the filter finds at a pixel.
-pub(super) struct Found {
-    pub mean: Vec<f64>,
+struct Found {
+    mean: Vec<f64>,
     /// How many rings the window grew.
-    pub rings: u32,
+    rings: u32,
 }
 
 impl Enhanced {
-    pub fn new(scene: &Scene, settings: Option<EnhancedSigma>, least: f64, valid: fn(f64) -> bool) -> Enhanced {
+    fn new(scene: &Scene, settings: Option<EnhancedSigma>, least: f64, valid: fn(f64) -> bool) -> Enhanced {
         let settings = settings.unwrap_or_default();
         Enhanced { settings, centre: scene.centre(settings), least, valid }
     }
 
-    pub fn filter(&self, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
+    fn filter(&self, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays, value: fn(Found) -> Vec<f64>) {
         let source = reads.get("source");
         let target = writes.get_mut("target");
         let z = if target.size[2] > 1 { args.slice as usize } else { 0 };
@@ -181,4 +219,30 @@ impl Enhanced {
         let mean = |c: usize| alike.iter().map(|v| v[c]).sum::<f64>() / alike.len() as f64;
         Found { mean: (0..source.channels).map(mean).collect(), rings: (radius - start) as u32 }
     }
+}
+
+/// Shares of the pixels, within the sector, whose window's edge grew by +0, +2, +4 ... up to the largest (thesis Tables 7-9),
+/// from the map that [`GROWTH`] writes. They sum to 1.
+pub fn growth_shares(scene: &Scene, growth: &Texels) -> Vec<f64> {
+    let enhanced = scene.settings.slices.enhanced_sigma.unwrap_or_default();
+    let rings = (enhanced.largest / 2).saturating_sub(enhanced.window / 2) as usize;
+    let mut counts = vec![0u64; rings + 1];
+    for y in 0..growth.size[1] {
+        for x in 0..growth.size[0] {
+            if is_insonified(scene, x, y) {
+                counts[(growth.one(x, y, 0).max(0.0) as usize).min(rings)] += 1;
+            }
+        }
+    }
+    let all = counts.iter().sum::<u64>().max(1) as f64;
+    counts.into_iter().map(|n| n as f64 / all).collect()
+}
+
+/// True if the slice's pixel is inside the sector; pixels beyond it only repeat the values at its rim.
+fn is_insonified(scene: &Scene, x: usize, y: usize) -> bool {
+    let Some(probe) = scene.probe() else { return true };
+    let (lateral, depth) = scene.grid.place(x as f64, y as f64);
+    let (sample, line) = probe.plane_indices(lateral, depth);
+    let within = |at: f64, count: usize| at >= 0.0 && at <= (count - 1) as f64;
+    within(sample, probe.samples) && within(line, probe.lines.len())
 }

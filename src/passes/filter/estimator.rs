@@ -1,20 +1,18 @@
-//! Local estimators of a pixel from those around it, which thesis 5.4 compares: as a filter of slices of their own, and as the
-//! centre of the enhanced sigma filter. Beyond the border the nearest pixel stands in; of distances, misses count nowhere.
+//! Local estimators of a pixel from its neighbours, which thesis 5.4 compares: as a filter of slices, and as the centre of the
+//! enhanced sigma filter. Beyond the border the nearest pixel repeats; of distances, misses are ignored.
 
-use crate::passes::chain::{slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Estimator;
 
-const NAME: &str = "estimator_slice";
-
 pub const SLICE: Pass = Pass {
-    name: NAME,
+    name: "estimator_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| if writes_volume(s, NAME, t) { "filter/estimator.slice" } else { "filter/estimator.plane" },
+    link: Link::Filter(Filter::of_slices(|s| Some([s.settings.slices.estimator.map_or(0, reach); 2]))),
+    shader: |_, t| if t.writes_volume() { "filter/estimator.slice" } else { "filter/estimator.plane" },
     needed: |s| s.settings.slices.estimator.map_or(Err("not asked for"), |_| Ok("asked for")),
-    reads: |s, t| vec![whole("source", slice_link(s, NAME, t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| params(Params::default(), s.settings.slices.estimator_edge, LEAST).i32("slice", t.slice),
@@ -40,12 +38,12 @@ pub const SLICE: Pass = Pass {
     },
 };
 
-/// Difference below which a gradient is taken for none: half a level of 255, as Wang, Vagnucci and Li do on whole levels.
+/// Smallest difference that counts as a gradient: half a level of 255, as Wang, Vagnucci and Li do on integer levels.
 pub(super) const LEAST: f64 = 0.5 / 255.0;
-/// The same on distances, mm: less than a detector can tell.
+/// The same on distances, mm: below the detector's resolution.
 pub(super) const LEAST_DISTANCE: f64 = 0.01;
 
-/// The shader's word for it.
+/// The value of the shader's constant ESTIMATOR.
 pub(super) fn constant(estimator: Estimator) -> i32 {
     match estimator {
         Estimator::Median => 0,
@@ -53,6 +51,11 @@ pub(super) fn constant(estimator: Estimator) -> i32 {
         Estimator::GradientInverse => 2,
         Estimator::NagaoMatsuyama => 3,
     }
+}
+
+/// How far it looks, texels.
+pub(super) fn reach(estimator: Estimator) -> u32 {
+    if estimator == Estimator::NagaoMatsuyama { 2 } else { 1 }
 }
 
 pub(super) fn params(params: Params, edge: f64, least: f64) -> Params {
@@ -118,7 +121,7 @@ pub(super) fn quotient(difference: f64, edge: f64) -> f64 {
     if edge > 0.0 { 1.0 / (1.0 + (difference / edge).powi(2)) } else { 0.0 }
 }
 
-/// Nagao and Matsuyama's nine: the square of 3x3, and a mask towards an edge and one towards a corner, each turned four times.
+/// Nagao and Matsuyama's nine: the square of 3x3, and a mask towards an edge and one towards a corner, each in four rotations.
 fn masks() -> Vec<Vec<(i64, i64)>> {
     let square = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).collect();
     let mut edge = vec![(0, 0), (-1, -1), (0, -1), (1, -1), (-1, -2), (0, -2), (1, -2)];

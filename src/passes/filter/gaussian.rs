@@ -1,8 +1,8 @@
 //! 3D Gaussian in texture space (lateral, depth, elevation), one axis a pass. The two in-plane axes are filtered on each
 //! slice as it arrives; the third when its neighbours are there, for the slices that a new frame is near.
 
-use crate::passes::chain::{slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
+use crate::scene::Scene;
 
 const WHY: &str = "at most 63 weighted values in f32, exp to 3 ulp; R16F stores 1 to 4.9e-4";
 const TOLERANCE: Tolerance = Tolerance { absolute: 6e-4, relative: 0.0, outliers: 0.0, why: WHY };
@@ -11,12 +11,13 @@ pub const LATERAL: Pass = Pass {
     name: "gaussian_lateral",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| {
-        if writes_volume(s, "gaussian_lateral", t) { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
+    link: Link::Filter(Filter::of_slices(|s| Some([s.smoothing_radius()[0], 0]))),
+    shader: |_, t| {
+        if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
     needed: |s| asked(s, 0),
-    reads: |s, t| vec![whole("source", slice_link(s, "gaussian_lateral", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "gaussian_lateral", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 0),
     repeat: once,
     params: |s, t| params(s, 0, t),
@@ -27,12 +28,13 @@ pub const LATERAL: Pass = Pass {
 
 pub const DEPTH: Pass = Pass {
     name: "gaussian_depth",
-    shader: |s, t| {
-        if writes_volume(s, "gaussian_depth", t) { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
+    link: Link::Filter(Filter::of_slices(|s| Some([0, s.smoothing_radius()[1]]))),
+    shader: |_, t| {
+        if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
     needed: |s| asked(s, 1),
-    reads: |s, t| vec![whole("source", slice_link(s, "gaussian_depth", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "gaussian_depth", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     params: |s, t| params(s, 1, t),
     constants: |s, _| constants(s, 1),
@@ -44,6 +46,7 @@ pub const ELEVATION: Pass = Pass {
     name: "gaussian_elevation",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
+    link: Link::AfterSlices,
     shader: |_, _| "filter/gaussian.volume",
     needed: |s| asked(s, 2),
     reads: |s, _| {

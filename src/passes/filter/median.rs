@@ -1,16 +1,16 @@
 //! Median of a square window, on slices (3x3) and on distance maps.
 
-use crate::passes::chain::{distance_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 
 pub const SLICE: Pass = Pass {
     name: "median_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| if writes_volume(s, "median_slice", t) { "filter/median.slice" } else { "filter/median.plane" },
+    link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
+    shader: |_, t| if t.writes_volume() { "filter/median.slice" } else { "filter/median.plane" },
     needed: |s| if s.settings.slices.median { Ok("asked for") } else { Err("not asked for") },
-    reads: |s, t| vec![whole("source", slice_link(s, "median_slice", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "median_slice", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),
@@ -28,14 +28,15 @@ pub const DISTANCE: Pass = Pass {
     name: "median_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/median.distance",
     needed: |s| match (s.has_distance(), s.distance.median) {
         (false, _) => Err("no distance map in this mode"),
         (true, 0) => Err("not asked for"),
         _ => Ok("asked for"),
     },
-    reads: |s, t| vec![whole("source", distance_link(s, "median_distance", t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, "median_distance", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: once,
     params: |_, t| Params::default().i32("slice", t.slice),

@@ -2,8 +2,7 @@
 //! pixel moves towards its four neighbours, the less the more they differ. Nothing flows across the border.
 
 use super::estimator::{quotient, storable_edge};
-use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::{Conductance, PeronaMalik, Scheme};
 
 const WHY: &str = "five values in f32, exp to 3 ulp of an exponent of at most 87; then what the target's format stores";
@@ -12,13 +11,14 @@ pub const SLICE: Pass = Pass {
     name: "perona_malik_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| match writes_volume(s, "perona_malik_slice", t) {
+    link: Link::Filter(Filter::of_slices(|_| Some([1; 2]))),
+    shader: |_, t| match t.writes_volume() {
         true => "filter/perona_malik.slice",
         false => "filter/perona_malik.plane",
     },
     needed: |s| asked(s.settings.slices.perona_malik, Scheme::Explicit),
-    reads: |s, t| vec![whole("source", slice_link(s, "perona_malik_slice", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "perona_malik_slice", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: slice_extent,
     repeat: |s| repeat(s.settings.slices.perona_malik),
     params: |s, t| params(s.settings.slices.perona_malik, t),
@@ -31,13 +31,14 @@ pub const DISTANCE: Pass = Pass {
     name: "perona_malik_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/perona_malik.distance",
     needed: |s| match s.has_distance() {
         true => asked(s.distance.perona_malik, Scheme::Explicit),
         false => Err("no distance map in this mode"),
     },
-    reads: |s, t| vec![whole("source", distance_link(s, "perona_malik_distance", t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, "perona_malik_distance", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: ray_extent,
     repeat: |s| repeat(s.distance.perona_malik),
     params: |s, t| params(s.distance.perona_malik, t),
@@ -50,10 +51,11 @@ pub const PICTURE: Pass = Pass {
     name: "perona_malik_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/perona_malik.picture",
     needed: |s| asked(s.settings.post.perona_malik, Scheme::Explicit),
-    reads: |s, t| vec![whole("source", picture_link(s, "perona_malik_picture", t).0)],
-    writes: |s, t| vec![whole("target", picture_link(s, "perona_malik_picture", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: picture_extent,
     repeat: |s| repeat(s.settings.post.perona_malik),
     params: |s, t| params(s.settings.post.perona_malik, t),

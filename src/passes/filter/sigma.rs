@@ -2,8 +2,7 @@
 //! lie within two sigma of the centre (additive noise), or two sigma times the centre (multiplicative); where no more than K
 //! do, nor all that there are, the mean of the four immediate neighbours.
 
-use crate::passes::chain::{distance_link, picture_link, slice_link, writes_volume};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene;
 
 const WHY: &str = "a sum of at most 63^2 differences in f32; a pixel at exactly 2 sigma may fall on either side; the slice's \
@@ -13,10 +12,11 @@ pub const SLICE: Pass = Pass {
     name: "sigma_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| if writes_volume(s, "sigma_slice", t) { "filter/sigma.slice" } else { "filter/sigma.plane" },
+    link: Link::Filter(Filter::of_slices(|s| Some([radius(s.settings.slices.sigma); 2]))),
+    shader: |_, t| if t.writes_volume() { "filter/sigma.slice" } else { "filter/sigma.plane" },
     needed: |s| asked(s.settings.slices.sigma),
-    reads: |s, t| vec![whole("source", slice_link(s, "sigma_slice", t).0)],
-    writes: |s, t| vec![slice("target", slice_link(s, "sigma_slice", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
     repeat: once,
     params: |s, t| params(s.settings.slices.sigma, t),
@@ -29,10 +29,11 @@ pub const DISTANCE: Pass = Pass {
     name: "sigma_distance",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/sigma.distance",
     needed: |s| if s.has_distance() { asked(s.distance.sigma) } else { Err("no distance map in this mode") },
-    reads: |s, t| vec![whole("source", distance_link(s, "sigma_distance", t).0)],
-    writes: |s, t| vec![whole("target", distance_link(s, "sigma_distance", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
     repeat: once,
     params: |s, t| params(s.distance.sigma, t),
@@ -45,10 +46,11 @@ pub const PICTURE: Pass = Pass {
     name: "sigma_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/sigma.picture",
     needed: |s| asked(s.settings.post.sigma),
-    reads: |s, t| vec![whole("source", picture_link(s, "sigma_picture", t).0)],
-    writes: |s, t| vec![whole("target", picture_link(s, "sigma_picture", t).1)],
+    reads: reads_source,
+    writes: writes_target,
     extent: |s, t| in_runs(picture_extent(s, t), 1),
     repeat: once,
     params: |s, t| params(s.settings.post.sigma, t),
@@ -82,11 +84,15 @@ fn params(sigma: Option<scene::Sigma>, args: &DispatchArgs) -> Params {
     Params::default().f32("range", range(sigma.sigma)).f32("few", f64::from(few(sigma.window))).i32("slice", args.slice)
 }
 
+/// Half the window's edge, texels.
+fn radius(sigma: Option<scene::Sigma>) -> u32 {
+    sigma.unwrap_or_default().window / 2
+}
+
 fn constants(sigma: Option<scene::Sigma>) -> Vec<(&'static str, i32)> {
-    let sigma = sigma.unwrap_or_default();
     vec![
-        ("RADIUS", (sigma.window / 2) as i32),
-        ("MULTIPLICATIVE", i32::from(sigma.noise == scene::Noise::Multiplicative)),
+        ("RADIUS", radius(sigma) as i32),
+        ("MULTIPLICATIVE", i32::from(sigma.unwrap_or_default().noise == scene::Noise::Multiplicative)),
     ]
 }
 
@@ -97,8 +103,8 @@ fn reference(
     writes: &mut Arrays,
     valid: fn(f64) -> bool,
 ) {
+    let radius = i64::from(radius(sigma));
     let sigma = sigma.unwrap_or_default();
-    let radius = i64::from(sigma.window / 2);
     let source = reads.get("source");
     let target = writes.get_mut("target");
     let z = if target.size[2] > 1 { args.slice as usize } else { 0 };

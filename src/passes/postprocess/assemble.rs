@@ -1,18 +1,19 @@
-//! From what was rendered to the picture: the mean of several rays a pixel, or what lies between the
-//! rays where one makes four pixels, and its place beside the planes of a 4-up picture.
+//! The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
+//! four pixels; in a 4-up picture, the rendering next to the planes.
 
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Layout;
 
 pub const PASS: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| match s.settings.layout {
         Layout::Single => "postprocess/assemble.alone",
         Layout::Four => "postprocess/assemble.four",
     },
-    needed: |s| match (chain::rendered(s), s.settings.layout) {
+    needed: |s| match (rendered(s), s.settings.layout) {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
         (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),
@@ -65,8 +66,8 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// Linear between the rays about a pixel; ray i goes through the common corner of pixels 2 i and 2 i + 1. Beyond the outermost
-/// ray that one stands.
+/// Linear interpolation between the rays around a pixel. Ray i goes through the common corner of pixels 2 i and 2 i + 1. Beyond
+/// the outermost ray its value repeats.
 fn between(rendered: &Texels, x: usize, y: usize) -> [f64; 4] {
     let along = |pixel: usize, rays: usize| {
         let at = ((pixel as f64 - 0.5) / 2.0).clamp(0.0, (rays - 1) as f64);

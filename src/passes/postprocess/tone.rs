@@ -1,26 +1,25 @@
 //! Contrast, brightness, gamma and colour map; cross-lines and frames over planes; the picture in 8 bits.
 
-use crate::passes::chain::picture_end;
-use crate::passes::raycast::planes::{place, tile_at};
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
 use crate::scene::{ColourMap, Scene, transfer};
 use glam::DVec3;
 
-/// How much of what lies under a cross-line it covers: anatomy stays visible.
-pub const LINE_STRENGTH: f64 = 0.7;
+/// Opacity of a cross-line: the anatomy below it stays visible.
+pub(in crate::passes) const LINE_STRENGTH: f64 = 0.7;
 
 pub const PASS: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Pictures),
     shader: |s, _| if s.draws_lines() { "postprocess/tone.lines" } else { "postprocess/tone.plain" },
     needed: |s| match s.tones_planes() {
         true => Err("planes are cut straight to 8 bits"),
         false => Ok("every picture ends in 8 bits"),
     },
-    reads: |s, _| {
-        let mut reads = vec![whole("picture", picture_end(s))];
+    reads: |s, t| {
+        let mut reads = vec![whole("picture", t.source())];
         reads.extend(s.draws_lines().then_some(whole("tiles", Slot::Tiles)));
         reads
     },
@@ -54,7 +53,7 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// Its numbers, behind those that are there.
+/// Adds the numbers of toning to those of a pass.
 pub fn params(scene: &Scene, params: Params) -> Params {
     let post = &scene.settings.post;
     let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
@@ -69,7 +68,7 @@ pub fn params(scene: &Scene, params: Params) -> Params {
         .vec3("map_4", e)
 }
 
-/// Its structure; with `lines`, over planes.
+/// The constants of toning; with `lines`, over planes.
 pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
     let mut constants = vec![("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32)];
@@ -80,10 +79,10 @@ pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
     constants
 }
 
-/// What the screen shows of a colour, or where there is none, of nothing: under the lines of the sheet, if it has any.
+/// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
 pub fn shown(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
     let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
-    if let Some((sheet, tile)) = sheet.and_then(|s| tile_at(s, x, y).map(|tile| (s, tile))) {
+    if let Some((sheet, tile)) = sheet.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {
         colour = with_lines(sheet, tile, colour, x, y);
     }
     [colour[0], colour[1], colour[2], 1.0]
@@ -107,7 +106,7 @@ pub fn toned(scene: &Scene, colour: [f64; 3]) -> [f64; 3] {
 
 /// A pixel's colour under the cross-lines and the frame of its tile.
 fn with_lines(sheet: &Sheet, tile: &Tile, mut colour: [f64; 3], x: usize, y: usize) -> [f64; 3] {
-    let place = place(sheet, tile, x, y);
+    let place = sheet.place(tile, x, y);
     for (other, line) in &tile.crossed_by {
         let cover = LINE_STRENGTH * (1.0 - distance(&tile.plane, other, place) / sheet.pixel).max(0.0);
         colour = std::array::from_fn(|c| colour[c] + (line[c] - colour[c]) * cover);

@@ -2,13 +2,14 @@
 //! decimation along the lines, log compression. Sample j of the result is centred on sample j M of the frame.
 
 use super::scan_convert::normalisation;
-use crate::passes::*;
-use crate::scene::{Conditioning, gaussian_radius};
+use crate::passes::pass::*;
+use crate::scene::{Conditioning, Scene, gaussian_radius};
 
 pub const PASS: Pass = Pass {
     name: "condition",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
+    link: Link::None,
     shader: |s, _| {
         if s.settings.conditioning.tgc.is_empty() {
             "preprocess/condition.plain"

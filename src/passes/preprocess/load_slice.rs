@@ -1,25 +1,25 @@
-//! A slice of a Cartesian volume: scaled to 0..1 and put into its place.
+//! A slice of a Cartesian volume, scaled to 0..1.
 
 use super::scan_convert::{load_params, normalisation};
-use crate::passes::chain::{copied, slice_link, writes_volume};
-use crate::passes::*;
-
-const NAME: &str = "load_slice";
+use crate::passes::pass::*;
+use crate::passes::slots::Format;
+use crate::scene::Scene;
+use crate::source::StoredType;
 
 pub const PASS: Pass = Pass {
-    name: NAME,
+    name: "load_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| {
-        if writes_volume(s, NAME, t) { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
+    link: Link::Filter(Filter { copies: stores_what_it_reads, ..Filter::of(Chain::Slices) }),
+    shader: |_, t| {
+        if t.writes_volume() { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
     needed: |s| match s.probe() {
-        None if copied(s).is_some() => Err("a frame is a slice as the volume stores it: it is copied there"),
         None => Ok("the volume is Cartesian already: its slices are only scaled"),
         Some(_) => Err("frames are polar"),
     },
     reads: |_, _| vec![layer("frames", Slot::Frames)],
-    writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: load_params,
@@ -43,3 +43,13 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// True if the volume stores the same values as frames hold. Floats may be beyond 0..1, so they are never copied.
+fn stores_what_it_reads(scene: &Scene) -> bool {
+    let format = Slot::Volume.format(scene);
+    match scene.input.stored {
+        StoredType::U8 => format == Format::R8 && scene.input.range == [0.0, 255.0],
+        StoredType::U16 => format == Format::R16 && scene.input.range == [0.0, 65535.0],
+        StoredType::F32 => false,
+    }
+}

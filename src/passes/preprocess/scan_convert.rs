@@ -1,18 +1,17 @@
 //! Scan conversion of one polar frame into one slice, through the look-up table (thesis 4.3, Fig. 31).
 
-use crate::passes::chain::{slice_link, writes_volume};
 use crate::passes::lookup_tables::scan_index;
-use crate::passes::*;
+use crate::passes::pass::*;
+use crate::scene::Scene;
 use crate::source::StoredType;
 
-const NAME: &str = "scan_convert";
-
 pub const PASS: Pass = Pass {
-    name: NAME,
+    name: "scan_convert",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    shader: |s, t| {
-        if writes_volume(s, NAME, t) { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" }
+    link: Link::Filter(Filter::of(Chain::Slices)),
+    shader: |_, t| {
+        if t.writes_volume() { "preprocess/scan_convert.slice" } else { "preprocess/scan_convert.plane" }
     },
     needed: |s| match s.probe() {
         Some(_) => Ok("frames are polar"),
@@ -22,7 +21,7 @@ pub const PASS: Pass = Pass {
         let frames = if s.conditions() { whole("frames", Slot::Conditioned) } else { layer("frames", Slot::Frames) };
         vec![frames, whole("scan_lut", Slot::ScanLut)]
     },
-    writes: |s, t| vec![slice("target", slice_link(s, NAME, t).1)],
+    writes: writes_target,
     extent: slice_extent,
     repeat: once,
     params: |s, t| {
@@ -48,7 +47,7 @@ pub const PASS: Pass = Pass {
                 let (x, y) = scene.grid.place(f64::from(column), f64::from(row));
                 let Some((sample, line)) = scan_index(scene, probe, x, y) else {
                     // The volume's own texels there are never written; filters must not see what an earlier frame left.
-                    if !writes_volume(scene, NAME, args) {
+                    if !args.writes_volume() {
                         target.set([column as usize, row as usize, z], &[0.0]);
                     }
                     continue;

@@ -1,13 +1,13 @@
 //! The volume as a solid block: the sample where each ray enters it, the sector's own border being a face too.
 
 use super::ray;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::probe::{Array, Motion, Probe};
 use crate::scene::cube::HalfSpace;
 use crate::scene::{Mode, Scene};
 use glam::DVec3;
 
-/// Colour and strength of the lines where faces meet: told from tissue, which is grey.
+/// Colour and strength of the lines where faces meet: a colour, because tissue is grey.
 const EDGE: ([f64; 3], f64) = ([0.55, 0.75, 0.95], 0.7);
 /// Pixels from an edge at which its line has faded.
 const EDGE_WIDTH: f64 = 1.5;
@@ -16,6 +16,7 @@ pub const PASS: Pass = Pass {
     name: "raycast_cube",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/cube"),
     needed: |s| match s.settings.mode {
         Mode::Cube => Ok("the volume is a solid block"),
@@ -26,7 +27,7 @@ pub const PASS: Pass = Pass {
         reads.push(whole("block", Slot::Block));
         reads
     },
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
@@ -125,16 +126,16 @@ fn shown(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, y: f64) ->
     [r, g, b, 1.0]
 }
 
-/// A face of the block or a border of the sector as seen from a place: the way out, and how far it is, mm.
+/// A face of the block or a border of the sector relative to a point: its outward normal, and its distance, mm.
 struct Side {
     normal: DVec3,
     room: f64,
 }
 
-/// How much of a pixel the line where its face meets another covers, 1 up to half a pixel from it and 0 from one and a half: the distance to it in pixels by how fast the room
-/// shrinks from pixel to pixel, both seen on the face.
+/// The share of a pixel that is covered by the line where its face meets another: 1 up to half a pixel from the line, 0 from one
+/// and a half. The distance in pixels is the distance to the other face divided by its change per pixel, both on the face.
 fn edge(scene: &Scene, others: impl Iterator<Item = Side>, normal: DVec3, place: DVec3, x: f64, y: f64) -> f64 {
-    // Where the rays of places next to the pixel's centre meet the face; one that is seen edge-on stays a thin one.
+    // Where the rays next to the pixel's centre meet the face. A face that is viewed edge-on keeps a finite slope.
     let small = 1e-4;
     let on_face = |x: f64, y: f64| {
         let (origin, direction) = scene.rays.at(x, y);
@@ -148,8 +149,8 @@ fn edge(scene: &Scene, others: impl Iterator<Item = Side>, normal: DVec3, place:
     cover.fold(0.0, f64::max).clamp(0.0, 1.0)
 }
 
-/// First and last range, line and slice of the sector as seen from a place. (The motor's way over the lines of a frame turns
-/// the slices by less than a degree and is left out of their normals.)
+/// First and last range, line and slice of the sector relative to a point. (The motor's motion during a frame rotates the slices
+/// by less than a degree and is ignored in their normals.)
 fn borders(probe: &Probe, place: DVec3) -> Vec<Side> {
     let (x, y, position) = probe.inverse_sweep_map(place);
     let (depth, sweep, mm) = match probe.motion {

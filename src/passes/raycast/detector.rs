@@ -1,19 +1,17 @@
 //! The surface detector in f64, along the samples of one ray. At sample i, with steps of s, the difference is
 //! D = mean(v[i], v[i-s], v[i-2s], v[i-3s]) - mean(v[i-4s] ... v[i-7s]): (2/n) (newer half - older half) for a ring of n = 8
-//! (thesis 4-3). What makes D an edge is the [`Detector`]'s to say.
+//! (thesis 4-3). The [`Detector`] decides when D is an edge.
 //!
 //! The plain threshold is the thesis'. The adaptive one is a detector of constant false alarm rate (Rohling 1983): D must
 //! exceed the threshold and noise (1 + n/m) s, where s is the standard deviation of the m samples before the ring's newer
-//! half, with a memory of 16: a stricter bar while little is known, and noise times the scatter within the newer half while
-//! nothing is. What stays below that bar may be a weak wall: when the
-//! ray has nothing better, its tallest such edge is looked at again, and is the surface if the mean of the n samples from
-//! its crossing on exceeds that of what lay before it by noise s / 2. Noise of standard deviation s leaves that mean
-//! uncertain by 0.35 s and D by 0.71 s: what does not stand out by its height may by how long it lasts.
+//! half, over 16 samples: the bar is higher while few samples are known, and noise times the deviation of the newer half while
+//! none is. An edge below that bar may be a weak wall: if the ray has no other surface, its largest such edge is examined
+//! again, and is the surface if the mean of the n samples from its crossing on exceeds the mean in front of it by noise s / 2. Noise of standard deviation s leaves that mean
+//! uncertain by 0.35 s and D by 0.71 s: an edge that its height does not distinguish from noise may be distinguished by its duration.
 //!
-//! The lasting detector also passes over an edge when less than half of it is left half a ring behind it: what floats in the
-//! fluid, and shells thinner than that in front of something else. A shell that is all there is on the ray is still found.
+//! The lasting detector also rejects an edge when less than half of it remains half a ring behind it: specks in the fluid, and
+//! shells thinner than that in front of something else. A shell that is the only surface on the ray is still found.
 
-use super::noise::Noise;
 use crate::probe::Geometry;
 use crate::scene::{Detector, Place, RING, Scene, Sign, Surface};
 
@@ -41,13 +39,13 @@ pub(super) fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Opti
     }
 }
 
-/// An edge that was passed over.
+/// An edge that was rejected.
 struct Weak {
     difference: f64,
     at: usize,
-    /// Where the ring of that time began, at the earliest.
+    /// The earliest sample that its ring may use.
     since: usize,
-    /// What the mean echo behind it must exceed, by polarity; none for what did stand out but did not last.
+    /// The level that the mean echo behind it must exceed, by polarity; none for an edge above the bar that did not last.
     level: Option<f64>,
 }
 
@@ -73,10 +71,10 @@ enum End {
     Ray,
 }
 
-/// What became of an edge.
+/// The result of following an edge.
 enum Edge {
     Surface(f64, f64),
-    /// No surface: its echo was gone again, as a speck's is.
+    /// No surface: its echo did not last, like that of a speck.
     Speck {
         best: f64,
         best_at: usize,
@@ -89,7 +87,7 @@ struct Ray<'a> {
     polarity: f64,
     samples: &'a [Option<f64>],
     first: i64,
-    /// What lies before the region is not learnt from.
+    /// True if samples in front of the region do not enter the noise.
     bordered: bool,
 }
 
@@ -99,7 +97,7 @@ impl Ray<'_> {
         half.sum::<Option<f64>>().map(|sum| sum / (N / 2) as f64)
     }
 
-    /// The difference at i, once a full ring since `since` is behind it and none of it lies outside.
+    /// The difference at i, if a full ring since `since` precedes it and none of the ring is outside.
     fn difference(&self, i: usize, stride: usize, since: usize) -> Option<f64> {
         (i < self.samples.len() && i >= since + (N - 1) * stride)
             .then(|| Some(self.polarity * (self.mean(i, stride, 0)? - self.mean(i, stride, N / 2)?)))
@@ -124,7 +122,7 @@ impl Ray<'_> {
         std::array::from_fn(|n| self.samples[i - (n + from) * stride].unwrap_or(0.0))
     }
 
-    /// Mean and deviation of what lies before the newer half, the deviation from the newer half while nothing was learnt.
+    /// Mean and deviation of the samples in front of the newer half; without any, the deviation is that of the newer half.
     fn before(&self, noise: &Noise, i: usize, stride: usize) -> (f64, f64) {
         let noise = match noise.learnt > 0.0 {
             true => *noise,
@@ -138,7 +136,7 @@ impl Ray<'_> {
         (noise.mean, noise.variance.sqrt())
     }
 
-    /// What the difference at i, where the ring is full, must exceed.
+    /// The bar that the difference at i must exceed, where the ring is full.
     fn bar(&self, threshold: f64, noise: &Noise, i: usize, stride: usize) -> f64 {
         if !self.adapts() {
             return threshold;
@@ -163,7 +161,7 @@ impl Ray<'_> {
         }
     }
 
-    /// From the ray's begin to the surface wanted, or to its end.
+    /// From the ray's start to the requested surface, or to its end.
     fn search(&self, state: &mut State) -> End {
         let rough = self.settings.rough as usize;
         let (mut i, mut since) = (0, 0);
@@ -184,14 +182,14 @@ impl Ray<'_> {
                     i += rough;
                     continue;
                 }
-                // Where the ring was silent a step ago, the edge lies in its newer half, and the fine ring fits before that.
+                // If the ring did not fire one step earlier, the edge is in its newer half, and the fine ring fits in front of it.
                 let silent = i >= since + N * rough;
                 from = i.saturating_sub(if silent { N / 2 * rough + N } else { N * rough }).max(since);
                 limit = i + N;
             }
             // The fine search. A gap sends it back to the rough one behind the gap.
             let mut at = from;
-            // Where an edge need not have risen just now.
+            // The sample at which an edge need not have risen.
             let mut fresh = from + N - 1;
             loop {
                 if at >= self.samples.len() {
@@ -245,7 +243,7 @@ impl Ray<'_> {
         End::Ray
     }
 
-    /// The tallest edge that was passed over, by the threshold alone; it must last.
+    /// Examines the largest rejected edge again, by the threshold alone; it must last.
     fn second_look(&self, weak: &Weak) -> Option<(f64, f64)> {
         let from = weak.at.saturating_sub(N * self.settings.rough as usize).max(weak.since);
         // Before the limit, and at it: there, too, a crossing comes first.
@@ -258,7 +256,7 @@ impl Ray<'_> {
         weak.level.is_none_or(|level| self.polarity * behind > level).then_some((place, echo))
     }
 
-    /// Above the bar here and not just before: an edge that was there before the region began is none of its surfaces.
+    /// Above the bar here and not one sample earlier: an edge in front of the region is none of its surfaces.
     fn crosses(&self, i: usize, since: usize, fresh: usize, bar: impl Fn(usize) -> f64) -> bool {
         self.difference(i, 1, since).is_some_and(|d| {
             let bar = bar(i);
@@ -294,7 +292,7 @@ impl Ray<'_> {
         if !(whole || wanted) {
             return end();
         }
-        // A ray that ends before the edge has been followed leaves it as it is.
+        // A ray that ends before the edge has been followed keeps it.
         if lasting && whole {
             let left = self.polarity * (echo(best_at + N / 2) - echo(best_at)) + best;
             if left <= best / 2.0 {
@@ -311,5 +309,55 @@ impl Ray<'_> {
         // Two equal differences put it in the middle between them.
         let shift = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
         Edge::Surface(best_at as f64 + shift - (f64::from(RING) - 1.0) / 2.0, echo(best_at))
+    }
+}
+
+/// Samples in the noise estimate: two rings. More would include samples too far in front of the edge, above all a slope of the gain.
+const MEMORY: f64 = 16.0;
+
+/// Mean and variance of the `learnt` samples that have left the ring's newer half.
+#[derive(Clone, Copy, Debug, Default)]
+struct Noise {
+    learnt: f64,
+    mean: f64,
+    variance: f64,
+}
+
+impl Noise {
+    /// Takes the ring's older half, newest first: the first time all of it, then only its newest sample.
+    fn learn(&mut self, older: [f64; N / 2]) {
+        if self.learnt == 0.0 {
+            let count = older.len() as f64;
+            self.learnt = count;
+            self.mean = older.iter().sum::<f64>() / count;
+            self.variance = older.iter().map(|v| (v - self.mean).powi(2)).sum::<f64>() / (count - 1.0);
+            return;
+        }
+        self.learnt += 1.0;
+        // The recursions of the mean and the unbiased variance of n samples (Welford), held at n = MEMORY.
+        let n = self.learnt.min(MEMORY);
+        let off = older[0] - self.mean;
+        self.mean += off / n;
+        self.variance = self.variance * (n - 2.0) / (n - 1.0) + off * off / n;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Up to MEMORY samples these are the mean and the unbiased variance of all; then the oldest lose their weight.
+    #[test]
+    fn the_noise_is_that_of_the_samples_and_forgets() {
+        let samples: Vec<f64> = (0..16).map(|i| 0.4 + 0.3 * (f64::from(i) * 1.7).sin()).collect();
+        let mut noise = Noise::default();
+        // Newest first.
+        noise.learn([samples[3], samples[2], samples[1], samples[0]]);
+        samples[4..].iter().for_each(|newest| noise.learn([*newest, 9.0, 9.0, 9.0]));
+        let mean = samples.iter().sum::<f64>() / 16.0;
+        let variance = samples.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 15.0;
+        assert!((noise.mean - mean).abs() < 1e-12 && (noise.variance - variance).abs() < 1e-12, "{noise:?}");
+        (0..200).for_each(|_| noise.learn([0.9; 4]));
+        assert!((noise.mean - 0.9).abs() < 1e-4 && noise.variance < 1e-4, "{noise:?}");
     }
 }

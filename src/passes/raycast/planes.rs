@@ -1,10 +1,10 @@
-//! MPR: planes and slabs through the volume, and no ray: each pixel's place lies in the plane of its tile. Where stage 4 only tones
-//! them, that is done at once: a third of the time of a picture of planes went into storing it in floats and loading it again.
+//! MPR: planes and slabs through the volume. No ray is cast: each pixel shows a point of its tile's plane. Where stage 4 only tones
+//! them, this pass tones: storing the picture in floats and loading it again took a third of the time.
 
 use super::ray;
+use crate::passes::pass::*;
 use crate::passes::postprocess::tone;
-use crate::passes::*;
-use crate::scene::planes::{Sheet, Tile};
+use crate::scene::planes::Sheet;
 use crate::scene::{Scene, Slab};
 use glam::DVec3;
 
@@ -12,6 +12,7 @@ pub const PASS: Pass = Pass {
     name: "raycast_planes",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/planes"),
     needed: |s| match (s.is_flat(), s.cuts_planes()) {
         (true, _) if s.tones_planes() => Err("planes are cut straight to 8 bits"),
@@ -96,10 +97,10 @@ fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
     constants
 }
 
-/// What a pixel shows; none outside all tiles and where nothing is seen.
+/// The value of a pixel; none outside all tiles and outside the insonified region.
 fn value_at(scene: &Scene, volume: &Texels, sheet: &Sheet, x: usize, y: usize) -> Option<f64> {
-    let tile = tile_at(sheet, x, y)?;
-    slab(scene, volume, place(sheet, tile, x, y), tile.plane.normal)
+    let tile = sheet.tile_at(x, y)?;
+    slab(scene, volume, sheet.place(tile, x, y), tile.plane.normal)
 }
 
 /// The scene without its camera and its rays' step, which no plane depends on.
@@ -117,27 +118,7 @@ fn unmoved(scene: &Scene) -> Scene {
     Scene { rays, step: 1.0, ..scene.clone() }
 }
 
-/// The tile that holds a pixel; none where the grid has more cells than tiles.
-pub fn tile_at(sheet: &Sheet, x: usize, y: usize) -> Option<&Tile> {
-    sheet.tiles.iter().find(|tile| {
-        let within = |at: usize, axis: usize| {
-            let low = tile.corner[axis] as usize;
-            at >= low && at < low + tile.size[axis] as usize
-        };
-        within(x, 0) && within(y, 1)
-    })
-}
-
-/// The place in the tile's plane that a pixel's centre shows.
-pub fn place(sheet: &Sheet, tile: &Tile, x: usize, y: usize) -> DVec3 {
-    let from_middle = |at: usize, axis: usize| {
-        let middle = f64::from(tile.corner[axis]) + f64::from(tile.size[axis]) / 2.0;
-        (at as f64 + 0.5 - middle) * sheet.pixel
-    };
-    tile.plane.at + tile.plane.right * from_middle(x, 0) + tile.plane.down * from_middle(y, 1)
-}
-
-/// What a slab about a place shows; none where all of it is cut away or not insonified.
+/// The value of a slab around a point; none where all of it is cut away or not insonified.
 fn slab(scene: &Scene, volume: &Texels, place: DVec3, normal: DVec3) -> Option<f64> {
     let settings = &scene.settings.planes;
     let count = scene.slab_samples() as usize;

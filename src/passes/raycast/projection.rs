@@ -2,25 +2,27 @@
 //! region.
 
 use super::ray;
-use crate::passes::*;
+use crate::passes::empty_space;
+use crate::passes::pass::*;
 use crate::scene::{Mode, Scene};
 
 pub const PASS: Pass = Pass {
     name: "raycast_projection",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/projection"),
     needed: |s| match s.settings.mode {
         Mode::Mip | Mode::MinIp | Mode::Mean => Ok("the mode keeps one value of each ray"),
         _ => Err("the mode is no projection"),
     },
-    reads: |s, _| ray::marching_reads(s, empty_space::volume_leaps(s)),
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    reads: |s, _| ray::marching_reads(s, empty_space::volume_skipping(s)),
+    writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| ray::params(s, s.projection_view()),
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         constants.push(("KEPT", kept(s)));
         constants
     },

@@ -1,9 +1,9 @@
-//! What the ray casters share: the parameters of rays and sweep map, and in f64 a ray's way through the volume.
+//! Shared by the ray casters: the parameters of rays and sweep map, and in f64 the march of a ray through the volume.
 
-use crate::passes::empty_space::Leaps;
-use crate::passes::lookup_tables::{is_uneven, line_parameter, sweep_span};
+use crate::passes::empty_space::Skipping;
+use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_span};
+use crate::passes::pass::*;
 use crate::passes::preprocess::packed_neighbours;
-use crate::passes::*;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
 use glam::DVec3;
@@ -16,45 +16,46 @@ macro_rules! variant {
     ($scene:expr, $shader:literal, $kind:literal) => {
         match crate::passes::raycast::ray::tables($scene) {
             (false, _, _) => concat!($shader, ".", $kind, "plain"),
-            (true, false, false) => concat!($shader, ".", $kind, "even"),
-            (true, false, true) => concat!($shader, ".", $kind, "moved"),
-            (true, true, false) => concat!($shader, ".", $kind, "uneven"),
-            (true, true, true) => concat!($shader, ".", $kind, "uneven_moved"),
+            (true, false, false) => concat!($shader, ".", $kind, "uniform"),
+            (true, false, true) => concat!($shader, ".", $kind, "intra_frame_motion"),
+            (true, true, false) => concat!($shader, ".", $kind, "non_uniform"),
+            (true, true, true) => concat!($shader, ".", $kind, "non_uniform_intra_frame_motion"),
         }
     };
 }
 pub(super) use variant;
 
-/// Whether the sweep look-up table, the table of slices, and the line look-up table are needed.
+/// Whether the sweep look-up table, the table of slices (non-uniform sweep), and the line look-up table (intra-frame motion) are
+/// needed.
 pub(super) fn tables(scene: &Scene) -> (bool, bool, bool) {
     match &scene.geometry {
         Geometry::Sweep(probe) => {
             let swept = !matches!(probe.motion, Motion::Still { .. });
-            let moved = match &probe.advance {
+            let moving = match &probe.advance {
                 Advance::None => false,
                 Advance::Same(a) => *a != 0.0,
                 Advance::Each(table) => table.iter().any(|a| *a != 0.0),
             };
-            (swept, swept && is_uneven(&scene.geometry), swept && moved)
+            (swept, swept && is_non_uniform(&scene.geometry), swept && moving)
         }
         Geometry::Cartesian(_) => (false, false, false),
     }
 }
 
 pub(super) fn reads(scene: &Scene) -> Vec<Bind> {
-    let (swept, uneven, moved) = tables(scene);
+    let (swept, non_uniform, moving) = tables(scene);
     let mut reads = vec![Bind { filtered: scene.filters_in_hardware(), ..whole("volume", Slot::Volume) }];
     reads.extend(swept.then_some(whole("sweep_lut", Slot::SweepLut)));
-    reads.extend(moved.then_some(whole("line_lut", Slot::LineLut)));
-    reads.extend(uneven.then_some(whole("slice_table", Slot::SliceTable)));
+    reads.extend(moving.then_some(whole("line_lut", Slot::LineLut)));
+    reads.extend(non_uniform.then_some(whole("slice_table", Slot::SliceTable)));
     reads
 }
 
-/// Of the passes that take samples along rays: what they leap by, too.
-pub(super) fn marching_reads(scene: &Scene, leaps: Leaps) -> Vec<Bind> {
+/// What passes that take samples along rays read: with the slots for empty-space skipping.
+pub(super) fn marching_reads(scene: &Scene, skipping: Skipping) -> Vec<Bind> {
     let mut reads = reads(scene);
-    reads.extend(scene.packs().then_some(whole("quads", Slot::Quads)));
-    reads.extend(leaps.slot().map(|slot| whole("bricks", slot)));
+    reads.extend(scene.packs().then_some(whole("packed_neighbours", Slot::PackedNeighbours)));
+    reads.extend(skipping.slot().map(|slot| whole("bricks", slot)));
     reads
 }
 
@@ -83,13 +84,13 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
 }
 
 /// Constants of the passes that take samples along rays.
-pub(super) fn marching_constants(scene: &Scene, leaps: Leaps) -> Vec<(&'static str, i32)> {
+pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'static str, i32)> {
     let mut constants = constants(scene);
     if scene.packs() {
         constants.retain(|(name, _)| *name != "SAMPLING");
         constants.push(("SAMPLING", packed_neighbours::sampling(scene)));
     }
-    constants.push(leaps.constant());
+    constants.push(skipping.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));
     constants
 }
@@ -167,10 +168,10 @@ pub(super) struct Ray<'a> {
     direction: DVec3,
     /// Across the ray, unit length.
     across: [DVec3; 2],
-    /// Where it lies in the box and on the near side of every clip plane, mm; leave < enter is a miss.
+    /// Interval inside the box and on the near side of every clip plane, mm; leave < enter is a miss.
     pub enter: f64,
     pub leave: f64,
-    /// How much longer than the scene's step a step is at the entry, and how much more that becomes a mm.
+    /// Ratio of the step at the entry to the scene's step, and the increase of this ratio per mm.
     wider: f64,
     widening: f64,
 }
@@ -224,7 +225,7 @@ impl<'a> Ray<'a> {
     }
 
     /// The windowed sample at an offset, which is that of step `n`; none outside the insonified region. With the sliding
-    /// filter it is the weighted mean of what lies inside of a cube of samples about it.
+    /// filter it is the weighted mean of the samples of a cube around it that are inside.
     pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {
         let at = texel(self.scene, self.place(offset))?;
         let edge = i64::from(self.scene.settings.ray.sliding);
@@ -263,19 +264,19 @@ impl<'a> Ray<'a> {
     }
 }
 
-/// How much longer than the scene's step a step is at a place: in proportion to the range from the array's apex.
+/// Ratio of the step to the scene's step at a place: proportional to the range from the array's apex.
 fn wider(scene: &Scene, place: DVec3) -> f64 {
     let Some(probe) = scene.probe() else { return 1.0 };
     let (x, y, _) = probe.inverse_sweep_map(place);
     1.0 + scene.settings.ray.spread * ((x.hypot(y) / spread_range(probe)).clamp(1.0, 8.0) - 1.0)
 }
 
-/// The range at which steps are not longer yet: that of the first sample, unless that is (nearly) the apex.
+/// The range up to which steps have the scene's length: that of the first sample, unless that is (nearly) the apex.
 fn spread_range(probe: &Probe) -> f64 {
     probe.first_range().max(probe.last_range() / 8.0)
 }
 
-/// Where a ray enters and leaves what is rendered, mm; leave < enter is a miss.
+/// Where a ray enters and leaves the rendered region, mm; leave < enter is a miss.
 fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {

@@ -2,16 +2,18 @@
 
 use super::detector::{detect, polarity};
 use super::ray;
-use crate::passes::*;
+use crate::passes::empty_space;
+use crate::passes::pass::*;
 use crate::scene::{Detector, Place, RING, Scene};
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/surface"),
     needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
-    reads: |s, _| ray::marching_reads(s, empty_space::surface_leaps(s)),
+    reads: |s, _| ray::marching_reads(s, empty_space::surface_skipping(s)),
     writes: |_, _| vec![whole("distance_map", Slot::Distance), whole("surface", Slot::Surface)],
     extent: ray_extent,
     repeat: once,
@@ -22,10 +24,10 @@ pub const PASS: Pass = Pass {
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
             .f32("noise", surface.noise)
-            .f32("silence", empty_space::classify::quiet(s))
+            .f32("quiet_level", empty_space::classify::quiet_level(s))
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::surface_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::surface_skipping(s));
         let detector = match s.settings.surface.detector {
             Detector::Threshold => 0,
             Detector::Adaptive => 1,

@@ -2,7 +2,8 @@
 
 use super::composite::{March, Medium, Place};
 use super::ray;
-use crate::passes::*;
+use crate::passes::empty_space;
+use crate::passes::pass::*;
 use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
 use glam::DVec3;
 
@@ -10,25 +11,26 @@ pub const PASS: Pass = Pass {
     name: "raycast_volume",
     stage: Stage::Raycast,
     frequency: Frequency::Picture,
+    link: Link::None,
     shader: |s, _| match kind(s) {
         Kind::Alone => ray::variant!(s, "raycast/volume", ""),
-        Kind::Veil => ray::variant!(s, "raycast/volume", "veil_"),
+        Kind::Layer => ray::variant!(s, "raycast/volume", "layer_"),
         Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
     },
     needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
     reads: |s, _| {
-        let mut reads = ray::marching_reads(s, empty_space::volume_leaps(s));
+        let mut reads = ray::marching_reads(s, empty_space::volume_skipping(s));
         reads.push(match s.settings.volume.compositing {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
             _ => whole("transfer", Slot::Transfer),
         });
-        reads.extend((kind(s) == Kind::Veil).then_some(whole("distance_map", Slot::Distance)));
+        reads.extend((kind(s) == Kind::Layer).then_some(whole("distance_map", Slot::Distance)));
         reads
     },
     writes: |s, _| match kind(s) {
-        Kind::Alone => vec![whole("picture", chain::rendered(s))],
-        Kind::Veil => vec![whole("picture", Slot::Veil)],
-        Kind::Hit => vec![whole("picture", Slot::Veil), whole("distance_map", Slot::Distance)],
+        Kind::Alone => vec![whole("picture", rendered(s))],
+        Kind::Layer => vec![whole("picture", Slot::VolumeLayer)],
+        Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("distance_map", Slot::Distance)],
     },
     extent: ray_extent,
     repeat: once,
@@ -45,7 +47,7 @@ pub const PASS: Pass = Pass {
             .f32("depth_near", near)
     },
     constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::volume_leaps(s));
+        let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         let compositing = match s.settings.volume.compositing {
             Compositing::Riemann => 0,
             Compositing::Corrected => 1,
@@ -71,7 +73,7 @@ pub const PASS: Pass = Pass {
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), x, y);
-                if kind(scene) == Kind::Veil {
+                if kind(scene) == Kind::Layer {
                     ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
                 }
                 let (colour, hit) = composite(scene, &ray, table);
@@ -88,15 +90,15 @@ pub const PASS: Pass = Pass {
 enum Kind {
     /// The picture.
     Alone,
-    /// What lies before a surface.
-    Veil,
-    /// What stage 3 lights, and where.
+    /// The volume in front of a surface.
+    Layer,
+    /// Colours that stage 3 lights, and the distance of the first hit.
     Hit,
 }
 
 fn kind(scene: &Scene) -> Kind {
     match (scene.settings.mode, scene.lights_volume()) {
-        (Mode::Mixed, _) => Kind::Veil,
+        (Mode::Mixed, _) => Kind::Layer,
         (_, true) => Kind::Hit,
         (_, false) => Kind::Alone,
     }
@@ -117,7 +119,7 @@ fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 
-/// What a ray sees of the volume through the transfer function, and through the tints of its depth.
+/// The volume along a ray, through the transfer function and the tints by depth.
 struct Seen<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
@@ -172,7 +174,7 @@ fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
     std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
 }
 
-/// Entry before a value in 0..1, and the share of the way to the next.
+/// Index of the entry before a value in 0..1, and the fraction to the next entry.
 fn placed(value: f64) -> (usize, f64) {
     let at = value * (transfer::ENTRIES - 1) as f64;
     let n = (at.floor() as usize).min(transfer::ENTRIES - 2);

@@ -1,8 +1,7 @@
-//! Blinn-Phong (thesis 4-4..4-7) under a far or near light, with shadow, occlusion and the look of skin where asked for.
+//! Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
 
-use super::{camera_params, light_at, normal, to_light};
-use crate::passes::chain::distance_end;
-use crate::passes::*;
+use super::{camera_params, light_at, normal, occlusion, shadow, to_light};
+use crate::passes::pass::*;
 use crate::scene::{Mode, Scene, Skin};
 use glam::DVec3;
 
@@ -10,17 +9,18 @@ pub const PASS: Pass = Pass {
     name: "light",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
     shader: |s, _| {
-        let arrives = (super::shadow::PASS.is_needed(s), super::occlusion::PASS.is_needed(s));
+        let arrives = (shadow::is_cast(s), occlusion::is_asked(s));
         match (lit_thing(s), arrives) {
             (Lit::Surface, (false, false)) => "shade/light.plain",
             (Lit::Surface, (true, false)) => "shade/light.shadowed",
             (Lit::Surface, (false, true)) => "shade/light.occluded",
             (Lit::Surface, (true, true)) => "shade/light.shadowed_occluded",
-            (Lit::Veiled, (false, false)) => "shade/light.veiled_plain",
-            (Lit::Veiled, (true, false)) => "shade/light.veiled_shadowed",
-            (Lit::Veiled, (false, true)) => "shade/light.veiled_occluded",
-            (Lit::Veiled, (true, true)) => "shade/light.veiled_shadowed_occluded",
+            (Lit::BehindLayer, (false, false)) => "shade/light.behind_layer_plain",
+            (Lit::BehindLayer, (true, false)) => "shade/light.behind_layer_shadowed",
+            (Lit::BehindLayer, (false, true)) => "shade/light.behind_layer_occluded",
+            (Lit::BehindLayer, (true, true)) => "shade/light.behind_layer_shadowed_occluded",
             (Lit::Composited, (false, false)) => "shade/light.composited_plain",
             (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
             (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
@@ -32,15 +32,15 @@ pub const PASS: Pass = Pass {
         (true, true) => Ok("the volume is lit where rays hit it first"),
         (false, _) => Err("no surface in this mode"),
     },
-    reads: |s, _| {
-        let mut reads = vec![whole("distance_map", distance_end(s))];
+    reads: |s, t| {
+        let mut reads = vec![whole("distance_map", t.source())];
         reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
-        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("veil", Slot::Veil)));
-        reads.extend(super::shadow::PASS.is_needed(s).then_some(whole("shadow", Slot::Shadow)));
-        reads.extend(super::occlusion::PASS.is_needed(s).then_some(whole("occlusion", Slot::Occlusion)));
+        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("volume_layer", Slot::VolumeLayer)));
+        reads.extend(shadow::is_cast(s).then_some(whole("shadow", Slot::Shadow)));
+        reads.extend(occlusion::is_asked(s).then_some(whole("occlusion", Slot::Occlusion)));
         reads
     },
-    writes: |s, _| vec![whole("picture", chain::rendered(s))],
+    writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
@@ -57,7 +57,7 @@ pub const PASS: Pass = Pass {
             .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
             .vec3("wrap", wrap(s.skin()))
             .vec3("through", through(s.skin()))
-            .f32("veil_share", s.settings.volume.veil)
+            .f32("layer_share", s.settings.volume.veil)
     },
     constants: |s, _| {
         let light = &s.settings.light;
@@ -75,7 +75,7 @@ pub const PASS: Pass = Pass {
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
                 let light = lit(scene, reads, x, y);
-                picture.set([x, y, 0], &seen(scene, reads, light, x, y));
+                picture.set([x, y, 0], &shown(scene, reads, light, x, y));
             }
         }
     },
@@ -85,7 +85,7 @@ pub const PASS: Pass = Pass {
 enum Lit {
     Surface,
     /// A surface behind a composited volume.
-    Veiled,
+    BehindLayer,
     /// The volume itself, where rays hit it first.
     Composited,
 }
@@ -93,25 +93,25 @@ enum Lit {
 fn lit_thing(scene: &Scene) -> Lit {
     match (scene.lights_volume(), scene.settings.mode) {
         (true, _) => Lit::Composited,
-        (false, Mode::Mixed) => Lit::Veiled,
+        (false, Mode::Mixed) => Lit::BehindLayer,
         (false, _) => Lit::Surface,
     }
 }
 
-/// What a pixel shows: its light (body and highlight), with the composited volume before it or in it.
-fn seen(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
-    let veil = |share: f64| {
-        let veil = reads.get("veil").get([x, y, 0]);
-        (DVec3::new(veil[0], veil[1], veil[2]) * share, veil[3] * share)
+/// The colour of a pixel: its light (body and highlight), with the composited volume in front of it or lit by it.
+fn shown(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
+    let layer = |share: f64| {
+        let layer = reads.get("volume_layer").get([x, y, 0]);
+        (DVec3::new(layer[0], layer[1], layer[2]) * share, layer[3] * share)
     };
     let (colour, opacity) = match (lit_thing(scene), light) {
         (Lit::Surface, light) => light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0)),
-        (Lit::Veiled, light) => {
-            let (before, opacity) = veil(scene.settings.volume.veil);
+        (Lit::BehindLayer, light) => {
+            let (before, opacity) = layer(scene.settings.volume.veil);
             light.map_or((before, opacity), |(body, highlight)| (before + (1.0 - opacity) * (body + highlight), 1.0))
         }
         (Lit::Composited, light) => {
-            let (colour, opacity) = veil(1.0);
+            let (colour, opacity) = layer(1.0);
             match light {
                 Some((body, highlight)) => (colour * (1.0 - opacity + opacity * body) + opacity * highlight, opacity),
                 None => (colour, opacity),
@@ -130,7 +130,7 @@ fn through(skin: Option<Skin>) -> DVec3 {
     skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
 }
 
-/// Light that comes from a pixel's surface: from its body, and its highlight.
+/// Light from a pixel's surface: from its body, and its highlight.
 fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec3)> {
     let distances = reads.get("distance_map");
     let (place, _) = super::place(scene, distances, x as i64, y as i64)?;
@@ -151,11 +151,11 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
         }
     };
 
-    let arrives = light.shadow.map_or(1.0, |s| match super::shadow::PASS.is_needed(scene) {
+    let arrives = light.shadow.map_or(1.0, |s| match shadow::is_cast(scene) {
         true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
         false => 1.0,
     });
-    let open = if super::occlusion::PASS.is_needed(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
+    let open = if occlusion::is_asked(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
     let (diffused, glow) = match scene.skin() {
         None => (DVec3::splat(facing * arrives), DVec3::ZERO),
         Some(_) => {

@@ -1,10 +1,10 @@
-//! Stage 3: what the distance map looks like in light. The camera's parameters, places and normals that its passes share.
+//! Stage 3: lighting of the distance map. Camera parameters, positions and normals that its passes share.
 
 pub mod light;
 pub mod occlusion;
 pub mod shadow;
 
-use crate::passes::{Params, Texels, is_hit, ray_params};
+use crate::passes::pass::{Params, Texels, is_hit, ray_params};
 use crate::scene::Scene;
 use glam::DVec3;
 
@@ -12,12 +12,12 @@ fn camera_params(scene: &Scene) -> Params {
     ray_params(scene).f32("cliff", scene.cliff())
 }
 
-/// Unit direction to a light that is far away, or the place of one that is near, in space.
+/// Unit direction to a directional light, or the position of a point light, in space.
 fn light_at(scene: &Scene) -> DVec3 {
     scene.light_place().unwrap_or_else(|| scene.rays.from_camera(scene.settings.light.direction.normalize()))
 }
 
-/// Unit direction from a place to the light, and how far it is; `otherwise` for a light at that very place.
+/// Unit direction from a place to the light, and the distance to it; the direction is `otherwise` for a light at that place.
 fn to_light(scene: &Scene, place: DVec3, otherwise: DVec3) -> (DVec3, f64) {
     match scene.light_place() {
         Some(light) => ((light - place).try_normalize().unwrap_or(otherwise), light.distance(place)),
@@ -34,14 +34,14 @@ fn hit_at(distances: &Texels, x: i64, y: i64) -> Option<f64> {
     Some(distances.one(x as usize, y as usize, 0)).filter(|d| is_hit(*d))
 }
 
-/// What a pixel sees: its place in space, and its distance.
+/// The point of the surface at a pixel in space, and its distance.
 fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f64)> {
     let distance = hit_at(distances, x, y)?;
     let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
     Some((origin + direction * distance, distance))
 }
 
-/// Unit normal at a pixel, towards the viewer. Nothing is taken across a cliff.
+/// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff.
 pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
     let (here, distance) = place(scene, distances, x, y)?;
     let slope = |dx: i64, dy: i64, facing: DVec3| {

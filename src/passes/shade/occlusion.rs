@@ -1,22 +1,22 @@
-//! Ambient occlusion in image space: what stands out of a pixel's tangent plane nearby takes sky away. (Mittring 2007; Bavoil
-//! and Sainz 2008.)
+//! Ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007;
+//! Bavoil and Sainz 2008.)
 
 use super::{camera_params, normal, place};
-use crate::passes::chain::distance_end;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Scene;
 
-/// Places looked at around a pixel.
+/// Samples around a pixel.
 const SAMPLES: u32 = 32;
 /// pi (3 - sqrt 5), rad: turning by it never comes back to a direction.
 const GOLDEN_ANGLE: f64 = 2.399_963_23;
-/// Cosine over the tangent plane that is no corner yet: the map's own roughness.
+/// Cosine above the tangent plane that is ignored: the map's own roughness.
 const ROUGHNESS: f64 = 0.1;
 
 pub const PASS: Pass = Pass {
     name: "occlusion",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/occlusion",
     needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
         (false, _) => Err("no surface in this mode"),
@@ -24,7 +24,7 @@ pub const PASS: Pass = Pass {
         (true, Some(occlusion)) if occlusion.strength == 0.0 => Err("a strength of 0 takes nothing"),
         _ => Ok("asked for"),
     },
-    reads: |s, _| vec![whole("distance_map", distance_end(s))],
+    reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
     extent: ray_extent,
     repeat: once,
@@ -50,6 +50,11 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// True if ambient occlusion darkens this scene.
+pub(super) fn is_asked(scene: &Scene) -> bool {
+    (PASS.needed)(scene).is_ok()
+}
 
 fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
     let settings = scene.settings.light.occlusion.unwrap_or_default();

@@ -2,18 +2,18 @@
 //! `thickness` deep, and a place on the way to the light that lies in it is where the light is blocked.
 
 use super::{camera_params, light_at, to_light};
-use crate::passes::chain::distance_end;
-use crate::passes::*;
+use crate::passes::pass::*;
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// Places looked at on the way to the light.
+/// Samples on the segment to the light.
 const STEPS: u32 = 96;
 
 pub const PASS: Pass = Pass {
     name: "shadow",
     stage: Stage::Shade,
     frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
     shader: |_, _| "shade/shadow",
     needed: |s| match (s.has_distance(), s.settings.light.shadow) {
         (false, _) => Err("no surface in this mode"),
@@ -21,7 +21,7 @@ pub const PASS: Pass = Pass {
         (true, Some(shadow)) if shadow.strength == 0.0 => Err("a strength of 0 casts none"),
         _ => Ok("asked for"),
     },
-    reads: |s, _| vec![whole("distance_map", distance_end(s))],
+    reads: |_, t| vec![whole("distance_map", t.source())],
     writes: |_, _| vec![whole("shadow", Slot::Shadow)],
     extent: ray_extent,
     repeat: once,
@@ -63,6 +63,11 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// True if the light casts a shadow in this scene.
+pub(super) fn is_cast(scene: &Scene) -> bool {
+    (PASS.needed)(scene).is_ok()
+}
 
 /// Share of the light that arrives at a place which pixel (x, y) sees.
 fn arriving(scene: &Scene, distances: &Texels, x: usize, y: usize, place: DVec3) -> f64 {

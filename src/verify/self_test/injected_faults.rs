@@ -278,20 +278,20 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         },
     },
     InjectedFault {
-        name: "leap one brick too far",
+        name: "skip one brick too far",
         what: "the distance to the next brick of another kind is counted from the one behind",
         change: Change::Shader {
-            pass: "leap_",
+            pass: "brick_distance_",
             by: |words| add_to_writes(words, "target", [1.0 / 255.0, 0.0, 0.0, 0.0]),
         },
     },
     InjectedFault {
         name: "brick taken for empty",
-        what: "bricks a hundredth above the threshold are leapt over",
+        what: "bricks a hundredth above the threshold are skipped",
         change: Change::Numbers {
-            pass: "classify_surface",
+            pass: "classify_bricks_surface",
             by: |_, params| {
-                number(params, "quiet", |value| {
+                number(params, "quiet_level", |value| {
                     if let Value::F32(v) = value {
                         *v += 0.01;
                     }

@@ -3,13 +3,20 @@
 use super::{fan, scene};
 use crate::common::probes::voxels;
 use crate::common::scenes;
-use echolume::passes::chain::{
-    copied, distance_end, distance_link, picture_end, picture_link, rectangle, rendered, slice_link,
-};
-use echolume::passes::{DispatchArgs, Slot};
+use echolume::passes::chain::{copied, distance_end, picture_end};
+use echolume::passes::{DispatchArgs, Pass, Slot, by_name, rendered};
 use echolume::probe::Advance;
 use echolume::scene::{Input, Scene, VisibleBounds};
 use echolume::source::StoredType;
+
+fn pass(name: &str) -> &'static Pass {
+    by_name(name).expect("pass")
+}
+
+/// The slots that a pass reads and writes as a link of its chain.
+fn link(scene: &Scene, name: &str, iteration: u32) -> (Slot, Slot) {
+    pass(name).link_slots(scene, &args(iteration)).expect("a link")
+}
 
 fn args(iteration: u32) -> DispatchArgs {
     DispatchArgs { iteration, ..DispatchArgs::default() }
@@ -19,7 +26,7 @@ fn args(iteration: u32) -> DispatchArgs {
 fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
     let filters = "slices = { median = true, sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }";
     let frames = scene(voxels([8, 8, 5]), &format!("mode = 'mip'\n{filters}"));
-    let link = |name: &str, iteration| slice_link(&frames, name, &args(iteration));
+    let link = |name: &str, iteration| link(&frames, name, iteration);
     assert_eq!(link("load_slice", 0), (Slot::Frames, Slot::SliceA));
     assert_eq!(link("median_slice", 0), (Slot::SliceA, Slot::SliceB));
     assert_eq!(link("sigma_slice", 0), (Slot::SliceB, Slot::SliceA));
@@ -29,7 +36,7 @@ fn filters_alternate_between_two_slots_and_the_last_writes_the_target() {
         assert_eq!(link("aos_slice", 4 + iteration), (Slot::SliceB, Slot::Volume));
     }
     let smoothed = scene(voxels([8, 8, 5]), "slices = { median = true, smooth = { elevation = 1.0 } }");
-    assert_eq!(slice_link(&smoothed, "median_slice", &args(0)), (Slot::SliceA, Slot::SharpVolume));
+    assert_eq!(self::link(&smoothed, "median_slice", 0), (Slot::SliceA, Slot::SharpVolume));
 }
 
 #[test]
@@ -40,11 +47,11 @@ fn an_empty_chain_leaves_its_slot_unchanged() {
         voxels([8, 8, 5]),
         "distance = { median = 3, perona_malik = { repeat = 3 } }\npost = { sigma = {}, perona_malik = { scheme = 'aos', repeat = 2 } }",
     );
-    assert_eq!(distance_link(&filtered, "median_distance", &args(0)), (Slot::Distance, Slot::DistanceA));
-    assert_eq!(distance_link(&filtered, "perona_malik_distance", &args(1)), (Slot::DistanceB, Slot::DistanceA));
+    assert_eq!(link(&filtered, "median_distance", 0), (Slot::Distance, Slot::DistanceA));
+    assert_eq!(link(&filtered, "perona_malik_distance", 1), (Slot::DistanceB, Slot::DistanceA));
     assert_eq!(distance_end(&filtered), Slot::DistanceB);
-    assert_eq!(picture_link(&filtered, "sigma_picture", &args(0)), (Slot::Picture, Slot::SmoothPicture));
-    assert_eq!(picture_link(&filtered, "aos_picture", &args(5)), (Slot::SmoothPictureB, Slot::SmoothPicture));
+    assert_eq!(link(&filtered, "sigma_picture", 0), (Slot::Picture, Slot::SmoothPicture));
+    assert_eq!(link(&filtered, "aos_picture", 5), (Slot::SmoothPictureB, Slot::SmoothPicture));
     assert_eq!(picture_end(&filtered), Slot::SmoothPicture);
 }
 
@@ -88,7 +95,7 @@ fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
     let whole = seen(filters, 192, 224);
     let of = |low, high| {
         let scene = Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..whole.clone() };
-        rectangle(&scene, pass, &args(iteration)).expect("a rectangle")
+        self::pass(pass).rectangle(&scene, &args(iteration)).expect("a rectangle")
     };
     let before = |axis: usize| (192..224).filter(|low| of(*low, 230).first[axis] == 160).count() as u32;
     let behind = |axis: usize| {
@@ -127,8 +134,9 @@ fn each_filter_covers_the_reach_of_the_filters_after_it() {
 
 #[test]
 fn rectangles_end_with_whole_workgroups_or_at_the_border() {
-    let of =
-        |low, high, pass: &str| rectangle(&seen("median = true, sigma = { window = 5 }", low, high), pass, &args(0));
+    let of = |low, high, pass: &str| {
+        self::pass(pass).rectangle(&seen("median = true, sigma = { window = 5 }", low, high), &args(0))
+    };
     let told = |low, high, pass: &str| of(low, high, pass).map(|r| (r.first, r.size));
     assert_eq!(told(200, 210, "sigma_slice"), Some(([192; 2], [32; 2])));
     assert_eq!(told(200, 230, "sigma_slice"), Some(([192; 2], [64; 2])));
@@ -141,8 +149,9 @@ fn rectangles_end_with_whole_workgroups_or_at_the_border() {
 #[test]
 fn rows_and_columns_of_elimination_are_whole() {
     let filters = "median = true, perona_malik = { scheme = 'aos', repeat = 1 }, smooth = { lateral = 1.0 }";
-    let of =
-        |pass: &str, iteration| rectangle(&seen(filters, 200, 210), pass, &args(iteration)).map(|r| (r.first, r.size));
+    let of = |pass: &str, iteration| {
+        self::pass(pass).rectangle(&seen(filters, 200, 210), &args(iteration)).map(|r| (r.first, r.size))
+    };
     assert_eq!(of("aos_slice", 0), None);
     assert_eq!(of("median_slice", 0), Some(([0; 2], [400; 2])), "all of it is eliminated behind");
     assert_eq!(of("gaussian_lateral", 0), Some(([192; 2], [32; 2])));

@@ -58,7 +58,7 @@ fn only_readers_of_a_changed_slot_run_again() {
     assert_eq!(passes(&with(""), &with("camera = { azimuth = 10 }")), format!("raycast_surface {filtered}"));
     assert_eq!(
         passes(&with(""), &with("surface = { threshold = 0.3 }")),
-        format!("classify_surface leap_surface raycast_surface {filtered}")
+        format!("classify_bricks_surface brick_distance_surface raycast_surface {filtered}")
     );
     // Another median window is a constant of its pipeline; shadow is one more pass, whose slot the light reads.
     let wider = scene(fan(Advance::None), &SURFACE.replace("median = 3", "median = 5"));
@@ -123,15 +123,21 @@ fn lookup_tables_are_built_again_when_their_inputs_change() {
     let still = |more: &str| volume(Advance::None, more);
     let marched = "raycast_volume tone";
     let (run, made) = again(&still(""), &still("volume = { transfer = 'bone' }"));
-    assert_eq!((run, made), (format!("classify_volume leap_volume {marched}"), "opaque_before transfer".into()));
+    assert_eq!(
+        (run, made),
+        (format!("classify_bricks_volume brick_distance_volume {marched}"), "opaque_before transfer".into())
+    );
     let pre = "compositing = 'pre-integrated'";
     let (run, made) =
         again(&still(&format!("volume = {{ {pre} }}")), &still(&format!("volume = {{ {pre}, transfer = 'bone' }}")));
-    assert_eq!((run, made), (format!("classify_volume leap_volume {marched}"), "opaque_before pre_integrated".into()));
+    assert_eq!(
+        (run, made),
+        (format!("classify_bricks_volume brick_distance_volume {marched}"), "opaque_before pre_integrated".into())
+    );
     let entries = |n: u32| still(&format!("ray = {{ entries = {n} }}"));
     assert_eq!(rerun(&entries(1025), &entries(513)), Rerun::Frames, "of all tables alike");
     let (run, made) = again(&still("ray = { brick = 8 }"), &still("ray = { brick = 16 }"));
-    assert!(run.starts_with("brick_ranges classify_volume") && made == "brick_table", "{run}: {made}");
+    assert!(run.starts_with("brick_ranges classify_bricks_volume") && made == "brick_table", "{run}: {made}");
     // The motor moves in the other direction, or further, during a frame: the tables of the sweep change, the lines of a frame do not.
     let [forth, back, fast] = [0.02, -0.02, 0.03].map(|way| volume(Advance::Same(way), ""));
     assert_eq!(again(&forth, &back).1, "");

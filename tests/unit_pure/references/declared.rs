@@ -8,10 +8,10 @@ use echolume::passes::{Slot, Value};
 fn told(scene: &Scene, name: &str, iteration: u32) -> String {
     let (pass, args) = (pass(name), DispatchArgs { iteration, slice: 1, slices: 2, ..DispatchArgs::default() });
     assert_eq!(pass.name, name);
-    assert!(pass.is_needed(scene), "{name}: {:?}", (pass.needed)(scene));
+    assert!(pass.is_needed(scene), "{name}: {:?}", pass.needed(scene));
     let slots = |binds: Vec<echolume::passes::Bind>| binds.iter().map(|b| b.slot.name()).collect::<Vec<_>>().join(", ");
-    let (reads, writes) = (slots((pass.reads)(scene, &args)), slots((pass.writes)(scene, &args)));
-    format!("{}: {reads} -> {writes} {:?}", (pass.shader)(scene, &args), (pass.extent)(scene, &args))
+    let (reads, writes) = (slots(pass.reads(scene, &args)), slots(pass.writes(scene, &args)));
+    format!("{}: {reads} -> {writes} {:?}", pass.shader(scene, &args), (pass.extent)(scene, &args))
 }
 
 fn numbers(scene: &Scene, name: &str) -> Vec<(&'static str, f64)> {
@@ -108,7 +108,7 @@ fn filters_that_are_off_or_change_nothing_are_skipped_and_explained() {
     let plain = slices([8, 8], "");
     let flat = scene([8; 3], "mode = 'mip'");
     for name in ["median", "estimator", "sigma", "enhanced_sigma", "growth", "perona_malik", "aos"] {
-        assert_eq!((pass(&format!("{name}_slice")).needed)(&plain), Err("not asked for"));
+        assert_eq!(pass(&format!("{name}_slice")).needed(&plain), Err("not asked for"));
     }
     for name in [
         "gaussian_lateral",
@@ -118,25 +118,25 @@ fn filters_that_are_off_or_change_nothing_are_skipped_and_explained() {
         "enhanced_sigma_picture",
         "aos_picture",
     ] {
-        assert_eq!((pass(name).needed)(&plain), Err("not asked for"));
+        assert_eq!(pass(name).needed(&plain), Err("not asked for"));
     }
     for name in ["median", "bilateral", "sigma", "enhanced_sigma", "perona_malik"].map(|n| format!("{n}_distance")) {
-        assert_eq!((pass(&name).needed)(&plain), Err("not asked for"));
-        assert_eq!((pass(&name).needed)(&flat), Err("no distance map in this mode"));
+        assert_eq!(pass(&name).needed(&plain), Err("not asked for"));
+        assert_eq!(pass(&name).needed(&flat), Err("no distance map in this mode"));
     }
     let nothing = slices(
         [8, 8],
         "sigma = { sigma = 0.0 }, enhanced_sigma = { sigma = 0.0, growth = true }, perona_malik = { edge = 0.0 }",
     );
     for name in ["sigma_slice", "enhanced_sigma_slice"] {
-        assert_eq!((pass(name).needed)(&nothing), Err("a sigma of 0 changes nothing"));
+        assert_eq!(pass(name).needed(&nothing), Err("a sigma of 0 changes nothing"));
     }
-    assert_eq!((pass("growth_slice").needed)(&nothing), Err("a sigma of 0 grows no window"));
-    assert_eq!((pass("perona_malik_slice").needed)(&nothing), Err("an edge of 0 changes nothing"));
-    assert_eq!((pass("aos_slice").needed)(&nothing), Err("an edge of 0 changes nothing"));
+    assert_eq!(pass("growth_slice").needed(&nothing), Err("a sigma of 0 grows no window"));
+    assert_eq!(pass("perona_malik_slice").needed(&nothing), Err("an edge of 0 changes nothing"));
+    assert_eq!(pass("aos_slice").needed(&nothing), Err("an edge of 0 changes nothing"));
     let explicit = slices([8, 8], "perona_malik = {}, enhanced_sigma = {}");
-    assert_eq!((pass("aos_slice").needed)(&explicit), Err("another scheme was asked for"));
-    assert_eq!((pass("growth_slice").needed)(&explicit), Err("not asked for"));
+    assert_eq!(pass("aos_slice").needed(&explicit), Err("another scheme was asked for"));
+    assert_eq!(pass("growth_slice").needed(&explicit), Err("not asked for"));
     assert_eq!((pass("perona_malik_slice").repeat)(&explicit), 5);
 }
 
@@ -185,7 +185,7 @@ fn shaders_and_references_get_the_same_parameters() {
     let expected = [("range", 0.5), ("few", 3.0), ("edge", 0.5), ("least", least), ("slice", 1.0)];
     assert_eq!(numbers(&scene, "enhanced_sigma_slice"), expected);
     assert_eq!(numbers(&scene, "growth_slice"), expected);
-    let expected = [("RADIUS", 3), ("LARGEST", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0)];
+    let expected = [("RADIUS", 3), ("MAX_RADIUS", 6), ("ESTIMATOR", 3), ("MULTIPLICATIVE", 0)];
     assert_eq!(constants(&scene, "enhanced_sigma_slice", 0), expected);
     assert_eq!(numbers(&scene, "perona_malik_slice"), [("edge", 0.5), ("lambda", 0.125), ("slice", 1.0)]);
     assert_eq!(constants(&scene, "perona_malik_slice", 0), [("CONDUCTANCE", 1)]);

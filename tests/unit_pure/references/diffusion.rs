@@ -94,11 +94,11 @@ fn aos(scene: &Scene, name: &str, source: &Texels) -> (Texels, Texels) {
     for iteration in 0..4 {
         let args = DispatchArgs { iteration, ..DispatchArgs::default() };
         let mut writes = Arrays::default();
-        for bind in (pass(name).writes)(scene, &args) {
+        for bind in pass(name).writes(scene, &args) {
             let channels = if bind.name == "shares" { 1 } else { source.channels };
             writes.insert(bind.name, Texels::untouched(source.size, channels));
         }
-        (pass(name).reference)(scene, &args, &held, &mut writes);
+        pass(name).reference(scene, &args, &held, &mut writes);
         for (written, texels) in writes.iter() {
             assert!(texels.values.iter().all(|v| v.is_finite()), "{written} has holes");
             held.insert(if iteration == 1 && written == "target" { "rows" } else { written }, texels.clone());
@@ -171,7 +171,7 @@ fn the_last_sweep_of_a_slice_goes_where_it_belongs() {
     for (depth, z) in [(3, 2), (1, 0)] {
         let mut writes = Arrays::default();
         writes.insert("target", Texels::untouched([3, 2, depth], 1));
-        (pass("aos_slice").reference)(
+        pass("aos_slice").reference(
             &scene,
             &DispatchArgs { iteration: 3, slice: 2, ..DispatchArgs::default() },
             &reads,

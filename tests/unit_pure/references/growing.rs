@@ -1,7 +1,7 @@
 //! The enhanced sigma filter and how far its windows grow, counted by brute force.
 
 use super::*;
-use echolume::passes::filter::growth;
+use echolume::passes::filter::enhanced_sigma::growth_shares;
 use echolume::probe::{Axis, Motion, Probe};
 
 /// The expected result at a pixel with a known centre: the rings that its window grows by, and the mean.
@@ -179,8 +179,8 @@ fn shares_of_growth_count_what_a_line_passes_through_and_sum_to_one() {
     let growing = |e: &str| slices([4, 2], &format!("enhanced_sigma = {{ {e}, growth = true }}"));
     // Cartesian: every pixel. Beyond the largest window, and before the first, there is nothing.
     let map = rows([[0.0, 1.0, 1.0, 2.0], [0.0, -1.0, 2.0, 9.0]]);
-    assert_eq!(growth::shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
-    assert_eq!(growth::shares(&growing("window = 5, largest = 5"), &map), [1.0]);
+    assert_eq!(growth_shares(&growing("window = 3, largest = 7"), &map), [3.0 / 8.0, 2.0 / 8.0, 3.0 / 8.0]);
+    assert_eq!(growth_shares(&growing("window = 5, largest = 5"), &map), [1.0]);
     // Only pixels inside the sector: outside, every window would have grown by one.
     let probe = Probe { motion: Motion::Translated, slices: Axis::centred(1.0, 3), ..wobbler() };
     let filters = "slices = { pixels = 40, enhanced_sigma = { window = 3, largest = 7, growth = true } }";
@@ -199,7 +199,7 @@ fn shares_of_growth_count_what_a_line_passes_through_and_sum_to_one() {
     });
     let odd = window(map.size, 0, 0, 99).filter(|(x, y)| inside(*x, *y) && x % 2 == 1).count();
     let share = odd as f64 / (size[0] * size[1] - outside) as f64;
-    let got = growth::shares(&scene, &map);
+    let got = growth_shares(&scene, &map);
     assert!(
         (got[0] - 1.0 + share).abs() < 1e-12 && (got[1] - share).abs() < 1e-12 && got[2] == 0.0,
         "{got:?}, {share}"

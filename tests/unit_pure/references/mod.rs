@@ -41,7 +41,7 @@ fn dispatched(scene: &Scene, name: &str, source: &Texels, args: DispatchArgs, de
     let (mut reads, mut writes) = (Arrays::default(), Arrays::default());
     reads.insert("source", source.clone());
     writes.insert("target", Texels::untouched([source.size[0], source.size[1], depth], source.channels));
-    (pass(name).reference)(scene, &args, &reads, &mut writes);
+    pass(name).reference(scene, &args, &reads, &mut writes);
     writes.get("target").clone()
 }
 

@@ -102,7 +102,7 @@ fn a_gaussian_across_slices_writes_only_the_slices_of_its_dispatch() {
     reads.insert("source", source.clone());
     writes.insert("target", Texels::untouched([2, 2, 9], 1));
     let args = DispatchArgs { slice: 3, slices: 2, ..DispatchArgs::default() };
-    (pass("gaussian_elevation").reference)(&scene, &args, &reads, &mut writes);
+    pass("gaussian_elevation").reference(&scene, &args, &reads, &mut writes);
     let target = writes.get("target");
     let all: f64 = weights().iter().sum();
     for (x, y) in window(source.size, 0, 0, 2) {

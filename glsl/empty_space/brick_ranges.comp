@@ -1,0 +1,33 @@
+// The smallest and the largest value that samples in each brick may have, for bricks that depend on an updated slice. A brick
+// outside the insonified region has no samples: its smallest value is larger than its largest.
+// variants: plain
+#version 460
+#include "common.glsl"
+layout(scalar) uniform Params {
+    int slice;  // the first updated slice
+    int slices;
+};
+readonly buffer BrickTable { vec4 entry[]; } brick_table; // tile columns, tile rows, slices (first * 4096 + last), side
+uniform texture3D tile_ranges;
+uniform writeonly image3D brick_ranges;
+
+void main() {
+    ivec3 at = ivec3(gl_GlobalInvocationID), size = imageSize(brick_ranges);
+    if (any(greaterThanEqual(at, size))) return;
+    vec4 entry = brick_table.entry[(at.z * size.y + at.y) * size.x + at.x];
+    ivec3 ends = ivec3(entry.xyz);
+    ivec3 first = ends >> 12, last = ends & 4095;
+    if (last.z < slice || first.z >= slice + slices) return;
+    float low = 1.0, high = 0.0;
+    // No tile outside.
+    if (entry.w == 0.0) last = first - 1;
+    ivec3 extent = last - first + 1;
+    int count = extent.x * extent.y * extent.z;
+    for (int n = 0; n < count; ++n) {
+        ivec3 tap = first + ivec3(n % extent.x, (n / extent.x) % extent.y, n / (extent.x * extent.y));
+        vec2 range = texelFetch(tile_ranges, tap, 0).xy;
+        low = min(low, range.x);
+        high = max(high, range.y);
+    }
+    imageStore(brick_ranges, at, vec4(low, high, 0.0, 0.0));
+}
