@@ -207,6 +207,8 @@ mod shader_compile;
 #[forbid(unsafe_code)]
 pub mod shader_source;
 #[forbid(unsafe_code)]
+pub mod shader_tools;
+#[forbid(unsafe_code)]
 pub mod source;
 #[forbid(unsafe_code)]
 pub mod spirv;

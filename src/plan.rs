@@ -156,6 +156,23 @@ impl Plan {
         }
         Rerun::Steps { steps, slots }
     }
+
+    /// What has to run again where shaders are other ones in the same scene.
+    pub fn rerun_shaders(&self, scene: &Scene, is_changed: impl Fn(&str) -> bool) -> Rerun {
+        let (mut changed, mut steps) = (Vec::new(), Vec::new());
+        for (i, step) in self.steps.iter().enumerate() {
+            let reads = step.reads(scene);
+            if !is_changed((step.pass.shader)(scene, &step.args())) && !reads.iter().any(|s| changed.contains(s)) {
+                continue;
+            }
+            if step.pass.frequency == Frequency::Frame {
+                return Rerun::Frames;
+            }
+            changed.extend(step.writes(scene));
+            steps.push(i);
+        }
+        Rerun::Steps { steps, slots: Vec::new() }
+    }
 }
 
 /// By slot: the step (pass and iteration) that wrote it last.

@@ -19,9 +19,12 @@ pub fn compile(compiler: &shaderc::Compiler, source: &Source) -> Result<Vec<u32>
     }
     let binary = compiler
         .compile_into_spirv(&source.text, shaderc::ShaderKind::Compute, &source.name, "main", Some(&options))
-        .map_err(|e| format!("{}: {e}", source.name))?;
+        .map_err(|e| format!("{}: {}", source.name, source.with_origins(&e.to_string(), &source.name)))?;
     match binary.get_num_warnings() {
         0 => Ok(binary.as_binary().to_vec()),
-        _ => Err(format!("{}: {}", source.name, binary.get_warning_messages())),
+        _ => {
+            let warnings = source.with_origins(&binary.get_warning_messages(), &source.name);
+            Err(format!("{}: {warnings}", source.name))
+        }
     }
 }

@@ -2,6 +2,7 @@
 //! (which compiles) and in the tests (which check that `spirv/` is what `glsl/` says).
 
 use std::path::Path;
+use std::sync::Arc;
 
 /// Options that go into every compilation; a change of them is a change of every shader.
 pub const OPTIONS: &str = "vulkan1.3 spirv1.5 -O -g auto-bind";
@@ -14,6 +15,16 @@ pub struct Source {
     pub defines: Vec<String>,
     /// The text with every include in place.
     pub text: String,
+    /// Where each line of the text comes from.
+    origins: Arc<[Origin]>,
+}
+
+#[derive(Clone)]
+struct Origin {
+    /// Path below glsl/.
+    file: Arc<str>,
+    /// From 1.
+    line: usize,
 }
 
 /// Every variant of every `.comp` below `root`, in order of name.
@@ -44,51 +55,75 @@ fn sorted(folder: &Path) -> Result<Vec<std::path::PathBuf>, String> {
 
 /// A line `// variants: name MACRO MACRO; name ...` names them; without it there is one, unnamed.
 fn variants(root: &Path, file: &Path) -> Result<Vec<Source>, String> {
-    let text = expand(root, file, 0)?;
-    let below = file.strip_prefix(root).unwrap_or(file).with_extension("");
-    let stem = below.to_string_lossy().replace('\\', "/");
+    let (text, origins) = version_first(expand(root, file, 0)?);
+    let origins: Arc<[Origin]> = origins.into();
+    let stem = below(root, &file.with_extension(""));
+    let source = |name: String, defines| Source { name, defines, text: text.clone(), origins: origins.clone() };
     let Some(line) = text.lines().find_map(|l| l.strip_prefix("// variants:")) else {
-        return Ok(vec![Source { name: stem, defines: Vec::new(), text }]);
+        return Ok(vec![source(stem, Vec::new())]);
     };
     line.split(';')
         .map(|variant| {
             let mut words = variant.split_whitespace().map(str::to_string);
             let name = words.next().ok_or_else(|| format!("{}: an empty variant", file.display()))?;
-            Ok(Source { name: format!("{stem}.{name}"), defines: words.collect(), text: text.clone() })
+            Ok(source(format!("{stem}.{name}"), words.collect()))
         })
         .collect()
 }
 
-fn expand(root: &Path, file: &Path, depth: u32) -> Result<String, String> {
+fn below(root: &Path, file: &Path) -> String {
+    file.strip_prefix(root).unwrap_or(file).to_string_lossy().replace('\\', "/")
+}
+
+/// Every line with its includes in place, and where it comes from.
+fn expand(root: &Path, file: &Path, depth: u32) -> Result<Vec<(String, Origin)>, String> {
     if depth > 8 {
         return Err(format!("{}: includes itself", file.display()));
     }
     let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
-    let mut expanded = String::with_capacity(text.len());
-    for line in text.lines() {
+    let name: Arc<str> = below(root, file).into();
+    let mut expanded = Vec::new();
+    for (i, line) in text.lines().enumerate() {
         match line.trim().strip_prefix("#include \"").and_then(|rest| rest.strip_suffix('"')) {
-            Some(name) => expanded.push_str(&expand(root, &root.join("include").join(name), depth + 1)?),
-            None => {
-                expanded.push_str(line);
-                expanded.push('\n');
-            }
+            Some(included) => expanded.extend(expand(root, &root.join("include").join(included), depth + 1)?),
+            None => expanded.push((line.to_string(), Origin { file: name.clone(), line: i + 1 })),
         }
     }
-    // GLSL wants its version first; everything above it is comment.
-    match depth {
-        0 => Ok(version_first(&expanded)),
-        _ => Ok(expanded),
-    }
+    Ok(expanded)
 }
 
-fn version_first(text: &str) -> String {
-    let (version, rest): (Vec<&str>, Vec<&str>) = text.lines().partition(|l| l.starts_with("#version"));
-    format!("{}\n{}\n", version.join("\n"), rest.join("\n"))
+/// GLSL wants its version first; everything above it is comment.
+fn version_first(lines: Vec<(String, Origin)>) -> (String, Vec<Origin>) {
+    let (version, rest): (Vec<_>, Vec<_>) = lines.into_iter().partition(|(line, _)| line.starts_with("#version"));
+    let (mut text, mut origins) = (String::new(), Vec::new());
+    for (line, origin) in version.into_iter().chain(rest) {
+        text.push_str(&line);
+        text.push('\n');
+        origins.push(origin);
+    }
+    (text, origins)
 }
 
 impl Source {
     /// What the SOURCES file holds a hash of.
     pub fn fingerprint(&self) -> String {
         format!("{OPTIONS}\n{}\n{}", self.defines.join(" "), self.text)
+    }
+
+    /// A compiler's message with the places of the files that were edited: `file:LINE:` of the expanded text becomes, for example,
+    /// `include/ray.glsl:12:`. `file` is the name that the compiler was given.
+    pub fn with_origins(&self, message: &str, file: &str) -> String {
+        let place = format!("{file}:");
+        let mut parts = message.split(place.as_str());
+        let mut located = parts.next().unwrap_or_default().to_string();
+        for part in parts {
+            let digits = part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len());
+            let line = part[..digits].parse::<usize>().ok().and_then(|n| self.origins.get(n.checked_sub(1)?));
+            match line {
+                Some(Origin { file, line }) => located.push_str(&format!("{file}:{line}{}", &part[digits..])),
+                None => located.push_str(&format!("{}:{part}", self.name)),
+            }
+        }
+        located
     }
 }

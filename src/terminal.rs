@@ -31,6 +31,7 @@ pub enum Failure {
 
 impl Failure {
     /// The message without its kind.
+    #[cfg(feature = "view")]
     pub fn message(self) -> String {
         let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = self;
         message

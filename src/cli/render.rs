@@ -4,7 +4,8 @@ use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
 use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose};
-use crate::gpu::{Renderer, RendererOptions};
+use crate::gpu::shader_reload::ShaderFolder;
+use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::plan::Plan;
 use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
@@ -44,14 +45,14 @@ pub struct Render {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
-    /// Compile the shaders from this folder instead of using the built-in ones
-    #[cfg(feature = "hot-reload")]
+    /// Compile the shaders from this folder instead of using the built-in ones (needs glslc or glslangValidator)
     #[arg(long, value_name = "DIR")]
     glsl: Option<PathBuf>,
 }
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
+        let options = self.options()?;
         let (mut source, scene) = self.open()?;
         if self.explain {
             let scene = self.input.resolve_sampling(scene);
@@ -68,7 +69,10 @@ impl Render {
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let context = self.input.open_device(self.validate)?;
-        let mut renderer = Renderer::new(&context, scene, &self.options()?).map_err(failed)?;
+        let mut renderer = Renderer::new(&context, scene, &options).map_err(|e| match e {
+            GpuError::Shader { .. } if self.glsl.is_some() => input(e),
+            e => failed(e),
+        })?;
         let send = |frame: Frame| renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed);
         self.input.for_each_frame(&mut *source, send)?;
         renderer.show(0).map_err(failed)?;
@@ -113,18 +117,12 @@ impl Render {
         self.input.open_with(&choice.set)
     }
 
-    #[cfg(feature = "hot-reload")]
     fn options(&self) -> Result<RendererOptions, Failure> {
         let mut options = RendererOptions::default();
         if let Some(folder) = &self.glsl {
-            options.shaders = crate::gpu::hot_reload::compile(folder).map_err(input)?;
+            options.shaders = ShaderFolder::open(folder).map_err(input)?.shaders();
         }
         Ok(options)
-    }
-
-    #[cfg(not(feature = "hot-reload"))]
-    fn options(&self) -> Result<RendererOptions, Failure> {
-        Ok(RendererOptions::default())
     }
 
     fn write_dump(&self, folder: &Path, renderer: &mut Renderer) -> Result<(), Failure> {

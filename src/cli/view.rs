@@ -3,6 +3,7 @@
 use super::view_config::{ConsoleConfig, WindowConfig, rungs};
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::error_report::command::parse_nanoseconds;
+use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::config::{self, Config};
@@ -86,6 +87,10 @@ pub struct View {
     /// Run with Vulkan validation; any message is a failure
     #[arg(long)]
     validate: bool,
+    /// Compile the shaders from this folder instead of using the built-in ones, and again whenever a file there changes. A shader that
+    /// does not compile is reported over the picture (needs glslc or glslangValidator)
+    #[arg(long, value_name = "DIR")]
+    glsl: Option<PathBuf>,
 }
 
 impl View {
@@ -119,6 +124,7 @@ impl View {
         if let Some(device) = device {
             place.device.device = device;
         }
+        let shaders = self.glsl.as_deref().map(ShaderFolder::open).transpose().map_err(input)?;
         let mut first = match kiosk {
             true => None,
             // Open the source before the window: a fault is then reported in the terminal.
@@ -138,7 +144,7 @@ impl View {
                 }
             };
             let (open, options) = wanted.options(factor, wake, startup_fault);
-            Console::new(context, open, options, size)
+            Console::new(context, open, ConsoleOptions { shaders: shaders.clone(), ..options }, size)
         };
         let ran = place.run(Box::new(make)).map_err(|e| match e {
             GpuError::NoSuchDevice { .. } => input(e),

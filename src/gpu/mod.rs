@@ -2,7 +2,7 @@
 //!
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
 //! - `resources` are images and buffers, `slots` those of a scene, `formats` what the device can do with them.
-//! - `pipelines` compiles shaders, `async_compiler` does so on its own thread.
+//! - `pipelines` compiles shaders, `async_compiler` does so on its own thread, `shader_reload` takes them from a folder that is watched.
 //! - `recorder` records one command buffer with the barriers of `barrier_recorder` and the time stamps of `timing`;
 //!   `timeline` says when a submission is done.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
@@ -16,13 +16,12 @@ pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
-#[cfg(feature = "hot-reload")]
-pub mod hot_reload;
 pub mod pass_runner;
 mod pipelines;
 mod recorder;
 mod renderer;
 pub mod resources;
+pub mod shader_reload;
 mod slots;
 mod timeline;
 mod timing;

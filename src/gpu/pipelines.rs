@@ -6,10 +6,11 @@ use super::formats::{self, TexelAccess};
 use super::resources::has_texels;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
+use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
@@ -91,6 +92,41 @@ impl Pipelines {
         if let Some(pipeline) = self.cached(&key) {
             return Ok(pipeline);
         }
+        let pipeline = self.make(&key, pass, scene, args)?;
+        // Another thread may have made the same pipeline meanwhile; either can be used.
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
+        Ok(pipeline)
+    }
+
+    /// Compiles the pipelines of a plan again that use `shaders`, and forgets all others that do. Returns the pipelines of the plan, by
+    /// step. The device must have finished with the previous pipelines, and no other thread may compile any.
+    ///
+    /// # Errors
+    /// As of [`Pipelines::get`]; the previous pipelines stay.
+    pub(super) fn recompile(
+        &self,
+        shaders: &HashSet<String>,
+        plan: &Plan,
+        scene: &Scene,
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        made.retain(|key, _| !shaders.contains(key.0));
+        let mut steps = Vec::with_capacity(plan.steps.len());
+        for step in &plan.steps {
+            let args = step.args();
+            let key = Pipelines::key(step.pass, scene, &args);
+            let pipeline = match made.get(&key) {
+                Some(pipeline) => pipeline.clone(),
+                None => self.make(&key, step.pass, scene, &args)?,
+            };
+            made.insert(key, pipeline.clone());
+            steps.push(pipeline);
+        }
+        *self.made.lock().unwrap_or_else(|e| e.into_inner()) = made;
+        Ok(steps)
+    }
+
+    fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
@@ -105,10 +141,7 @@ impl Pipelines {
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
         let constants = self.context.faults.constants(pass.name, &key.1);
-        let pipeline = Arc::new(Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module)?);
-        // Another thread may have made the same pipeline meanwhile; either can be used.
-        self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
-        Ok(pipeline)
+        Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module).map(Arc::new)
     }
 }
 

@@ -11,6 +11,7 @@ use crate::probe::Geometry;
 use crate::scene::{Input, Scene, SceneError, Settings};
 use crate::source::recorder::Header;
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 /// Frames of a replay that one step sends: a few milliseconds of work.
@@ -184,6 +185,18 @@ impl Session {
                 self.renderer.change(self.views.of(&self.backward).into_owned())?
             }
         };
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    /// Compiles the pipelines of changed shaders again, and draws with them.
+    pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<(), GpuError> {
+        let rerun = self.renderer.reload_shaders(shaders)?;
+        self.run_again(&rerun);
+        Ok(())
+    }
+
+    fn run_again(&mut self, rerun: &Rerun) {
         self.display.invalidate();
         if !matches!(rerun, Rerun::Steps { .. }) {
             // A replay is interrupted: its first frames went through the previous stage 1.
@@ -195,7 +208,6 @@ impl Session {
                 self.display = Display::Empty;
             }
         }
-        Ok(())
     }
 
     /// The volume on display, or the next one to be.

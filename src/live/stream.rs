@@ -6,6 +6,8 @@ use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
+use crate::gpu::pipelines::embedded;
+use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
@@ -33,6 +35,8 @@ pub struct StreamOptions {
     /// Called when the next step has work: the source reported an event, or a pipeline was compiled. If set, pipelines of changed
     /// settings are compiled in the background.
     pub wake: Option<Wake>,
+    /// Shaders to use instead of the embedded ones. Those that change are loaded again between two pictures.
+    pub shaders: Option<Arc<ShaderFolder>>,
 }
 
 impl Default for StreamOptions {
@@ -44,6 +48,7 @@ impl Default for StreamOptions {
             readback: true,
             cine: CineLimits::default(),
             wake: None,
+            shaders: None,
         }
     }
 }
@@ -177,6 +182,16 @@ impl Stream {
 
     fn step_between_pictures(&mut self, patience: Duration) -> Result<Step, StreamError> {
         let Some(session) = &mut self.session else { return Ok(Step::Progress) };
+        if let Some(folder) = &self.options.shaders
+            && let Some(changed) = folder.take_changed()
+        {
+            match session.reload_shaders(&changed) {
+                Ok(()) => folder.accept(),
+                Err(error) if error.is_device_lost() => return Err(error.into()),
+                // The previous pipelines remain.
+                Err(error) => folder.refuse(changed, error.to_string()),
+            }
+        }
         match session.begin()? {
             Begun::Picture => return Ok(Step::Progress),
             Begun::Refused(fault) => {
@@ -318,6 +333,7 @@ impl Stream {
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
+            shaders: self.options.shaders.as_ref().map_or_else(embedded, ShaderFolder::shaders_or_embedded),
             ..gpu::RendererOptions::default()
         };
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;

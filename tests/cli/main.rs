@@ -3,6 +3,7 @@
 mod budget;
 #[path = "../common/mod.rs"]
 mod common;
+#[cfg(feature = "view")]
 mod direct;
 mod docs;
 mod filter;
@@ -10,10 +11,12 @@ mod frames;
 mod inputs;
 mod outputs;
 mod service;
+mod shaders;
 mod signals;
 mod stream;
 mod support_bundle;
 mod verify;
+#[cfg(feature = "view")]
 mod view;
 
 use common::program::*;
@@ -290,4 +293,13 @@ fn the_program_needs_no_source_tree_no_path_and_no_place() {
     let (code, _, err) = finish(&mut command);
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert_eq!(png_size(&folder.path("p.png")), [64, 48]);
+}
+
+#[cfg(not(feature = "view"))]
+#[test]
+fn without_the_feature_view_the_command_says_how_to_have_it() {
+    for arguments in [&["view"][..], &["view", "--help"], &["view", "--source", "sweep.frames", "--full-screen"]] {
+        refuses(arguments, &run(arguments), 2, &["without the feature `view`", "cargo build --release"]);
+    }
+    assert!(!done(&["--help"]).contains("  view"), "help names a command that is not there");
 }

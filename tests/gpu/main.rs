@@ -5,6 +5,7 @@ mod any_scene;
 #[path = "../common/mod.rs"]
 mod common;
 mod conditioning;
+#[cfg(feature = "view")]
 mod console;
 mod cube;
 mod detector;

@@ -23,6 +23,7 @@ use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::queues::oracle::SubmissionLog;
 use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// How a [`Renderer`] runs.
@@ -353,6 +354,25 @@ impl Renderer {
         if !matches!(rerun, Rerun::Steps { .. }) {
             self.filtered_bounds = self.scene.seen;
         }
+        self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
+        Ok(rerun)
+    }
+
+    /// Compiles the pipelines that use `shaders` again, because their source changed. Returns what has to run again, as
+    /// [`Renderer::change`] does.
+    ///
+    /// # Errors
+    /// A shader that does not exist, or that disagrees with the declaration of its pass. The previous pipelines stay.
+    pub fn reload_shaders(&mut self, shaders: &HashSet<String>) -> Result<Rerun, GpuError> {
+        if let Some(fault) = &self.broken {
+            return Err(GpuError::Broken(fault.clone()));
+        }
+        // Its thread may be compiling the previous source.
+        self.compiler = None;
+        self.wait_presented()?;
+        self.collect()?;
+        self.steps = self.pipelines.recompile(shaders, &self.plan, &self.scene)?;
+        let rerun = self.plan.rerun_shaders(&self.scene, |shader| shaders.contains(shader));
         self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
     }

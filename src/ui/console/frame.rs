@@ -25,6 +25,8 @@ const PRESENT_RETRY: Duration = Duration::from_millis(100);
 const BLANK_INTERVAL: Duration = Duration::from_millis(20);
 /// The help needs a window of this height, points.
 const MIN_HELP_HEIGHT: f32 = 200.0;
+/// Lines of a shader compiler's message that are shown.
+const MAX_SHADER_LINES: usize = 12;
 
 impl Console {
     /// Does what is due and returns what the event loop does next.
@@ -51,6 +53,9 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
+        self.needs_redraw |= shader_fault != self.shader_fault;
+        self.shader_fault = shader_fault;
         self.take_statistics(now);
         let before = self.notes.len();
         self.notes.retain(|(until, _)| *until > now);
@@ -299,6 +304,10 @@ impl Console {
         let banner = |title: &str, text: &str, is_fault| Banner { title: title.into(), text: text.into(), is_fault };
         if let Some((fault, _)) = &self.startup_fault {
             return Some(banner(&fault.title, &fault.why, true));
+        }
+        if let Some(fault) = &self.shader_fault {
+            let lines: Vec<&str> = fault.lines().take(MAX_SHADER_LINES).collect();
+            return Some(banner("Shader error: the last good shader is shown", &lines.join("\n"), true));
         }
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         match self.source.state() {

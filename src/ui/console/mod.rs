@@ -15,6 +15,7 @@ use super::picking::Viewport;
 use super::quality_ladder::{self, Rung};
 use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
+use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
 use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
@@ -65,6 +66,8 @@ pub struct ConsoleOptions {
     pub wake: Wake,
     /// A fault that prevents the view: only its message is shown.
     pub startup_fault: Option<StartupFault>,
+    /// Shaders to use instead of the embedded ones. The folder is watched, and shaders that change are loaded again.
+    pub shaders: Option<Arc<ShaderFolder>>,
 }
 
 impl Default for ConsoleOptions {
@@ -88,6 +91,7 @@ impl Default for ConsoleOptions {
             is_kiosk: false,
             wake: Arc::new(|| ()),
             startup_fault: None,
+            shaders: None,
         }
     }
 }
@@ -178,6 +182,11 @@ pub struct Console {
     /// The startup fault, and when to check it next.
     startup_fault: Option<(StartupFault, Instant)>,
     request: LoopRequest,
+    shaders: Option<Arc<ShaderFolder>>,
+    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    shader_fault: Option<String>,
+    /// Reloads `shaders`.
+    _shader_watch: Option<Watch>,
 }
 
 /// Options that never change.
@@ -201,9 +210,15 @@ impl Console {
             readback: false,
             cine: options.cine,
             wake: Some(options.wake.clone()),
+            shaders: options.shaders.clone(),
+        };
+        let watch = options.shaders.as_ref().map(|folder| Watch::new(folder, options.wake.clone())).transpose();
+        let (shader_watch, watch_fault) = match watch {
+            Ok(watch) => (watch, None),
+            Err(fault) => (None, Some(fault)),
         };
         let time_shares: Vec<f64> = options.rungs.iter().map(|rung| rung.time_share).collect();
-        Console {
+        let mut console = Console {
             screen: None,
             stream: Stream::new(context, Feed::none(), controls.settings().clone(), stream_options),
             context: context.clone(),
@@ -241,7 +256,19 @@ impl Console {
             present_retry_at: None,
             startup_fault: options.startup_fault.map(|fault| (fault, now + FAULT_CHECK_INTERVAL)),
             request: LoopRequest::default(),
+            shaders: options.shaders,
+            shader_fault: None,
+            _shader_watch: shader_watch,
+        };
+        if let Some(fault) = watch_fault {
+            console.notify(&fault, true);
         }
+        console
+    }
+
+    /// Why the picture is not drawn with the shaders as they are in their folder now.
+    pub fn shader_fault(&self) -> Option<&str> {
+        self.shader_fault.as_deref()
     }
 
     /// Sets the screen to present to.

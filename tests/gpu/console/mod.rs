@@ -4,6 +4,7 @@ mod failures;
 mod gestures;
 mod idle;
 mod monkey;
+mod shaders;
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
@@ -53,6 +54,7 @@ pub fn options() -> ConsoleOptions {
         is_kiosk: false,
         wake: Arc::new(|| ()),
         startup_fault: None,
+        shaders: None,
     }
 }
 

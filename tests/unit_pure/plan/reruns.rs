@@ -191,3 +191,23 @@ fn a_filter_with_an_overwritten_input_reruns_the_filters_before_it() {
     let first = [("tile_ranges", 0), ("brick_ranges", 0)];
     assert_eq!(stale_after(&[("brick_ranges", 0)], &Contents::new()), first);
 }
+
+#[test]
+fn another_shader_runs_its_passes_and_what_reads_their_results() {
+    let scene = with("");
+    let plan = Plan::new(&scene);
+    let again = |shader: &str| match plan.rerun_shaders(&scene, |name| name.starts_with(shader)) {
+        Rerun::Steps { steps, slots } => {
+            assert!(slots.is_empty(), "{shader}: the scene is the same");
+            let mut passes: Vec<_> = steps.iter().map(|i| plan.steps[*i].pass.name).collect();
+            passes.dedup();
+            passes.join(" ")
+        }
+        other => format!("{other:?}"),
+    };
+    assert_eq!(again("raycast/volume"), "", "it is not used");
+    assert_eq!(again("postprocess/tone"), "tone");
+    assert_eq!(again("shade/light"), "light tone");
+    assert_eq!(again("raycast/surface"), "raycast_surface median_distance bilateral_distance light tone");
+    assert_eq!(again("preprocess/scan_convert"), "Frames");
+}
