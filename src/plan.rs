@@ -162,7 +162,7 @@ impl Plan {
         let (mut changed, mut steps) = (Vec::new(), Vec::new());
         for (i, step) in self.steps.iter().enumerate() {
             let reads = step.reads(scene);
-            if !is_changed((step.pass.shader)(scene, &step.args())) && !reads.iter().any(|s| changed.contains(s)) {
+            if !is_changed(step.pass.shader(scene, &step.args())) && !reads.iter().any(|s| changed.contains(s)) {
                 continue;
             }
             if step.pass.frequency == Frequency::Frame {

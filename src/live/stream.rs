@@ -6,7 +6,6 @@ use super::phase::{Pending, Phase};
 use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
-use crate::gpu::pipelines::embedded;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
 use crate::scene::{Scene, SceneError, Settings};
@@ -328,14 +327,16 @@ impl Stream {
         }
         self.cine.discard_partial();
         let mut pool = VolumePool::new(self.options.update, self.options.images, slices);
-        let options = gpu::RendererOptions {
+        let mut options = gpu::RendererOptions {
             volume_images: pool.images(),
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
-            shaders: self.options.shaders.as_ref().map_or_else(embedded, ShaderFolder::shaders_or_embedded),
             ..gpu::RendererOptions::default()
         };
+        if let Some(folder) = &self.options.shaders {
+            options.shaders = folder.shaders_or_embedded();
+        }
         let renderer = Renderer::new(&self.context, views.first().clone(), &options)?;
         if let Some(previous) = self.previous_pool.take() {
             pool.continue_from(previous);
