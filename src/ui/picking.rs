@@ -105,7 +105,7 @@ pub(super) enum Pane {
 
 impl<'a> Viewport<'a> {
     /// Converts a position in the window to pixels of the picture.
-    fn to_pixel(&self, scene: &Scene, at: [f64; 2]) -> Option<[f64; 2]> {
+    fn pixel_of(&self, scene: &Scene, at: [f64; 2]) -> Option<[f64; 2]> {
         let size = scene.picture_size().map(f64::from);
         let pixel: [f64; 2] = std::array::from_fn(|a| (at[a] - self.corner[a]) / self.size[a] * size[a]);
         pixel.iter().all(|v| v.is_finite()).then_some(pixel)
@@ -114,7 +114,7 @@ impl<'a> Viewport<'a> {
     /// The scene, and a position in the window as pixels of the picture; it may be outside of the picture.
     pub(super) fn pixel_at(&self, at: [f64; 2]) -> Option<(&'a Scene, [f64; 2])> {
         let scene = self.scene?;
-        Some((scene, self.to_pixel(scene, at)?))
+        Some((scene, self.pixel_of(scene, at)?))
     }
 
     /// The pane at a position in the window; none outside of the picture and in empty cells.

@@ -204,7 +204,7 @@ impl Verify {
     }
 
     fn write(&self, run: &Run, compared: Option<&BaselineComparison>) -> Result<(), Failure> {
-        put(&self.json, || report::to_json(&run).map_err(|e| e.to_string()))?;
+        put(&self.json, || report::to_json(run).map_err(|e| e.to_string()))?;
         put(&self.junit, || junit::junit(run, compared))?;
         put(&self.html, || html::html(run, compared))
     }

@@ -105,7 +105,7 @@ fn no_wrong_probe_or_scene_file_is_taken_for_a_default() {
 #[test]
 fn no_wrong_setting_is_refused_without_its_flag_or_name() {
     let folder = Folder::new("settings");
-    let wrong = "--device 4096 | there are: 0 ;--device no such card | there are: 0 ;--preset foetal | bone, fetal;\
+    let wrong = "--device 4096 | available: 0 ;--device no such card | available: 0 ;--preset foetal | bone, fetal;\
                  --mode sideways | --mode;--volume 1 | --volume 1;--size 64 | --size;--size 64x | --size;\
                  --size 64x48x2 | --size;--size 1.5x2 | --size;--size 0x0 | 0x0;--size 16385x1 | 16384;\
                  --camera azimuth | --camera;--camera azimuth=east | --camera;--camera azimut=1 | --camera;\
@@ -164,7 +164,7 @@ fn info_does_not_hide_the_facts_and_devices_not_the_software() {
     let (before, after) = devices.split_once("    picked:").expect("one is picked");
     let head = before.lines().rfind(|l| !l.starts_with(' ')).expect("it has a name");
     let software = head.contains("(software,");
-    assert_eq!(after.lines().next().is_some_and(|l| l.contains("It is software")), software, "{devices}");
+    assert_eq!(after.lines().next().is_some_and(|l| l.contains("It is a software device")), software, "{devices}");
     let folder = Folder::new("devices");
     let said = render(BONE, &folder.path("p.png"), &[]);
     assert!(said.starts_with("device: ") && said.contains("(software: no GPU is used)") == software, "{said}");
@@ -190,7 +190,7 @@ fn no_slot_is_missing_from_the_dump_and_no_pass_from_the_times() {
     let plan = explain(SWEEP, &["--size", "64x48", "--preset", "fetal"]);
     let (passes, slots) = plan.split_once("\nslots\n").expect("slots are listed");
     let mut slots = first_words(slots, "    ");
-    assert_eq!(slots.pop().as_deref(), Some("in"), "the sum comes last");
+    assert_eq!(slots.pop().as_deref(), Some("total"), "the sum comes last");
     let dump = Folder(folder.0.join("new/dump"));
     let said = render(SWEEP, &folder.path("p.png"), &["--preset", "fetal", "--timings", "--dump", &dump.path("")]);
     let slots: BTreeSet<String> = slots.iter().map(|s| format!("{s}.png")).collect();

@@ -67,7 +67,7 @@ fn a_run_like_the_baseline_has_not_changed_and_one_that_is_slower_or_wrong_has()
     let chosen = [&FEW[..], &["--only", "median_distance"]].concat();
     let (file, earlier) = kept(&folder, "before.json", &chosen);
     let again = |name: &str, changed: &Run, threshold: &str| {
-        let file = folder.write(name, report::to_json(&changed).expect("JSON"));
+        let file = folder.write(name, report::to_json(changed).expect("JSON"));
         verify(&[&chosen[..], &["--baseline", &file, "--threshold", threshold]].concat())
     };
     // A busy machine is no slower device: any time passes that is not a hundred times longer.
@@ -112,7 +112,7 @@ fn refusals_of_verify_are_one_line_with_their_own_exit_code() {
     refuses(&["--json"], &full, 1, &["/dev/full: cannot be written"]);
     let (code, _, err) = verify(&["--quick", "--full"]);
     assert!(code == Some(2) && err.contains("cannot be used with"), "{err}");
-    refuses(&["--device"], &verify(&["--device", "no such card"]), 3, &["no such card", "there are"]);
+    refuses(&["--device"], &verify(&["--device", "no such card"]), 3, &["no such card", "available"]);
     let without = finish(without_device(Command::new(PROGRAM).arg("verify")));
     refuses(&["no driver"], &without, 3, &["no Vulkan device"]);
     assert_eq!(folder.names().len(), 2, "{:?}", folder.names());

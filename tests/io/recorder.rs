@@ -66,7 +66,7 @@ fn all(replay: &mut Reader) -> Vec<(Frame, f64)> {
 fn every_frame_comes_back_byte_for_byte_with_an_index_and_without() {
     let folder = Folder::new("back");
     for finished in [true, false] {
-        let path = folder.join(&format!("{finished}.frames"));
+        let path = folder.join(format!("{finished}.frames"));
         written(&path, finished);
         let mut replay = Reader::open(&path).expect("opened");
         assert_eq!((replay.rebuilt(), replay.damaged(), replay.lost()), (!finished, 0, 0));

@@ -167,7 +167,7 @@ fn no_top_level_module_depends_on_itself_through_others() {
     let edges = dependencies();
     let tops = graph(edges.iter().map(|(from, to)| (from[0].clone(), to[0].clone())));
     assert!(tops.len() > 10, "the modules are read: {tops:?}");
-    for cycle in cycles(&tops) {
+    if let Some(cycle) = cycles(&tops).first() {
         let between = edges.iter().filter(|(a, b)| a[0] != b[0] && cycle.contains(&a[0]) && cycle.contains(&b[0]));
         let lines: Vec<String> = between.map(|(a, b)| format!("  {} -> {}", a.join("::"), b.join("::"))).collect();
         panic!("modules depend on each other in a cycle: {}\n{}", cycle.join(", "), lines.join("\n"));

@@ -19,7 +19,7 @@ impl Area {
     }
 
     /// Converts values of the axes to a position on the screen.
-    pub(super) fn from_raw(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
+    pub(super) fn scaled(&self, raw: [i32; 2], spans: &[Span; 2]) -> [f64; 2] {
         self.clamp([0, 1].map(|n| spans[n].fraction(raw[n]) * (f64::from(self.0[n].max(1)) - 1.0)))
     }
 
@@ -88,7 +88,7 @@ impl Fingers {
             slot.is_replaced = false;
             // A finger without a position is reported once it moves.
             let (Some(_), false, [Some(x), Some(y)]) = (slot.tracking_id, slot.is_palm, slot.raw) else { continue };
-            let at = area.from_raw([x, y], spans);
+            let at = area.scaled([x, y], spans);
             match &mut slot.reported {
                 None => {
                     *count += 1;

@@ -229,7 +229,7 @@ impl Translator {
         let mut to = None;
         match (&device.profile.pointing, device.place) {
             (Pointing::Absolute(spans), [Some(x), Some(y)]) if has_position => {
-                to = Some(self.area.from_raw([x, y], spans))
+                to = Some(self.area.scaled([x, y], spans))
             }
             (Pointing::Pad(spans), _) => match device.pad.report(spans) {
                 Some(PadMotion::Pointer(by)) => {

@@ -230,7 +230,7 @@ pub(super) const FAULTS: &[InjectedFault] = &[
     },
     InjectedFault {
         name: "region off",
-        what: "the box that is rendered lies half a pixel of a slice isolated",
+        what: "the rendered box is shifted by half a pixel of a slice",
         change: Change::Numbers {
             pass: "raycast_projection",
             by: |scene, params| {

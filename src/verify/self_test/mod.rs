@@ -42,8 +42,8 @@ impl Detection {
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
             _ if self.left_out => (Verdict::LeftOut, Vec::new(), Some(self.message.clone())),
-            Some(by) => (Verdict::Passed, Vec::new(), Some(format!("detection by {by}: {}", self.message))),
-            None => (Verdict::Failed, vec![Fault::new(format!("not detection: {}", self.message))], None),
+            Some(by) => (Verdict::Passed, Vec::new(), Some(format!("caught by {by}: {}", self.message))),
+            None => (Verdict::Failed, vec![Fault::new(format!("not caught: {}", self.message))], None),
         };
         Outcome {
             group: "self-test".into(),

@@ -75,7 +75,7 @@ fn no_wrong_flag_is_taken_for_a_default() {
         (&["sigma:window=wide"], &["--filter sigma:window=wide"]),
         (&["sigma:sigma=-1"], &["slices.sigma", "at least 0"]),
         (&["median:size=5"], &["median has no settings"]),
-        (&["estimator:edges=1"], &["estimator has no \"edges\"", "kind, edge"]),
+        (&["estimator:edges=1"], &["estimator has no key \"edges\"", "kind, edge"]),
         (&["estimator:kind=mode"], &["--filter estimator:kind=mode", "nagao-matsuyama"]),
         (&["perona-malik:step=0.3"], &["slices.perona_malik", "0.25"]),
         (&["enhanced-sigma:largest=3"], &["slices.enhanced_sigma", "less than window"]),
@@ -95,7 +95,7 @@ fn no_wrong_flag_is_taken_for_a_default() {
         (["--region", "0,0,31,20"], "the picture is 30 x 20"),
         (["--region", "0,0,5"], "X,Y,WIDTH,HEIGHT"),
         (["--region", "3,3,1,1"], "fewer than two"),
-        (["--device", "no such device"], "there are"),
+        (["--device", "no such device"], "available"),
     ] {
         refused(&[&[&input, "-o", &output, "--filter", "median"], &flags[..]].concat(), 2, &[named]);
     }

@@ -17,15 +17,15 @@ fn a_file_cut_off_anywhere_is_one_line_and_no_panic() {
         ("small.vol", kretz(&[-0.1, 0.0, 0.1], &[-0.1, 0.1], b"")),
     ];
     for (name, whole) in &small {
-        assert!(total(&folder.write(name, whole)).is_ok(), "{name}");
+        assert!(total(folder.write(name, whole)).is_ok(), "{name}");
         for cut in 0..whole.len() {
-            assert!(total(&folder.write(name, &whole[..cut])).is_err(), "{name} cut at {cut} of {}", whole.len());
+            assert!(total(folder.write(name, &whole[..cut])).is_err(), "{name} cut at {cut} of {}", whole.len());
         }
     }
     for (name, whole, header) in [("sweep.mha", sweep, 470), ("sweep.vol", volume, 1500)] {
         let data = (1..20).map(|i| i * (whole.len() - 1) / 19);
         for cut in (0..header).chain(data) {
-            let error = total(&folder.write(name, &whole[..cut])).unwrap_err();
+            let error = total(folder.write(name, &whole[..cut])).unwrap_err();
             assert!(error.contains(name), "{error}");
         }
     }
@@ -87,14 +87,14 @@ fn header_numbers_that_cannot_be_true_are_refused_by_name() {
     ];
     for (from, to, named) in faults {
         assert!(good.contains(from));
-        let error = total(&folder.write("n.mha", good.replacen(from, to, 1))).unwrap_err();
+        let error = total(folder.write("n.mha", good.replacen(from, to, 1))).unwrap_err();
         assert!(error.contains(named), "{from} -> {to}: {error}");
     }
     let endless = "Comment = x\n".repeat(200_000);
-    assert!(total(&folder.write("n.mha", endless)).unwrap_err().contains("ElementDataFile"));
-    assert!(total(&folder.write("n.png", b"\x89PNG")).unwrap_err().contains("MetaImage"));
+    assert!(total(folder.write("n.mha", endless)).unwrap_err().contains("ElementDataFile"));
+    assert!(total(folder.write("n.png", b"\x89PNG")).unwrap_err().contains("MetaImage"));
     assert!(total(&folder.0).unwrap_err().contains("regular file"));
-    assert!(total(&folder.join("absent.mha")).unwrap_err().contains("absent.mha"));
+    assert!(total(folder.join("absent.mha")).unwrap_err().contains("absent.mha"));
 }
 
 /// Changes to a file: places and new bytes, and where to cut it.
@@ -110,7 +110,7 @@ fn damaged(mut whole: Vec<u8>, changes: &[(usize, u8)], cut: usize) -> Vec<u8> {
 /// Reads the bytes under both file endings and checks that no more frames come out than the bytes can hold.
 fn read_hostile(folder: &Folder, bytes: &[u8]) {
     for name in ["x.mha", "x.vol"] {
-        if let Ok(read) = total(&folder.write(name, bytes)) {
+        if let Ok(read) = total(folder.write(name, bytes)) {
             assert!(read.len() <= bytes.len() * 1032 + (1 << 20), "{} bytes from {}", read.len(), bytes.len());
         }
     }

@@ -10,7 +10,7 @@ fn forward_and_backward_sweeps_keep_their_slices_in_geometric_order() {
     let data: Vec<u8> = (0..7).flat_map(|frame| [frame; 8]).collect();
     folder.write("s.probe.toml", TABLE);
     let more = "UltrasoundImageType = BRIGHTNESS\nUltrasoundImageOrientation = FM\n";
-    let mut recording = open(&folder.write("s.mha", image("4 2 7", "MET_UCHAR", more, &data)));
+    let mut recording = open(folder.write("s.mha", image("4 2 7", "MET_UCHAR", more, &data)));
     assert_eq!((recording.volumes(), recording.frames_in_file()), (2, 7));
     let frames = all_frames(&mut recording).unwrap();
     let order: Vec<_> = frames.iter().map(|f| (f.volume, f.number, f.slice, f.backward, f.bytes[0])).collect();

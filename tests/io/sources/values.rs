@@ -7,7 +7,7 @@ fn both_forms_of_the_wobbler_sweep_are_one_sweep() {
     // Away from the probe file, each must know its own geometry.
     let copies = ["sweep.mha", "sweep.vol"].map(|n| folder.write(n, fs::read(stored("wobbler-4dc7").join(n)).unwrap()));
     let paths = [copies[0].as_ref(), copies[1].as_ref(), Path::new(SWEEP)];
-    let mut recordings = paths.map(|p| open(p));
+    let mut recordings = paths.map(open);
     assert_eq!(
         recordings.each_ref().map(|r| r.format()),
         ["MetaImage pre-scan sweep", "Kretz volume", "MetaImage pre-scan sweep"]
@@ -37,7 +37,7 @@ fn both_forms_of_the_wobbler_sweep_are_one_sweep() {
 
 #[test]
 fn the_ultrasonix_frames_are_polar_by_their_probe_file_and_pictures_are_not() {
-    let mut polar = open(&stored("ultrasonix-curvilinear/brightness.mha"));
+    let mut polar = open(stored("ultrasonix-curvilinear/brightness.mha"));
     assert_eq!(polar.format(), "PLUS sequence");
     assert_eq!((polar.volumes(), polar.frames_per_volume()), (5, 1));
     let probe = probe_of(&polar);
@@ -49,7 +49,7 @@ fn the_ultrasonix_frames_are_polar_by_their_probe_file_and_pictures_are_not() {
     assert_eq!(frames.iter().map(|f| f.time.unwrap()).collect::<Vec<_>>(), [98.0, 98.01, 98.02, 99.03, 99.04]);
     assert_eq!(frames.iter().map(|f| f.volume).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
 
-    let mut pictures = open(&stored("ultrasonix-curvilinear/scan-converted.mha"));
+    let mut pictures = open(stored("ultrasonix-curvilinear/scan-converted.mha"));
     let Geometry::Cartesian(grid) = pictures.geometry(4) else { panic!("820 x 616 pictures are not scan lines") };
     assert_eq!((grid.size, pictures.volumes()), ([820, 616, 1], 5));
     assert_eq!(all_frames(&mut pictures).unwrap().iter().map(|f| f.bytes.len()).sum::<usize>(), 820 * 616 * 5);
@@ -89,7 +89,7 @@ fn a_compressed_file_holds_the_same_frames_as_its_raw_bytes() {
 
 #[test]
 fn the_bone_is_cartesian() {
-    let mut bone = open(&stored("bone-l14/bone.mha"));
+    let mut bone = open(stored("bone-l14/bone.mha"));
     let Geometry::Cartesian(grid) = bone.geometry(0) else { panic!("no probe was given") };
     assert_eq!((grid.size, grid.spacing, grid.origin), ([160, 216, 33], [0.25, 0.25, 0.35], [0.0; 3]));
     assert_eq!((bone.format(), bone.volumes(), bone.range()), ("MetaImage", 1, [0.0, 255.0]));
@@ -140,7 +140,7 @@ fn samples_that_are_not_finite_are_counted_and_replaced() {
     assert_eq!(read, clean);
     assert_eq!(recording.replaced(), 3, "a second reading counts nothing twice");
     let nothing: Vec<u8> = [f32::NAN; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
-    let [low, high] = open(&folder.write("n.mha", image("2 2 2", "MET_FLOAT", "", &nothing))).range();
+    let [low, high] = open(folder.write("n.mha", image("2 2 2", "MET_FLOAT", "", &nothing))).range();
     assert!(low < high);
 }
 
@@ -166,7 +166,7 @@ fn missing_parts_of_a_kretz_file_are_named() {
     let folder = Folder::new("kretz");
     let wavelet = folder.write("w.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(2, 0x1100, b"xy")));
     assert!(total(&wavelet).unwrap_err().contains("wavelet"));
-    let several = open(&folder.write("4d.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(0xd600, 1, b"xy"))));
+    let several = open(folder.write("4d.vol", kretz(&[-0.1, 0.1], &[-0.1, 0.1], &item(0xd600, 1, b"xy"))));
     assert!(several.description().iter().any(|(title, _)| title == "4D"));
     // Without tables the voxels are Cartesian, the radial step apart.
     let plain = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");
@@ -181,15 +181,15 @@ fn missing_parts_of_a_kretz_file_are_named() {
 fn no_patient_field_is_ever_shown() {
     let folder = Folder::new("patient");
     let whole = kretz(&[-0.1, 0.1], &[-0.1, 0.1], b"");
-    let mut shown = format!("{:?}", open(&folder.write("p.vol", &whole)).description());
+    let mut shown = format!("{:?}", open(folder.write("p.vol", &whole)).description());
     for cut in 0..whole.len() {
-        shown += &total(&folder.write("p.vol", &whole[..cut])).unwrap_err();
+        shown += &total(folder.write("p.vol", &whole[..cut])).unwrap_err();
     }
     let more = "PatientName = SECRET^PATIENT\nSeq_Frame0000_PatientName = SECRET\nComment = SECRET\n";
     let whole = image("2 2 2", "MET_UCHAR", more, &[1; 8]);
-    shown += &format!("{:?}", open(&folder.write("p.mha", &whole)).description());
+    shown += &format!("{:?}", open(folder.write("p.mha", &whole)).description());
     for cut in 0..whole.len() {
-        shown += &total(&folder.write("p.mha", &whole[..cut])).unwrap_err();
+        shown += &total(folder.write("p.mha", &whole[..cut])).unwrap_err();
     }
     assert!(!shown.contains("SECRET"), "{shown}");
 }
@@ -199,7 +199,7 @@ fn line_ends_of_another_system_do_not_shift_the_data() {
     let folder = Folder::new("line-ends");
     let header = String::from_utf8(image("4 3   2", "MET_UCHAR", "\n  \n", b"")).unwrap().replace('\n', "\r\n");
     let data: Vec<u8> = (0..24).collect();
-    assert_eq!(total(&folder.write("l.mha", [header.as_bytes(), &data].concat())), Ok(data));
+    assert_eq!(total(folder.write("l.mha", [header.as_bytes(), &data].concat())), Ok(data));
 }
 
 #[test]
@@ -217,9 +217,9 @@ fn data_in_a_second_file_are_found_behind_its_header() {
         let text = String::from_utf8(image("4 3 2", "MET_UCHAR", more, b"")).unwrap();
         folder.write("h.mhd", text.replace("LOCAL", "raw.bin"))
     };
-    assert_eq!(total(&header("HeaderSize = -1\n")), Ok(data.clone()));
-    assert_eq!(total(&header("HeaderSize = 7\n")), Ok(data.clone()));
-    assert!(total(&header("HeaderSize = 8\n")).unwrap_err().contains("23 of 24"));
-    assert_eq!(total(&header("")).unwrap()[..7], [9; 7]);
-    assert!(open(&header("")).description().iter().any(|(title, _)| title == "more data"));
+    assert_eq!(total(header("HeaderSize = -1\n")), Ok(data.clone()));
+    assert_eq!(total(header("HeaderSize = 7\n")), Ok(data.clone()));
+    assert!(total(header("HeaderSize = 8\n")).unwrap_err().contains("23 of 24"));
+    assert_eq!(total(header("")).unwrap()[..7], [9; 7]);
+    assert!(open(header("")).description().iter().any(|(title, _)| title == "more data"));
 }
