@@ -43,7 +43,7 @@ fn faulty_frames_are_reported_and_left_out() {
     let faults = run(&mut stream, |_, picture| shown.push(picture.volume));
     assert_eq!(shown.last(), Some(&4), "{shown:?}: {faults:?}");
     let expected = [
-        "not told",
+        "not announced",
         "1000 bytes",
         "1600 bytes",
         "1280 bytes",
