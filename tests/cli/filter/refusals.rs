@@ -81,16 +81,16 @@ fn no_wrong_flag_is_taken_for_a_default() {
         (&["enhanced-sigma:largest=3"], &["slices.enhanced_sigma", "less than window"]),
         (&["median", "median"], &["median is given twice"]),
         (&["gaussian"], &["give lateral, depth or both"]),
-        (&["gaussian:elevation=1"], &["reach across slices"]),
-        (&["gaussian:kernel=3"], &["reach across slices"]),
-        (&["gaussian:depth=1", "blur"], &["a gaussian blurs already"]),
+        (&["gaussian:elevation=1"], &["need several slices"]),
+        (&["gaussian:kernel=3"], &["need several slices"]),
+        (&["gaussian:depth=1", "blur"], &["cannot be combined with gaussian"]),
         (&["gaussian:lateral=900"], &["slices.smooth.lateral", "at most 32"]),
     ] {
         let flags: Vec<&str> = filters.iter().flat_map(|f| ["--filter", f]).collect();
         refused(&[&[&input, "-o", &output], &flags[..]].concat(), 2, named);
     }
     let still = &["--growth-table", "--filter", "enhanced-sigma:sigma=0"];
-    refused(&[&[&*input], &still[..]].concat(), 2, &["a sigma of 0"]);
+    refused(&[&[&*input], &still[..]].concat(), 2, &["sigma must be above 0"]);
     for (flags, named) in [
         (["--region", "0,0,31,20"], "the picture is 30 x 20"),
         (["--region", "0,0,5"], "X,Y,WIDTH,HEIGHT"),
