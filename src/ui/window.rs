@@ -68,6 +68,7 @@ pub fn run(
         wake,
         wake_pending,
         window: None,
+        size: [0; 2],
         context: None,
         console: None,
         failed: None,
@@ -93,6 +94,8 @@ struct WindowLoop<'a> {
     console: Option<Console>,
     context: Option<Arc<Context>>,
     window: Option<Arc<Window>>,
+    /// As the last event has it. To ask the window would panic inside winit once the X server has destroyed it, before that event arrives.
+    size: [u32; 2],
     failed: Option<GpuError>,
     recovery: Recovery,
     ends: Option<Instant>,
@@ -105,7 +108,7 @@ impl WindowLoop<'_> {
         }
         let window = self.new_window(events)?;
         let context = Context::for_presentation(self.device, &Target::Window(window.clone()))?;
-        let size = size_of(&window);
+        let size = self.size;
         let screen = Screen::new(&context, Target::Window(window.clone()), size, self.options.present_mode)?;
         let mut console = (self.make)(&context, size, window.scale_factor() as f32, self.wake.clone());
         console.set_screen(Some(screen));
@@ -114,8 +117,9 @@ impl WindowLoop<'_> {
         Ok(())
     }
 
-    fn new_window(&self, events: &ActiveEventLoop) -> Result<Arc<Window>, GpuError> {
-        let [width, height] = self.options.size;
+    fn new_window(&mut self, events: &ActiveEventLoop) -> Result<Arc<Window>, GpuError> {
+        self.size = self.options.size;
+        let [width, height] = self.size;
         let full = self.options.full_screen.then(|| Fullscreen::Borderless(self.monitor(events)));
         let attributes = Window::default_attributes()
             .with_title("Echolume")
@@ -134,6 +138,7 @@ impl WindowLoop<'_> {
         if self.window.is_none() {
             self.window = Some(self.new_window(events).map_err(|fault| (lost, fault))?);
         }
+        let size = self.size;
         let (Some(window), Some(console), Some(context)) = (&self.window, &mut self.console, &mut self.context) else {
             return Ok(());
         };
@@ -142,7 +147,7 @@ impl WindowLoop<'_> {
             target: Target::Window(window.clone()),
             present_mode: self.options.present_mode,
         };
-        output.restore(console, context, &|_| Ok(size_of(window)), lost).map(drop)
+        output.restore(console, context, &|_| Ok(size), lost).map(drop)
     }
 
     fn update(&mut self, events: &ActiveEventLoop) {
@@ -179,7 +184,7 @@ impl WindowLoop<'_> {
         if let (true, Some(window), Some(context)) = (next.restart, &self.window, &self.context) {
             let screen = self.console.take().and_then(Console::into_screen);
             let factor = window.scale_factor() as f32;
-            let mut console = (self.make)(context, size_of(window), factor, self.wake.clone());
+            let mut console = (self.make)(context, self.size, factor, self.wake.clone());
             console.set_screen(screen);
             self.console = Some(console);
         }
@@ -196,11 +201,6 @@ impl WindowLoop<'_> {
             false => ControlFlow::WaitUntil(at),
         }));
     }
-}
-
-fn size_of(window: &Window) -> [u32; 2] {
-    let size = window.inner_size();
-    [size.width, size.height]
 }
 
 impl ApplicationHandler<()> for WindowLoop<'_> {
@@ -221,7 +221,10 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
             }
             WindowEvent::Destroyed => events.exit(),
             WindowEvent::CloseRequested if !self.options.stays_open => events.exit(),
-            WindowEvent::Resized(size) => console.resize([size.width, size.height]),
+            WindowEvent::Resized(size) => {
+                self.size = (*size).into();
+                console.resize(self.size);
+            }
             WindowEvent::RedrawRequested | WindowEvent::Occluded(false) => console.redraw(),
             _ => {}
         }
