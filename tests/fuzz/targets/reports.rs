@@ -5,7 +5,7 @@ use echolume::error_report::{Measure, Report, choose, export as error_export};
 use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
-use echolume::ui::quality_ladder;
+use echolume::ui::frame_budget::measured_ladder;
 use echolume::verify::report::{self, baseline, html as page, junit, summary};
 
 pub fn error_report(bytes: &[u8]) -> String {
@@ -24,7 +24,7 @@ pub fn error_report(bytes: &[u8]) -> String {
     #[cfg(not(feature = "view"))]
     let rungs = 0;
     #[cfg(feature = "view")]
-    let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
+    let rungs = measured_ladder(&report).map_or(0, |rungs| rungs.len());
     format!("{} {rungs} {}", outcome.len(), error_export::csv(&report).len())
 }
 
