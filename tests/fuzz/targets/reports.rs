@@ -6,7 +6,7 @@ use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
 use echolume::ui::frame_budget::measured_ladder;
-use echolume::verify::report::{self, baseline, html as page, junit, summary};
+use echolume::verify::report::{self, baseline, html as page, junit};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -68,5 +68,5 @@ pub fn verification(bytes: &[u8]) -> String {
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
     page::html(&run, Some(&compared)).expect("a page");
-    told(summary::summary(&run))
+    told(report::summary(&run))
 }
