@@ -2,27 +2,20 @@
 //!
 //! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device.
 
-mod convert;
-mod devices;
 mod filter;
-mod info;
-mod phantom;
+mod machine;
 mod probe;
+mod recordings;
 mod render;
-mod report;
 mod stream;
-mod support_bundle;
 #[cfg(feature = "view")]
-mod view;
-#[cfg(not(feature = "view"))]
-#[path = "no_view.rs"]
 mod view;
 #[cfg(feature = "view")]
 mod view_config;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::terminal::{self, Failure, failed, input};
-use crate::{profile, verify};
+use crate::{error_report, profile, thesis_tables, verify};
 use clap::{Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
@@ -68,19 +61,42 @@ enum Command {
     /// Test whether this device and its driver render correctly
     Verify(verify::command::Verify),
     /// Report error against run time for each dial, or the tables of the thesis
-    Report(report::Report),
+    Report(Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
-    Phantom(phantom::MakePhantom),
+    Phantom(recordings::MakePhantom),
     /// Resample a volume to a Cartesian grid (.mha, .nrrd), or convert frames
-    Convert(convert::Convert),
+    Convert(recordings::Convert),
     /// Describe a recording, without patient fields
-    Info(info::Info),
+    Info(recordings::Info),
     /// Drive the motor of a probe: home, sweep, stop; or simulate one
     Probe(probe::Probe),
     /// List the Vulkan devices, their missing features, and which one would be used
-    Devices(devices::Devices),
+    Devices(machine::Devices),
     /// Pack versions, devices, configuration and logs for support, without recordings, pictures or names
-    SupportBundle(support_bundle::SupportBundle),
+    SupportBundle(machine::SupportBundle),
+}
+
+#[derive(clap::Args)]
+struct Report {
+    #[command(subcommand)]
+    kind: ReportKind,
+}
+
+#[derive(Subcommand)]
+enum ReportKind {
+    /// Measure error against run time: renders and times every setting of each dial and compares it with the reference
+    Error(Box<error_report::command::ErrorReport>),
+    /// Measure the thesis' tables of times under its conditions, and print them with its figures
+    Tables(thesis_tables::command::ThesisTables),
+}
+
+impl Report {
+    fn run(&self) -> Result<(), Failure> {
+        match &self.kind {
+            ReportKind::Error(error) => error.run(),
+            ReportKind::Tables(tables) => tables.run(),
+        }
+    }
 }
 
 /// Parses the command line and runs it.
@@ -172,4 +188,29 @@ fn start_log(
         }
     }
     Ok(())
+}
+
+/// `echolume view` in a build without the feature `view`: says how to have it.
+#[cfg(not(feature = "view"))]
+mod view {
+    use crate::terminal::{Failure, input};
+    use std::ffi::OsString;
+    use std::path::PathBuf;
+
+    #[derive(clap::Args)]
+    pub struct View {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        _arguments: Vec<OsString>,
+    }
+
+    impl View {
+        pub fn run(self) -> Result<(), Failure> {
+            Err(input("view: this program was built without the feature `view`; build it with `cargo build --release`"))
+        }
+
+        /// The configuration is not read.
+        pub fn log(&self) -> Option<(PathBuf, u64, u32)> {
+            None
+        }
+    }
 }

@@ -9,7 +9,7 @@ use crate::live::cine::CineLimits;
 use crate::source::live::Live;
 use crate::terminal::{Failure, failed, input};
 use crate::ui::console::{Console, ConsoleOptions, StartupFault};
-use crate::ui::quality_ladder::{self, Rung};
+use crate::ui::frame_budget::{Rung, built_in_ladder, measured_ladder};
 use crate::ui::source_supervisor::OpenSource;
 use crate::ui::window::{self, MakeConsole, WindowOptions};
 use std::path::Path;
@@ -160,8 +160,9 @@ fn stamp() -> String {
 /// The quality steps that hold the frame budget: those of a report, or the built-in ones.
 pub fn rungs(report: Option<&Path>) -> Result<Vec<Rung>, Failure> {
     match report {
-        None => Ok(quality_ladder::built_in()),
-        Some(file) => quality_ladder::measured(&read_report(file)?)
-            .map_err(|e| failed(format!("--report {}: {e}", file.display()))),
+        None => Ok(built_in_ladder()),
+        Some(file) => {
+            measured_ladder(&read_report(file)?).map_err(|e| failed(format!("--report {}: {e}", file.display())))
+        }
     }
 }

@@ -1,27 +1,24 @@
 //! Files: bounded reading, atomic replacement, and signal handling while a file is written.
 //!
-//! Some errors omit the file's name, because the caller adds it.
+//! [`Unfinished`] is a file that is either complete or absent. [`InputError`] is an error of an input file: one line that names the file,
+//! the field and the fault. Some errors omit the file's name, because the caller adds it.
 
-mod input_error;
 pub mod signals;
-mod unfinished;
 
-pub use input_error::InputError;
-pub(crate) use input_error::{escaped, quoted};
-pub use unfinished::Unfinished;
-
-use std::fs::{File, OpenOptions};
-use std::io::{Read, Write};
-use std::path::Path;
+use signals::Writing;
+use std::fs::{File, OpenOptions, metadata};
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Reads a file of at most `max_bytes` bytes. `what` names its kind in messages.
 ///
 /// # Errors
 /// The fault without the file's name: it is not a regular file, is longer than `max_bytes`, or cannot be read.
 pub fn read(path: &Path, max_bytes: u64, what: &str) -> Result<Vec<u8>, String> {
-    let unreadable = |e: std::io::Error| format!("cannot be read: {e}");
+    let unreadable = |e: io::Error| format!("cannot be read: {e}");
     let too_long = || Err(format!("is longer than {} MiB, which no {what} is", max_bytes >> 20));
-    let about = std::fs::metadata(path).map_err(unreadable)?;
+    let about = metadata(path).map_err(unreadable)?;
     // Reading a pipe would block, and a device may never end.
     if !about.is_file() {
         return Err("is not a regular file".into());
@@ -92,7 +89,155 @@ fn check_place(file: &Path) -> Result<(), String> {
 }
 
 fn is_special(file: &Path) -> bool {
-    std::fs::metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir())
+    metadata(file).is_ok_and(|there| !there.is_file() && !there.is_dir())
+}
+
+/// A file under a temporary name until it is complete. Dropping it earlier deletes it. After a signal, writes fail, so that the writer
+/// stops; the signal takes effect when the file is deleted.
+pub struct Unfinished {
+    file: BufWriter<Part>,
+    target: PathBuf,
+}
+
+struct Part {
+    file: NamedTempFile,
+    // Dropped after the file, so that the file is deleted before a signal ends the process.
+    signals: Writing,
+}
+
+impl Unfinished {
+    /// # Errors
+    /// The folder cannot be written, or the target exists and is not a regular file.
+    pub fn create(target: &Path) -> io::Result<Unfinished> {
+        // Resolve links, and use the target's folder, so that renaming is atomic within one file system.
+        let target = target.canonicalize().unwrap_or_else(|_| target.to_path_buf());
+        if metadata(&target).is_ok_and(|there| !there.is_file()) {
+            return Err(io::Error::other("the target is not a regular file"));
+        }
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut named = tempfile::Builder::new();
+        named.prefix(".echolume-").suffix(".part");
+        #[cfg(unix)]
+        {
+            // The process' umask applies, as for any new file.
+            use std::os::unix::fs::PermissionsExt;
+            named.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let signals = Writing::begin();
+        let file = named.tempfile_in(folder)?;
+        Ok(Unfinished { file: BufWriter::new(Part { file, signals }), target })
+    }
+
+    /// Flushes everything to the disk.
+    ///
+    /// # Errors
+    /// The disk is full, or a signal arrived.
+    pub fn finish(&mut self) -> io::Result<()> {
+        self.file.flush()?;
+        self.file.get_ref().file.as_file().sync_all()
+    }
+
+    /// Renames the file to its target, atomically.
+    ///
+    /// # Errors
+    /// The disk is full, or a signal arrived before everything was written.
+    pub fn rename(self) -> io::Result<()> {
+        let Part { file, signals } = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let named = file.persist(&self.target).map_err(|e| e.error);
+        drop(signals);
+        named.map(drop)
+    }
+}
+
+impl Write for Unfinished {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Write for Part {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.signals.signal() {
+            Some(signal) => Err(io::Error::other(format!("stopped by {signal}"))),
+            None => self.file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// Longest quotation from a file, characters.
+const MAX_QUOTE: usize = 60;
+/// Longest part of a message, characters.
+const MAX_PART: usize = 300;
+
+/// An error of an input file: one line that names the file, the field and what is wrong with it.
+///
+/// Everything that comes from the file is escaped and shortened, so that a file cannot send control characters to a terminal.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{file}: {field}: {fault}")]
+pub struct InputError {
+    file: String,
+    field: String,
+    fault: String,
+}
+
+impl InputError {
+    /// An error of `field` in `file`. All three parts are escaped and shortened.
+    pub fn new(file: &Path, field: impl AsRef<str>, fault: impl AsRef<str>) -> InputError {
+        InputError {
+            file: escaped(&file.display().to_string(), MAX_PART),
+            field: escaped(field.as_ref(), MAX_PART),
+            fault: escaped(fault.as_ref(), MAX_PART),
+        }
+    }
+
+    /// The operating system cannot read the file.
+    pub(crate) fn unreadable(file: &Path, error: &io::Error) -> InputError {
+        InputError::new(file, "file", format!("cannot be read: {error}"))
+    }
+
+    /// The operating system cannot write the file.
+    pub(crate) fn unwritable(file: &Path, error: &io::Error) -> InputError {
+        InputError::new(file, "file", format!("cannot be written: {error}"))
+    }
+
+    /// The field that is wrong.
+    pub fn field(&self) -> &str {
+        &self.field
+    }
+
+    /// What is wrong with it.
+    pub fn fault(&self) -> &str {
+        &self.fault
+    }
+}
+
+/// A value from a file in quotes, escaped and shortened.
+pub(crate) fn quoted(value: &str) -> String {
+    format!("'{}'", escaped(value, MAX_QUOTE))
+}
+
+/// Text with control characters and other invisible ones escaped, at most `longest` characters of the original.
+pub(crate) fn escaped(text: &str, longest: usize) -> String {
+    let mut line = String::new();
+    for (i, c) in text.chars().enumerate() {
+        if i == longest {
+            line.push_str("...");
+            break;
+        }
+        match c {
+            '\'' | '"' | '\\' => line.push(c),
+            _ => line.extend(c.escape_debug()),
+        }
+    }
+    line
 }
 
 #[cfg(test)]
@@ -140,5 +285,14 @@ mod tests {
         for n in 0..8u8 {
             assert_eq!(std::fs::read(folder.path().join(n.to_string())).expect("read"), vec![n; 1 << 16]);
         }
+    }
+
+    #[test]
+    fn a_file_cannot_break_the_line_or_drive_the_terminal() {
+        let error =
+            InputError::new(Path::new("a\nb"), "Dim\u{1b}[2J", quoted(&"x\r\n\u{202e}".repeat(400))).to_string();
+        assert_eq!(error.lines().count(), 1);
+        assert!(!error.chars().any(|c| c.is_control() || c == '\u{202e}'), "{error}");
+        assert!(error.len() < 2000);
     }
 }

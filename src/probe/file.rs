@@ -3,9 +3,8 @@
 //! The numbers of samples, lines and frames are not in it. They come from the recording.
 
 use super::axis::Axis;
-use super::geometry::{Advance, Array, GeometryError, Motion, Probe};
+use super::geometry::{Advance, Array, GeometryError, Motion, Probe, Volumes};
 use super::motor::MotorTable;
-use super::volumes::Volumes;
 use crate::files::{self, InputError};
 use serde::Deserialize;
 use std::fmt::Write as _;

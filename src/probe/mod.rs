@@ -6,10 +6,8 @@ pub mod file;
 pub mod geometry;
 pub mod grid;
 pub mod motor;
-pub mod volumes;
 
 pub use axis::Axis;
 pub use file::ProbeFile;
-pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe};
+pub use geometry::{Advance, Array, GeometryError, Indices, Motion, Probe, Volumes};
 pub use grid::{Geometry, Grid};
-pub use volumes::Volumes;

@@ -5,7 +5,7 @@ use crate::files::{read_text, replace};
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
 use crate::profile::measure;
-use crate::profile::{compare, export, trace};
+use crate::profile::{compare, export};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
 
@@ -113,7 +113,7 @@ impl Profile {
         self.write(&self.json, || profile.to_json().map_err(failed))?;
         self.write(&self.csv, || Ok(export::csv(&profile)))?;
         self.write(&self.csv_samples, || Ok(export::csv_samples(&profile)))?;
-        self.write(&self.trace, || trace::chrome(&profile, &spans).map_err(failed))?;
+        self.write(&self.trace, || export::chrome_trace(&profile, &spans).map_err(failed))?;
         match second {
             Some(second) => self.judge(&profile, &second.finish().0),
             None => Ok(()),

@@ -5,8 +5,8 @@ use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer};
 use crate::plan::{Plan, Rerun, Step};
+use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
-use crate::profile::trace::{self, Track};
 use crate::profile::{Acquisition, Ceiling, Ceilings, FORMAT, PassProfile, Profile, Sizes, settings_hash};
 use crate::scene::Scene;
 use crate::source::Frame;
@@ -52,7 +52,7 @@ pub fn run(
     scene: &Scene,
     frames: &[Frame],
     options: &ProfileOptions,
-) -> Result<(Profile, Vec<trace::Span>), GpuError> {
+) -> Result<(Profile, Vec<export::Span>), GpuError> {
     let mut run = ProfileRun::new(context, scene, options)?;
     while run.needs_more() {
         run.repeat(frames)?;
@@ -129,7 +129,7 @@ impl ProfileRun {
     }
 
     /// The profile of the measured repeats, and their spans.
-    pub fn finish(self) -> (Profile, Vec<trace::Span>) {
+    pub fn finish(self) -> (Profile, Vec<export::Span>) {
         let device = machine::device(&self.context);
         let (scene, plan, repeats) = (&self.scene, self.renderer.plan(), self.repeats);
         let stamped = device.valid_bits > 0;
@@ -197,8 +197,8 @@ fn settings(scene: &Scene) -> String {
     toml::to_string(&scene.settings).unwrap_or_default()
 }
 
-fn traced(repeat: usize, span: Span) -> trace::Span {
-    trace::Span {
+fn traced(repeat: usize, span: Span) -> export::Span {
+    export::Span {
         name: span.name.into(),
         track: if span.on_device { Track::Device } else { Track::Host },
         repeat,

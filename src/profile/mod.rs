@@ -1,12 +1,11 @@
 //! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
-//! compares two, [`export`] and [`trace`] write them as text and as Chrome traces.
+//! compares two, [`export`] writes them as text and as Chrome traces.
 
 pub(crate) mod command;
 pub mod compare;
 pub mod export;
 pub mod measure;
 pub mod statistics;
-pub mod trace;
 
 use crate::machine::Device;
 use serde::{Deserialize, Serialize};

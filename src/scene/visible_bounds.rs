@@ -271,33 +271,3 @@ fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
     }
     corners
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::probe::{Advance, Axis};
-    use crate::scene::{Input, Settings};
-    use crate::source::StoredType;
-
-    #[test]
-    fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
-        let probe = Probe {
-            array: Array::Curved { radius: 20.0 },
-            lines: Axis::centred(0.05, 24),
-            start_depth: 2.0,
-            sample_pitch: 0.8,
-            samples: 64,
-            motion: Motion::Fan { wobble_radius: 12.0 },
-            slices: Axis::centred(0.06, 9),
-            advance: Advance::None,
-            sound_speed: 1540.0,
-        };
-        let input = Input { stored: StoredType::U8, range: [0.0, 255.0] };
-        for side in [[30.0, 38.0], [-38.0, -30.0]] {
-            let settings = format!("mode = 'mip'\nregion = {{ lateral = {side:?}, depth = [2, 6] }}");
-            let settings: Settings = toml::from_str(&settings).expect("settings");
-            let scene = Scene::new(Geometry::Sweep(probe.clone()), input, settings).expect("scene");
-            assert_eq!((scene.seen, scene.share_seen(), scene.frames_seen()), (VisibleBounds::default(), 0.0, 0..0));
-        }
-    }
-}

@@ -6,7 +6,6 @@ pub(crate) mod command;
 pub mod export;
 pub mod growth;
 pub mod measure;
-pub mod sweep;
 
 use crate::machine::Device;
 use crate::profile::statistics::Sample;

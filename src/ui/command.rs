@@ -1,6 +1,12 @@
-//! The commands of a user. Gestures on the picture, keys and panels give them.
+//! The commands of a user, which gestures on the picture, keys and panels give; and the key bindings: what every key does, and its
+//! description in the help.
 
+pub use super::view::Face;
+
+use super::input::{Input, Key, Modifiers};
+use super::sliders::{GAIN, THRESHOLD};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, TransferName};
+use Key::{Char, Function};
 
 /// One command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,11 +80,234 @@ pub enum Tool {
     Plane,
 }
 
-/// A face of the region.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
-    /// 0 lateral, 1 depth, 2 elevation.
-    pub axis: usize,
-    /// The face at the higher end of the axis.
-    pub high: bool,
+/// A key and its command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Binding {
+    pub key: Key,
+    pub modifiers: Modifiers,
+    pub(super) description: &'static str,
+    pub command: Command,
+    /// The command repeats while the key is held.
+    pub(super) repeats: bool,
+}
+
+const NONE: Modifiers = Modifiers { shift: false, control: false, alt: false };
+const SHIFT: Modifiers = Modifiers { shift: true, ..NONE };
+
+const fn on(key: Key, description: &'static str, command: Command) -> Binding {
+    Binding { key, modifiers: NONE, description, command, repeats: false }
+}
+
+/// With shift.
+const fn shift(key: Key, description: &'static str, command: Command) -> Binding {
+    Binding { modifiers: SHIFT, ..on(key, description, command) }
+}
+
+impl Binding {
+    const fn repeating(self) -> Binding {
+        Binding { repeats: true, ..self }
+    }
+}
+
+/// A distance beyond any volume, mm.
+const BEYOND_ANY_VOLUME_MM: f64 = 1e5;
+
+/// All key bindings, in groups. Consecutive ones with the same description are one line of the help.
+pub const KEY_BINDINGS: &[Binding] = &[
+    on(Char('1'), "surface", Command::Mode(Mode::Surface)),
+    on(Char('2'), "volume", Command::Mode(Mode::Volume)),
+    on(Char('3'), "surface behind a volume layer", Command::Mode(Mode::Mixed)),
+    on(Char('4'), "largest echoes (MIP)", Command::Mode(Mode::Mip)),
+    on(Char('5'), "smallest echoes (MinIP)", Command::Mode(Mode::MinIp)),
+    on(Char('6'), "X-ray", Command::Mode(Mode::Mean)),
+    on(Char('7'), "one plane", Command::Mode(Mode::Plane)),
+    on(Char('8'), "three planes", Command::Mode(Mode::Orthogonal)),
+    on(Char('9'), "tomography", Command::Mode(Mode::Tomography)),
+    on(Char('0'), "block", Command::Mode(Mode::Cube)),
+    on(Key::Tab, "three planes and the rendering", Command::Layout(Layout::Four)),
+    on(Function(4), "three planes and the rendering", Command::Layout(Layout::Four)),
+    shift(Key::Tab, "one picture", Command::Layout(Layout::Single)),
+    shift(Function(4), "one picture", Command::Layout(Layout::Single)),
+    // What a drag does.
+    on(Char('t'), "drag rotates", Command::Tool(Tool::Rotate)),
+    on(Char('l'), "drag moves the light", Command::Tool(Tool::Light)),
+    on(Char('g'), "drag moves the region's faces", Command::Tool(Tool::Region)),
+    on(Char('x'), "drag cuts from the front", Command::Tool(Tool::Clip)),
+    on(Char('s'), "drag moves the planes (sections)", Command::Tool(Tool::Plane)),
+    shift(Char('x'), "nothing cut from the front", Command::MoveClip(-BEYOND_ANY_VOLUME_MM)),
+    // The view.
+    shift(Key::Left, "rotate", Command::Rotate([-5.0, 0.0])).repeating(),
+    shift(Key::Right, "rotate", Command::Rotate([5.0, 0.0])).repeating(),
+    shift(Key::Up, "rotate", Command::Rotate([0.0, 5.0])).repeating(),
+    shift(Key::Down, "rotate", Command::Rotate([0.0, -5.0])).repeating(),
+    on(Char(','), "roll", Command::Roll(-5.0)).repeating(),
+    on(Char('.'), "roll", Command::Roll(5.0)).repeating(),
+    on(Char('+'), "closer", Command::Zoom(1.1)).repeating(),
+    on(Char('='), "closer", Command::Zoom(1.1)).repeating(),
+    on(Char('-'), "farther", Command::Zoom(1.0 / 1.1)).repeating(),
+    on(Key::Backspace, "reset all settings", Command::Reset),
+    // Planes.
+    on(Char('a'), "plane A: the scan plane", Command::Plane(PlaneName::A)),
+    on(Char('b'), "plane B: across the frames", Command::Plane(PlaneName::B)),
+    on(Char('c'), "plane C: at one depth", Command::Plane(PlaneName::C)),
+    on(Key::PageUp, "plane by 1 mm", Command::StepPlane(-1.0)).repeating(),
+    on(Key::PageDown, "plane by 1 mm", Command::StepPlane(1.0)).repeating(),
+    shift(Key::PageUp, "plane by 5 mm", Command::StepPlane(-5.0)).repeating(),
+    shift(Key::PageDown, "plane by 5 mm", Command::StepPlane(5.0)).repeating(),
+    // The look.
+    on(Key::Up, "threshold", Command::StepSlider(THRESHOLD, 1)).repeating(),
+    on(Key::Down, "threshold", Command::StepSlider(THRESHOLD, -1)).repeating(),
+    on(Char('['), "gain", Command::StepSlider(GAIN, -1)).repeating(),
+    on(Char(']'), "gain", Command::StepSlider(GAIN, 1)).repeating(),
+    on(Char('d'), "shadow (darker)", Command::Shadow(true)),
+    shift(Char('d'), "no shadow", Command::Shadow(false)),
+    on(Function(5), "volume in grey", Command::Transfer(TransferName::Grey)),
+    on(Function(6), "volume in sepia", Command::Transfer(TransferName::Sepia)),
+    on(Function(7), "volume as skin", Command::Transfer(TransferName::Skin)),
+    on(Function(8), "volume as bone", Command::Transfer(TransferName::Bone)),
+    on(Function(9), "volume in blue", Command::Transfer(TransferName::Cool)),
+    on(Function(10), "volume in red", Command::Transfer(TransferName::Warm)),
+    shift(Function(5), "picture in grey", Command::ColourMap(ColourMap::Grey)),
+    shift(Function(6), "picture in sepia", Command::ColourMap(ColourMap::Sepia)),
+    shift(Function(7), "picture as skin", Command::ColourMap(ColourMap::Skin)),
+    shift(Function(8), "picture in ice", Command::ColourMap(ColourMap::Ice)),
+    shift(Function(9), "picture in its own colours", Command::ColourMap(ColourMap::None)),
+    // Time. The caller limits the index to the volumes that it has.
+    on(Key::Space, "freeze, unfreeze", Command::Freeze),
+    on(Key::Left, "one volume back, forth", Command::StepCine(-1)).repeating(),
+    on(Key::Right, "one volume back, forth", Command::StepCine(1)).repeating(),
+    on(Key::Home, "oldest volume", Command::SeekCine(0)),
+    on(Key::End, "newest volume", Command::SeekCine(usize::MAX)),
+    on(Key::Enter, "play the cine loop", Command::PlayCine),
+    on(Char('p'), "save the picture", Command::SavePicture),
+    on(Char('r'), "save the recording", Command::SaveLoop),
+    // The screen.
+    on(Char('h'), "this help", Command::ToggleHelp),
+    on(Function(1), "this help", Command::ToggleHelp),
+    on(Function(2), "times of the passes", Command::ToggleTimes),
+    on(Function(3), "sliders", Command::TogglePanels),
+    on(Function(11), "full screen", Command::ToggleFullScreen),
+    on(Key::Escape, "quit", Command::Exit),
+    on(Char('q'), "quit", Command::Exit),
+];
+
+/// The binding of a key with these modifiers.
+pub(super) fn binding(key: Key, modifiers: Modifiers) -> Option<&'static Binding> {
+    // Whether a sign needs shift depends on the keyboard layout.
+    let is_sign = matches!(key, Char(c) if !c.is_alphanumeric());
+    let modifiers = Modifiers { shift: modifiers.shift && !is_sign, ..modifiers };
+    KEY_BINDINGS.iter().find(|b| b.key == key && b.modifiers == modifiers)
+}
+
+/// The command of a key with these modifiers.
+#[cfg(test)]
+fn command(key: Key, modifiers: Modifiers) -> Option<Command> {
+    binding(key, modifiers).map(|b| b.command)
+}
+
+/// The lines of the help: keys, such as "Shift+Left, Shift+Right", and their description, in the order of [`KEY_BINDINGS`].
+pub(super) fn help() -> impl Iterator<Item = (String, &'static str)> {
+    KEY_BINDINGS.chunk_by(|a, b| a.description == b.description).filter_map(|same| {
+        let keys: Vec<String> = same.iter().map(key_label).collect();
+        Some((keys.join(", "), same.first()?.description))
+    })
+}
+
+fn key_label(binding: &Binding) -> String {
+    let Modifiers { shift, control, alt } = binding.modifiers;
+    let held = [(control, "Ctrl+"), (alt, "Alt+"), (shift, "Shift+")];
+    let held: String = held.iter().filter(|(is_held, _)| *is_held).map(|(_, name)| *name).collect();
+    let key = match binding.key {
+        Char(c) => c.to_uppercase().to_string(),
+        Function(n) => format!("F{n}"),
+        Key::PageUp => "Page up".into(),
+        Key::PageDown => "Page down".into(),
+        other => format!("{other:?}"),
+    };
+    held + &key
+}
+
+/// The keys that are held. A toggle must not repeat while its key is held.
+#[derive(Clone, Debug, Default)]
+pub(super) struct HeldKeys {
+    modifiers: Modifiers,
+    held: Vec<Key>,
+}
+
+impl HeldKeys {
+    pub(super) fn modifiers(&self) -> Modifiers {
+        self.modifiers
+    }
+
+    /// The command that an input gives, if any.
+    pub(super) fn input(&mut self, input: &Input) -> Option<Command> {
+        match *input {
+            Input::Modifiers(modifiers) => self.modifiers = modifiers,
+            Input::FocusLost => *self = HeldKeys::default(),
+            Input::Key { key, pressed: false } => self.held.retain(|held| *held != key),
+            Input::Key { key, pressed: true } => {
+                let again = self.held.contains(&key);
+                if !again {
+                    self.held.push(key);
+                }
+                return binding(key, self.modifiers).filter(|b| b.repeats || !again).map(|b| b.command);
+            }
+            _ => {}
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_is_bound_twice() {
+        for (i, a) in KEY_BINDINGS.iter().enumerate() {
+            assert!(
+                !KEY_BINDINGS[..i].iter().any(|b| (b.key, b.modifiers) == (a.key, a.modifiers)),
+                "{}",
+                key_label(a)
+            );
+            assert_eq!(command(a.key, a.modifiers), Some(a.command), "{} cannot be reached", key_label(a));
+        }
+    }
+
+    #[test]
+    fn every_mode_layout_tool_and_plane_has_a_key() {
+        use Mode::*;
+        let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
+        let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane].map(Command::Tool);
+        let layouts = [Layout::Single, Layout::Four].map(Command::Layout);
+        let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
+        for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {
+            assert!(KEY_BINDINGS.iter().any(|b| b.command == *command), "{command:?}");
+        }
+    }
+
+    #[test]
+    fn the_help_has_a_line_for_every_command() {
+        let lines: Vec<_> = help().collect();
+        assert!(lines.contains(&("H, F1".into(), "this help")));
+        assert!(lines.contains(&("Shift+X".into(), "nothing cut from the front")));
+        let mut descriptions: Vec<_> = lines.iter().map(|(_, description)| description).collect();
+        descriptions.sort();
+        assert!(descriptions.windows(2).all(|w| w[0] != w[1]), "the same description in two places");
+    }
+
+    #[test]
+    fn a_held_key_repeats_only_if_its_binding_says_so() {
+        let mut keys = HeldKeys::default();
+        let mut press = |key, pressed| keys.input(&Input::Key { key, pressed });
+        assert_eq!(press(Key::Space, true), Some(Command::Freeze));
+        assert_eq!(press(Key::Space, true), None);
+        assert_eq!(press(Key::Space, false), None);
+        assert_eq!(press(Key::Space, true), Some(Command::Freeze));
+        assert_eq!(press(Key::Right, true), Some(Command::StepCine(1)));
+        assert_eq!(press(Key::Right, true), Some(Command::StepCine(1)));
+        keys.input(&Input::Modifiers(Modifiers { shift: true, ..Modifiers::default() }));
+        let sign = Input::Key { key: Char('+'), pressed: true };
+        assert_eq!(keys.input(&sign), Some(Command::Zoom(1.1)));
+    }
 }

@@ -1,9 +1,9 @@
 //! The live volume on a screen, and the gestures that control it.
 //!
-//! - [`input`] is what a window, a touch screen or an input device reports. `gestures` and [`keys`] turn inputs into
-//!   [`command`]s, and `controls` applies these to the settings.
-//! - [`console`] connects inputs, stream and screen. `frame_budget` keeps the time of a picture on the rungs of the
-//!   [`quality_ladder`], [`source_supervisor`] keeps the source open, [`export`] saves files, and [`panels`] lays out what is
+//! - [`input`] is what a window, a touch screen or an input device reports. `gestures` and the keys of [`command`] turn inputs
+//!   into commands, and `controls` applies these to the settings.
+//! - [`console`] connects inputs, stream and screen. [`frame_budget`] keeps the time of a picture on the rungs of the
+//!   quality ladder, [`source_supervisor`] keeps the source open, [`export`] saves files, and [`panels`] lays out what is
 //!   drawn over the picture. None of these depends on a window, so all of them are tested without one.
 //! - [`window`] shows the console in a window. Without a windowing system, `direct` shows it on a monitor and `devices` reads
 //!   input devices from the kernel.
@@ -16,13 +16,11 @@ mod devices;
 #[cfg(target_os = "linux")]
 pub mod direct;
 pub mod export;
-mod frame_budget;
+pub mod frame_budget;
 mod gestures;
 pub mod input;
-pub mod keys;
 pub mod panels;
 mod picking;
-pub mod quality_ladder;
 mod recovery;
 pub mod sliders;
 pub mod source_supervisor;

@@ -1,7 +1,6 @@
 //! How commands change the camera, the light, the viewer's clip plane, the planes and the region. Every function takes finite numbers of
 //! any size and returns numbers that [`Scene::new`] accepts.
 
-use super::command::Face;
 use super::picking::Picker;
 use crate::probe::{Geometry, Motion};
 use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, insonified_box};
@@ -168,6 +167,15 @@ pub(super) fn keep_scale(now: &Scene, mut settings: Settings) -> Option<Settings
 
 /// Least thickness of the region after a face moved, mm.
 const MIN_THICKNESS: f64 = 2.0;
+
+/// A face of the region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    /// 0 lateral, 1 depth, 2 elevation.
+    pub axis: usize,
+    /// The face at the higher end of the axis.
+    pub high: bool,
+}
 
 const FACES: [Face; 6] = [
     Face { axis: 0, high: false },

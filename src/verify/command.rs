@@ -6,7 +6,7 @@ use crate::files::{read_text, replace};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::terminal::{Failure, failed, input, say};
 use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
-use crate::verify::report::{self, Level, Outcome, Run, Verdict, html, junit, summary};
+use crate::verify::report::{self, Level, Outcome, Run, Verdict, html, junit};
 use crate::verify::self_test::{self, Detection};
 use crate::verify::{self, Check, DeviceUnderTest};
 use std::path::{Path, PathBuf};
@@ -124,7 +124,7 @@ impl Verify {
             }
             // One line per group; a failure is printed at once.
             if outcome.verdict == Verdict::Failed {
-                say!("{}", summary::failure(outcome).trim_end());
+                say!("{}", report::failure(outcome).trim_end());
             }
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
             ran += 1;
@@ -211,9 +211,9 @@ impl Verify {
 
     fn judge(&self, run: &Run, compared: Option<&BaselineComparison>, stopped: Option<&str>) -> Result<(), Failure> {
         if let Some(compared) = compared {
-            say!("{}", summary::comparison(compared).trim_end());
+            say!("{}", report::comparison(compared).trim_end());
         }
-        say!("{}", summary::summary(run));
+        say!("{}", report::summary(run));
         let files: Vec<_> = run.failures().flat_map(|o| &o.faults).flat_map(|f| &f.files).collect();
         if !files.is_empty() {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
@@ -267,7 +267,7 @@ fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
 
 fn tell(group: &[Outcome]) {
     if let Some(first) = group.first() {
-        say!("{}", summary::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
+        say!("{}", report::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Comparisons with what is expected: outputs of a pass with its reference, pictures with pictures, and difference pictures for the
 //! report.
 
-use super::check::Findings;
+use super::Findings;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, Bind, DispatchArgs, Pass, Slot, Texels, is_hit};
 use crate::picture::Picture;

@@ -2,10 +2,9 @@
 //! of queues, with frames in any order, and with any number of threads of a software device.
 
 use super::built_in::Noise;
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture};
-use super::render;
 use super::render::Drawn;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Picture;

@@ -3,9 +3,8 @@
 //! are rendered correctly. Failures are simulated above the driver, on isolated contexts.
 
 use super::built_in::{BYTES, FLOATS, frames, scene, wall, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{count_figure, expect_same_picture};
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::faults::{InjectedFailure, InjectionPoint};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};

@@ -1,10 +1,9 @@
 //! Group "formats": what the device supports for every format, and that every fallback still renders the picture of the f64 reference.
 
 use super::built_in::{BYTES, scene, wall, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{count_figure, picture_comparison, picture_difference};
-use super::render;
 use super::render::stored_reference_picture;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, RendererOptions, TexelAccess, formats};
 use crate::passes::Texels;
 use crate::picture::Picture;

@@ -2,9 +2,8 @@
 //! rendered with a wait after every step. Passes are slowed down so that work overlaps.
 
 use super::built_in::{BYTES, Noise, scene, wall, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
 use crate::picture::Picture;

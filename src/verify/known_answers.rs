@@ -1,10 +1,9 @@
 //! Group "known answers": scenes whose correct result is a formula, independent of the f64 reference.
 
 use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings};
 use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_comparison};
 use super::passes::POISON;
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, render};
 use crate::gpu::resources::shape_size;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::shade::shadow;

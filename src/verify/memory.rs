@@ -1,9 +1,8 @@
 //! Group "memory": nothing reads memory that was not written. New memory is filled with poison values that no pass computes; pictures and
 //! slots must stay the same, and some pass must write every texel of every slot.
 
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, expect_same_picture, texel_comparison};
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::faults::Poison;
 use crate::gpu::{Context, GpuError, RendererOptions};
 use crate::passes::slots::Initializer;

@@ -7,7 +7,6 @@
 //! detects each.
 
 pub mod built_in;
-mod check;
 pub(crate) mod command;
 mod compare;
 pub mod determinism;
@@ -25,10 +24,18 @@ mod speed;
 pub mod stress;
 pub mod time_stamps;
 
-pub use check::{Check, DeviceUnderTest, Findings};
 pub use compare::{Comparison, ExtraTolerance, compare_outputs, compare_picture, expect_same_picture};
 
-use report::{Level, Outcome, Run};
+use crate::gpu::pass_runner::PassRunner;
+use crate::gpu::{Context, ContextOptions, GpuError};
+use crate::machine;
+use crate::passes::fault_injection::Change;
+use crate::scene::Scene;
+use render::Drawn;
+use report::{FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// All checks of a level, in running order.
@@ -82,4 +89,327 @@ pub fn run(
 pub fn stopped(signal: &str, left: usize) -> Outcome {
     Check::new("run", "every check was run", |_| Ok(Findings::default()))
         .failed(format!("{signal}: {left} checks were not"))
+}
+
+/// What a check measured and detected.
+#[derive(Default)]
+pub struct Findings {
+    pub figures: Vec<Figure>,
+    pub faults: Vec<Fault>,
+    pub notes: Vec<String>,
+    pub pictures: Vec<PictureComparison>,
+    /// Set if the check was skipped: what this device or system lacks.
+    pub left_out: Option<String>,
+}
+
+impl Findings {
+    /// A skipped check.
+    pub fn left_out(why: impl Into<String>) -> Findings {
+        Findings { left_out: Some(why.into()), ..Findings::default() }
+    }
+
+    /// Adds a fault with this text unless the condition holds.
+    pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.faults.push(Fault::new(what()));
+        }
+    }
+
+    /// Records a figure, and adds a fault if it exceeds its limit. NaN exceeds any limit.
+    pub fn error(&mut self, figure: Figure, what: impl FnOnce() -> String) {
+        let within = figure.allowed.is_none_or(|allowed| figure.value <= allowed);
+        self.expect(within, what);
+        self.figures.push(figure);
+    }
+}
+
+type Work = Box<dyn Fn(&mut DeviceUnderTest) -> Result<Findings, GpuError>>;
+
+/// A single check.
+pub struct Check {
+    pub group: &'static str,
+    /// Unique in its group.
+    pub name: String,
+    work: Work,
+}
+
+impl Check {
+    pub fn new(
+        group: &'static str,
+        name: impl Into<String>,
+        work: impl Fn(&mut DeviceUnderTest) -> Result<Findings, GpuError> + 'static,
+    ) -> Check {
+        Check { group, name: name.into(), work: Box::new(work) }
+    }
+
+    /// Runs the check. An error of the device is a fault; after a lost device the next check gets a new context.
+    pub fn run(&self, dut: &mut DeviceUnderTest) -> Outcome {
+        let begun = Instant::now();
+        let mut findings = self.findings(dut).unwrap_or_else(|error| {
+            let mut findings = Findings::default();
+            findings.faults.push(Fault::new(error.to_string()));
+            if error.is_device_lost() {
+                dut.renew().unwrap_or_else(|e| findings.faults.push(Fault::new(format!("and no other device: {e}"))));
+            }
+            findings
+        });
+        let complaints = dut.complaints();
+        findings.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
+        let verdict = match (findings.faults.is_empty(), &findings.left_out) {
+            (false, _) => Verdict::Failed,
+            (true, Some(_)) => Verdict::LeftOut,
+            (true, None) => Verdict::Passed,
+        };
+        findings.notes.extend(findings.left_out.take());
+        self.outcome(verdict, findings, begun)
+    }
+
+    /// Runs the check and returns errors of the device unchanged.
+    ///
+    /// # Errors
+    /// The device fails.
+    fn findings(&self, dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
+        (self.work)(dut)
+    }
+
+    /// The outcome of a check that was not run.
+    fn stopped(&self, why: &str) -> Outcome {
+        let findings = Findings { notes: vec![format!("not run: {why}")], ..Findings::default() };
+        self.outcome(Verdict::LeftOut, findings, Instant::now())
+    }
+
+    /// The outcome of a check that failed for this reason.
+    fn failed(&self, why: String) -> Outcome {
+        let findings = Findings { faults: vec![Fault::new(why)], ..Findings::default() };
+        self.outcome(Verdict::Failed, findings, Instant::now())
+    }
+
+    fn outcome(&self, verdict: Verdict, findings: Findings, begun: Instant) -> Outcome {
+        Outcome {
+            group: self.group.into(),
+            name: self.name.clone(),
+            verdict,
+            seconds: begun.elapsed().as_secs_f64(),
+            figures: findings.figures,
+            faults: findings.faults,
+            notes: findings.notes,
+            pictures: findings.pictures,
+        }
+    }
+}
+
+/// The device under test, with the built-in scenes.
+pub struct DeviceUnderTest {
+    pub context: Arc<Context>,
+    pub level: Level,
+    options: ContextOptions,
+    pass_runner: Option<PassRunner>,
+    scenes: Rc<Vec<(String, Scene)>>,
+    /// Called on every new context.
+    prepare: Option<fn(&Context)>,
+    /// The program that checks start as a child process; None if this process is not the `echolume` program.
+    pub program: Option<PathBuf>,
+    modes: Option<Rc<Vec<Drawn>>>,
+    /// Fault injected into every new context.
+    injected_fault: Option<Change>,
+    /// Number of validation messages already reported.
+    messages_read: usize,
+}
+
+impl DeviceUnderTest {
+    /// # Errors
+    /// There is no device, or no validation layer although it is requested.
+    pub fn new(options: &ContextOptions, level: Level) -> Result<DeviceUnderTest, GpuError> {
+        DeviceUnderTest::prepared(options, level, None)
+    }
+
+    /// Like `new`, but calls `prepare` on every context before anything is created from it.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn prepared(
+        options: &ContextOptions,
+        level: Level,
+        prepare: Option<fn(&Context)>,
+    ) -> Result<DeviceUnderTest, GpuError> {
+        let context = Context::new(options)?;
+        prepare.iter().for_each(|prepare| prepare(&context));
+        let made = |spec: &built_in::SceneSpec| Ok((spec.name.clone(), spec.build()?));
+        let scenes: Result<Vec<_>, String> = built_in::scenes().iter().map(made).collect();
+        let scenes = Rc::new(scenes.map_err(GpuError::Broken)?);
+        Ok(DeviceUnderTest {
+            context,
+            level,
+            options: options.clone(),
+            pass_runner: None,
+            scenes,
+            prepare,
+            injected_fault: None,
+            program: std::env::current_exe().ok(),
+            modes: None,
+            messages_read: 0,
+        })
+    }
+
+    /// A device under test with the same device and scenes, and an injected fault.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn with_fault(&self, change: Change) -> Result<DeviceUnderTest, GpuError> {
+        let mut dut = DeviceUnderTest {
+            context: self.context.clone(),
+            options: self.options.clone(),
+            scenes: self.scenes.clone(),
+            pass_runner: None,
+            injected_fault: Some(change),
+            program: None,
+            modes: None,
+            ..*self
+        };
+        dut.renew()?;
+        Ok(dut)
+    }
+
+    /// The built-in scenes by name. Together they need every pass.
+    pub fn scenes(&self) -> Rc<Vec<(String, Scene)>> {
+        self.scenes.clone()
+    }
+
+    /// Every mode with filters of every stage, rendered in the simplest way: the expected pictures of other checks. Rendered once.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn modes(&mut self) -> Result<Rc<Vec<Drawn>>, GpuError> {
+        if let Some(modes) = &self.modes {
+            return Ok(modes.clone());
+        }
+        let modes = Rc::new(render::modes(&self.context)?);
+        self.modes = Some(modes.clone());
+        Ok(modes)
+    }
+
+    /// The runner of single passes.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn pass_runner(&mut self) -> Result<&mut PassRunner, GpuError> {
+        if self.pass_runner.is_none() {
+            self.pass_runner = Some(PassRunner::new(&self.context)?);
+        }
+        // It exists here.
+        self.pass_runner.as_mut().ok_or(GpuError::Broken("no pass can be run alone".into()))
+    }
+
+    /// Another context on the same device, because the old one was lost or will be.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::new`].
+    pub fn another(&self) -> Result<Arc<Context>, GpuError> {
+        let context = Context::new(&self.options)?;
+        self.injected_fault.iter().for_each(|change| context.faults.inject_change(*change));
+        self.prepare.iter().for_each(|prepare| prepare(&context));
+        Ok(context)
+    }
+
+    /// RendererOptions of new contexts.
+    pub fn options(&self) -> &ContextOptions {
+        &self.options
+    }
+
+    /// True if the validation layer is active.
+    pub fn watched(&self) -> bool {
+        self.options.validation
+    }
+
+    /// A run of these outcomes that ends now.
+    pub(crate) fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+        Run {
+            format: FORMAT.into(),
+            program: machine::program(),
+            date: machine::date(),
+            device: machine::device(&self.context),
+            level: self.level,
+            validation: self.options.validation,
+            seconds: begun.elapsed().as_secs_f64(),
+            outcomes,
+        }
+    }
+
+    fn renew(&mut self) -> Result<(), GpuError> {
+        (self.pass_runner, self.messages_read) = (None, 0);
+        self.context = self.another()?;
+        Ok(())
+    }
+
+    /// Validation messages since the last call.
+    fn complaints(&mut self) -> Vec<String> {
+        let messages = self.context.messages();
+        let new = messages[self.messages_read.min(messages.len())..].to_vec();
+        self.messages_read = messages.len();
+        credible_messages(&self.context, new, true)
+    }
+}
+
+/// A context for one check alone: its device may be lost, may lack features, or one queue may act as several. Validation messages are
+/// reported at the end.
+///
+/// Validation layers of version 1.3.239 do not know that a queue or the host waits for a timeline semaphore. If one queue acts as
+/// several, they report everything between submissions as a hazard; likewise if memory that was read back is reused.
+struct IsolatedContext {
+    pub context: Arc<Context>,
+    /// Report hazards between submissions.
+    hears_submissions: bool,
+}
+
+impl IsolatedContext {
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub fn new(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
+        IsolatedContext::of_queues(dut, 1)
+    }
+
+    /// A context that is used as if it had this many queues.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn of_queues(dut: &DeviceUnderTest, queues: usize) -> Result<IsolatedContext, GpuError> {
+        let context = dut.another()?;
+        Ok(IsolatedContext { hears_submissions: context.queue_count() >= queues, context })
+    }
+
+    /// A context whose renderers change often, or are created again after slots were read back.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn of_changes(dut: &DeviceUnderTest) -> Result<IsolatedContext, GpuError> {
+        Ok(IsolatedContext { hears_submissions: false, context: dut.another()? })
+    }
+
+    /// A context that lacks features: `change` edits its known capabilities before anything is created from it.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub(crate) fn lacking(
+        dut: &DeviceUnderTest,
+        change: impl FnOnce(&mut Context),
+    ) -> Result<IsolatedContext, GpuError> {
+        let mut isolated = IsolatedContext::new(dut)?;
+        let own = Arc::get_mut(&mut isolated.context);
+        own.map(change).ok_or(GpuError::Broken("the isolated context is shared".into()))?;
+        Ok(isolated)
+    }
+
+    /// Adds the validation messages as faults.
+    pub(crate) fn report_validation(&self, findings: &mut Findings) {
+        let messages = credible_messages(&self.context, self.context.messages(), self.hears_submissions);
+        findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
+    }
+}
+
+/// Validation messages without known false positives: hazards between submissions only if they are reliable.
+fn credible_messages(context: &Context, mut messages: Vec<String>, hears_submissions: bool) -> Vec<String> {
+    if !hears_submissions || !context.validates_timelines() {
+        messages.retain(|m| !(m.contains("SYNC-HAZARD") && m.contains("vkQueueSubmit2")));
+    }
+    messages
 }

@@ -1,10 +1,9 @@
 //! Groups "modes" and "against": pictures of known bodies in every mode, compared with the f64 reference, or with another device.
 
 use super::built_in::{BYTES, FLOATS, body_frames, cartesian, linear, scene, still, uneven, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{MAX_FAR_SHARE, compare_picture, picture_comparison, picture_difference};
-use super::render;
 use super::render::reference_picture;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::Context;
 use crate::gpu::GpuError;
 use crate::passes::Texels;

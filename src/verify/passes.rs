@@ -2,8 +2,8 @@
 //! Each pass gets its own inputs, so that errors do not accumulate; outputs are poisoned first, so that unwritten texels are detected.
 
 use super::built_in::Noise;
-use super::check::{Check, DeviceUnderTest, Findings};
 use super::compare::{Comparison, ExtraTolerance, compare_outputs, texel_comparison};
+use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::resources::shape_size;

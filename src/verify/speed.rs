@@ -2,7 +2,7 @@
 //! earlier times.
 
 use super::built_in::{ALL_FILTERS, BYTES, cartesian, scene, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings};
+use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::{Context, ContextOptions, GpuError, pass_runner};
 use crate::passes::{PASSES, Pass};
 use crate::probe::{Axis, Geometry, Probe};

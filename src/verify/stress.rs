@@ -2,10 +2,9 @@
 //! Some pictures are compared with those of a new renderer, and at the end no memory may leak.
 
 use super::built_in::{self, Noise};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{add_picture_counts, count_figure, expect_same_picture};
 use super::failures::expect_memory_returned;
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::files::signals;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TexelAccess};
 use crate::passes::{Slot, Texels};

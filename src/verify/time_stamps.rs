@@ -3,9 +3,8 @@
 //! causes no failure.
 
 use super::built_in::{BYTES, scene, wall, wobbler};
-use super::check::{Check, DeviceUnderTest, Findings, IsolatedContext};
 use super::compare::{count_figure, expect_same_picture};
-use super::render;
+use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{PassTime, Span};
 use crate::picture::Picture;

@@ -4,7 +4,7 @@ use crate::scenes::*;
 use echolume::passes::{DispatchArgs, by_name};
 use echolume::profile::compare::{CompareOptions, Verdict, compare};
 use echolume::profile::measure::{ProfileOptions, ProfileRun, run};
-use echolume::profile::{Profile, trace};
+use echolume::profile::{Profile, export};
 
 const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }
@@ -110,7 +110,7 @@ fn a_profile_is_consistent_and_round_trips() {
     }
     let text = profile.to_json().expect("json");
     assert_eq!(Profile::from_json(&text).expect("read back"), profile);
-    let trace = trace::chrome(&profile, &spans).expect("trace");
+    let trace = export::chrome_trace(&profile, &spans).expect("trace");
     let trace: serde_json::Value = serde_json::from_str(&trace).expect("json");
     let events = trace["traceEvents"].as_array().expect("events");
     assert_eq!(events.iter().filter(|e| e["name"] == "scan_convert").count(), 6 * 15);

@@ -9,8 +9,7 @@ use echolume::plan::Plan;
 use echolume::reference;
 use echolume::scene::{MAX_WINDOW, Scene};
 use echolume::thesis_tables::growth::{Growth, SIGMAS, WINDOWS, growth, growth_settings};
-use echolume::thesis_tables::measure::{TableOptions, run, scene};
-use echolume::thesis_tables::sweep::{BALL_RADIUS, frames, surface_depth};
+use echolume::thesis_tables::measure::{BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames};
 use echolume::thesis_tables::{Conditions, Filter3d, export, tables};
 
 fn pass_names(plan: &Plan, first: bool) -> Vec<&'static str> {
@@ -79,7 +78,7 @@ fn rays_meet_the_surface_where_the_body_has_it() {
         let (step, rays) = (scene.step, scene.rays);
         let face = scene.probe().expect("a sweep").array_radius();
         let mut renderer = Renderer::new(&device(), scene, &RendererOptions::default()).expect("renderer");
-        for frame in frames(conditions.frames, conditions.lines) {
+        for frame in sweep_frames(conditions.frames, conditions.lines) {
             renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
         }
         renderer.show(0).expect("show");

@@ -1,22 +1,21 @@
 //! The configuration of a cart: one TOML file. `tools/kiosk/echolume.toml` is an example with all keys.
 //!
-//! Every key is optional. Paths are relative to the folder of the file. An error is one line that names the file, the line, the key and
-//! the allowed values.
-
-mod error;
-mod flags;
-
-pub use error::ConfigError;
+//! Every key is optional. Paths are relative to the folder of the file. An error ([`ConfigError`]) is one line that names the file, the
+//! line, the key and the allowed values. The keys of the source are converted to the flags of `echolume stream`, which are checked in one
+//! place; and flags back to keys in messages.
 
 use super::chord::Chord;
 use crate::live::Update;
 use crate::scene::Settings;
-use crate::scene::load::{self, Layers, LoadError, transfer_file};
-use error::{KeyLocations, allowed};
+use crate::scene::load::{self, Layers, LoadError, line_of, transfer_file};
+use crate::text::printable;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use toml::de::{DeTable, DeValue};
 
 /// Default path of the configuration of the service.
 pub const DEFAULT_PATH: &str = "/etc/echolume/echolume.toml";
@@ -264,7 +263,7 @@ impl Config {
     /// # Errors
     /// One line: a path is not UTF-8.
     pub fn to_toml(&self) -> Result<String, String> {
-        toml::to_string(self).map_err(|e| crate::text::printable(&e.to_string()))
+        toml::to_string(self).map_err(|e| printable(&e.to_string()))
     }
 
     /// The settings of the scene in layers: the preset of the phantom if that is the source, then the presets, then the scene.
@@ -414,6 +413,287 @@ mod optional_chord {
             None => serializer.serialize_str("none"),
         }
     }
+}
+
+/// All keys that correspond to flags.
+const SOURCE_KEYS: &[&str] = &[
+    "source",
+    "probe",
+    "rate",
+    "real_time",
+    "rounds",
+    "tool",
+    "clip",
+    "spacing",
+    "hole",
+    "motor.port",
+    "motor.angle",
+    "motor.sweeps",
+    "motor.homed",
+    "motor.delay",
+    "motor.stamps",
+    "motor.baud",
+    "motor.parity",
+    "motor.stop_bits",
+    "motor.timeout",
+];
+
+/// The flag of a key.
+fn flag(key: &str) -> String {
+    match key {
+        "motor.port" => "--motor".into(),
+        key => format!("--{}", key.trim_start_matches("motor.").replace('_', "-")),
+    }
+}
+
+impl Config {
+    /// The arguments of `echolume stream` for the same source, each as one word `--flag=value`.
+    pub fn source_arguments(&self) -> Vec<String> {
+        let path = |path: &Path| path.to_string_lossy().into_owned();
+        let clip = self.clip.map(|clip| clip.map(|n| n.to_string()).join(","));
+        let rounds = if self.forever { Some(u32::MAX) } else { self.rounds };
+        let Motor { port, angle, sweeps, homed, delay, stamps, baud, parity, stop_bits, timeout } =
+            self.motor.clone().unwrap_or_default();
+        fn text<T: ToString>(value: Option<T>) -> Option<String> {
+            value.map(|value| value.to_string())
+        }
+        let values = [
+            ("source", Some(self.source.clone())),
+            ("probe", self.probe.as_deref().map(path)),
+            ("rate", text(self.rate)),
+            ("rounds", text(rounds)),
+            ("tool", self.tool.clone()),
+            ("clip", clip),
+            ("spacing", text(self.spacing)),
+            ("hole", text(self.hole)),
+            ("motor.port", port),
+            ("motor.angle", text(angle)),
+            ("motor.sweeps", text(sweeps)),
+            ("motor.delay", text(delay)),
+            ("motor.baud", text(baud)),
+            ("motor.parity", parity),
+            ("motor.stop_bits", text(stop_bits)),
+            ("motor.timeout", text(timeout)),
+        ];
+        let switches = [("real_time", self.real_time), ("motor.homed", homed), ("motor.stamps", stamps)];
+        let values = values.into_iter().filter_map(|(key, value)| Some(format!("{}={}", flag(key), value?)));
+        values.chain(switches.into_iter().filter(|(_, on)| *on).map(|(key, _)| flag(key))).collect()
+    }
+
+    /// Converts a message about those arguments to one about the file: with keys instead of flags, and the line of the first key.
+    pub fn flag_error(&self, message: &str) -> ConfigError {
+        let mut text_with_keys = message.to_string();
+        let mut first: Option<(usize, &str)> = None;
+        for key in SOURCE_KEYS {
+            let flag = flag(key);
+            let mut from = 0;
+            while let Some(at) = text_with_keys[from..].find(&flag).map(|at| from + at) {
+                let end = at + flag.len();
+                from = end;
+                // Not the start of a longer flag.
+                if text_with_keys[end..].starts_with(|c: char| c == '-' || c.is_alphanumeric()) {
+                    continue;
+                }
+                // The placeholder of the value, such as `<N>`, belongs to the flag.
+                let value =
+                    text_with_keys[end..].strip_prefix(" <").and_then(|rest| rest.find('>')).map_or(0, |n| n + 3);
+                text_with_keys.replace_range(at..end + value, key);
+                from = at + key.len();
+                first = Some(first.filter(|(earlier, _)| *earlier < at).unwrap_or((at, key)));
+            }
+        }
+        match first {
+            // The message begins with the key and its value.
+            Some((0, key)) => self.locations.error_at(key, text_with_keys[key.len()..].trim_start_matches([':', ' '])),
+            Some((_, key)) => self.locations.error_at(key, &text_with_keys),
+            None => self.locations.error_at("", &text_with_keys),
+        }
+    }
+}
+
+/// Longest part of a message that comes from the file, characters.
+const MAX_MESSAGE: usize = 400;
+
+/// An error in a configuration, in one line: the file, the line and the key if they are known, and the fault.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub struct ConfigError {
+    path: PathBuf,
+    /// Line number from 1.
+    line: Option<usize>,
+    key: String,
+    fault: String,
+}
+
+impl ConfigError {
+    fn of_file(path: &Path, fault: String) -> ConfigError {
+        ConfigError::new(path, None, "", &fault)
+    }
+
+    fn new(path: &Path, line: Option<usize>, key: &str, fault: &str) -> ConfigError {
+        let short = |text: &str| match text.char_indices().nth(MAX_MESSAGE) {
+            Some((end, _)) => format!("{} ...", &text[..end]),
+            None => text.to_string(),
+        };
+        ConfigError { path: path.into(), line, key: short(&printable(key)), fault: short(&printable(fault)) }
+    }
+
+    /// The wrong key, such as `display.scale`; empty if the fault is in the file itself.
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}: ", printable(&self.path.display().to_string()))?;
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        if !self.key.is_empty() {
+            write!(f, "{}: ", self.key)?;
+        }
+        write!(f, "{}", self.fault)
+    }
+}
+
+/// The path of the file, and where its keys are, outer keys first.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct KeyLocations {
+    path: PathBuf,
+    keys: Vec<KeyLocation>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct KeyLocation {
+    /// The complete key with its tables, separated by dots.
+    key: String,
+    line: usize,
+    /// Byte ranges of the last part of the key, and of the value.
+    name: Range<usize>,
+    value: Range<usize>,
+}
+
+impl KeyLocations {
+    /// Finds the keys of a text.
+    ///
+    /// # Errors
+    /// The text is not TOML.
+    fn of(text: &str, path: &Path) -> Result<KeyLocations, ConfigError> {
+        let table = DeTable::parse(text).map_err(|e| {
+            let line = e.span().map(|span| line_of(text, span.start));
+            ConfigError::new(path, line, "", e.message())
+        })?;
+        let mut keys = Vec::new();
+        collect_keys("", table.get_ref(), text, &mut keys);
+        Ok(KeyLocations { path: path.into(), keys })
+    }
+
+    /// The folder of the file.
+    fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    fn line(&self, key: &str) -> Option<usize> {
+        self.keys.iter().find(|place| place.key == key).map(|place| place.line)
+    }
+
+    /// An error about the value of a key, with its line. If the file lacks the key, the line is that of the table it belongs to.
+    fn error_at(&self, key: &str, fault: &str) -> ConfigError {
+        let mut at = key;
+        let line = loop {
+            match (self.line(at), at.rsplit_once('.')) {
+                (None, Some((table, _))) => at = table,
+                (line, _) => break line,
+            }
+        };
+        ConfigError::new(&self.path, line, key, fault)
+    }
+
+    /// Converts an error of the parser to one that names the key and the allowed values.
+    fn parse_error(&self, error: &toml::de::Error) -> ConfigError {
+        let at = error.span().unwrap_or_default();
+        let holds = |range: &Range<usize>| range.start <= at.start && at.end <= range.end;
+        let place = self.keys.iter().rfind(|place| holds(&place.name));
+        match place.or_else(|| self.keys.iter().rfind(|place| holds(&place.value))) {
+            None => ConfigError::new(&self.path, None, "", error.message()),
+            Some(place) => {
+                // For an unknown key the parser lists the existing ones.
+                let allowed = allowed(&place.key).map_or(String::new(), |allowed| format!("; must be {allowed}"));
+                let fault = format!("{}{allowed}", error.message());
+                ConfigError::new(&self.path, Some(place.line), &place.key, &fault)
+            }
+        }
+    }
+}
+
+fn collect_keys(above: &str, table: &DeTable, text: &str, keys: &mut Vec<KeyLocation>) {
+    for (name, value) in table {
+        let key = match above {
+            "" => name.get_ref().to_string(),
+            above => format!("{above}.{}", name.get_ref()),
+        };
+        let line = line_of(text, name.span().start);
+        keys.push(KeyLocation { key: key.clone(), line, name: name.span(), value: value.span() });
+        if let DeValue::Table(inner) = value.get_ref() {
+            collect_keys(&key, inner, text, keys);
+        }
+    }
+}
+
+/// The allowed values of each key, for error messages. The ranges of the source's keys are those of the flags, which `cli` checks.
+const ALLOWED: &[(&str, &str)] = &[
+    ("source", "\"phantom\", a file (.mha, .mhd, .vol, .frames) or \"igtl://HOST[:PORT]\""),
+    ("probe", "a file, as \"probe.toml\""),
+    ("rate", "volumes a second, above 0, at most 1e6"),
+    ("real_time", "true or false"),
+    ("rounds", "a whole number of times, 1 or more"),
+    ("loop", "true or false"),
+    ("tool", "the name of a TRANSFORM or tool, or \"image\""),
+    ("clip", "[x, y, width, height] in pixels"),
+    ("spacing", "0.01 to 1000 mm"),
+    ("hole", "0 to 1000 mm"),
+    ("preset", "a list of names, as [\"fetal\"]"),
+    ("device", "a text: the number of a device or a part of its name"),
+    ("motor", "a table with port and sweeps"),
+    ("motor.port", "a serial port, as \"/dev/ttyUSB0\""),
+    ("motor.angle", "degrees"),
+    ("motor.sweeps", "passes a second"),
+    ("motor.homed", "true or false"),
+    ("motor.delay", "0 to 10000 ms"),
+    ("motor.stamps", "true or false"),
+    ("motor.baud", "300 to 4000000 bits a second"),
+    ("motor.parity", "\"none\", \"even\" or \"odd\""),
+    ("motor.stop_bits", "1 or 2"),
+    ("motor.timeout", "20 to 10000 ms"),
+    ("scene", "what a scene file holds"),
+    ("display", "a table"),
+    ("display.full_screen", "true or false"),
+    ("display.direct", "true or false"),
+    ("display.monitor", "a part of the monitor's name"),
+    ("display.size", "[width, height] in pixels, each 64 to 16384"),
+    ("display.present", "\"fifo\" or \"mailbox\""),
+    ("display.panels", "true or false"),
+    ("display.scale", "0.5 to 4"),
+    ("display.budget", "a time from 1ms to 10s, or none"),
+    ("display.report", "the error.json of `echolume report error`, needs display.budget"),
+    ("keys", "a table"),
+    ("keys.exit", "keys as \"ctrl+alt+q\", or \"none\""),
+    ("live", "a table"),
+    ("live.update", "\"whole\" or \"rolling\""),
+    ("live.cine_volumes", "1 to 1000"),
+    ("live.cine_memory_mb", "16 to 65536 MiB"),
+    ("live.retry", "a time from 100ms to 10min"),
+    ("live.record", "a folder"),
+    ("files", "a table"),
+    ("files.pictures", "a folder"),
+    ("files.log", "a file"),
+    ("files.log_size_mb", "1 to 1024 MiB"),
+    ("files.log_files", "1 to 100"),
+];
+
+/// The allowed values of a key.
+fn allowed(key: &str) -> Option<&'static str> {
+    ALLOWED.iter().find(|(name, _)| *name == key).map(|(_, allowed)| *allowed)
 }
 
 #[cfg(test)]

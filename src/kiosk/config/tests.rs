@@ -1,4 +1,3 @@
-use super::error::ALLOWED;
 use super::*;
 use std::collections::BTreeSet;
 

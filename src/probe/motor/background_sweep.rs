@@ -1,9 +1,9 @@
 //! A sweep on a thread of its own, and the recent positions of the array.
 
 use super::drive::Drive;
-use super::fault::{Fault, MotorError, Stopped};
 use super::guard::Interrupter;
 use super::sweep::{ArrayState, Position, Sweep, Track};
+use super::{Fault, MotorError, Stopped};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};

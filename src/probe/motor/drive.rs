@@ -2,12 +2,12 @@
 //!
 //! Home is found by the module's own reference search, or by this program with the home switch.
 
-use super::fault::{Fault, MotorError, Stopped};
 use super::guard::{Guard, Interrupter};
 use super::port::{Answer, PERIOD, Port, PortSettings};
 use super::sweep::{Direction, Position, Sweep};
 use super::table::{Home, MotorTable, Side};
 use super::tmcl::{self, Request, axis};
+use super::{Fault, MotorError, Stopped};
 use std::time::{Duration, Instant};
 
 /// Without any movement for so long the motor has stalled.

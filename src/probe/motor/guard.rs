@@ -3,10 +3,10 @@
 //! A process that is killed (SIGKILL), or whose machine fails, cannot do that. Then only the module's own watchdog stops the motor, see
 //! [`super::tmcl::WATCHDOG`].
 
-use super::fault::{Fault, MotorError, Stopped};
 use super::port::{Answer, Port};
 use super::table::MotorTable;
 use super::tmcl::{LENGTH, Request, SUCCESS, command};
+use super::{Fault, MotorError, Stopped};
 use crate::files::signals::Held;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,12 +1,12 @@
 //! The motor that wobbles the array: a stepper behind a TMCL module on a serial port.
 //!
 //! [`tmcl`] is the protocol and [`port`] the serial port. [`guard`] stops the motor in every case. [`drive`] finds home and sweeps,
-//! [`sweep`] computes the speed and gives each frame its angle and direction, [`background_sweep`] sweeps on a thread of its own during
-//! a stream, and [`simulate`] is a simulated module for tests and demonstrations.
+//! [`sweep`] computes the speed and gives each frame its angle and direction, [`background_sweep`] sweeps on a thread of its own during a
+//! stream, and [`simulate`] is a simulated module for tests and demonstrations. A [`MotorError`] is one line with the fault, the port, what
+//! to do and whether the motor was stopped.
 
 pub mod background_sweep;
 pub mod drive;
-pub mod fault;
 pub mod guard;
 pub mod port;
 #[cfg(target_os = "linux")]
@@ -17,8 +17,82 @@ pub mod tmcl;
 
 pub use background_sweep::{BackgroundSweep, PositionLog};
 pub use drive::{Drive, MotorStatus};
-pub use fault::{Fault, MotorError, Stopped};
 pub use guard::Interrupter;
 pub use port::{Parity, PortSettings, StopBits};
 pub use sweep::{ArrayState, Direction, Position, Sweep, Track};
 pub use table::MotorTable;
+
+use std::time::Duration;
+use table::Side;
+use tmcl::status_words;
+
+/// A fault, with what to do about it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Fault {
+    #[error("the port cannot be opened: {0}; take one that `echolume probe ports` lists and nothing else uses")]
+    NotOpened(String),
+    #[error(
+        "no reply to {request} within {timeout:?}; check the module's power, the cable, --baud, --timeout and the address"
+    )]
+    NoReply { request: String, timeout: Duration },
+    #[error("the reply to {request} is damaged: wrong checksum; check the cable, its ground, --baud and --parity")]
+    Checksum { request: String },
+    #[error("the module refuses {request}: status {status}, {}; check the [motor] table", status_words(*.status))]
+    Refused { request: String, status: u8 },
+    #[error("the {} limit switch is closed at {angle:.2} deg; rotate the array off it by hand, then run home", .side.name())]
+    LimitSwitch { side: Side, angle: f64 },
+    #[error("the motor has stalled at {angle:.2} deg; free the array or lower the acceleration, then run home")]
+    Stalled { angle: f64 },
+    #[error("the port is gone: {0}; is it unplugged? Plug it in, then run home")]
+    Unplugged(String),
+    #[error("this is the wrong module: {found}, and not {wanted} as in the probe file; check the cable and --port")]
+    WrongModule { found: String, wanted: String },
+    #[error("the home switch was not found within the probe's travel; check the switch, home_inverted and home")]
+    HomeNotFound,
+    #[error("{what} has not ended after {limit:?}; check the speeds in the [motor] table and in the module")]
+    TooLong { what: &'static str, limit: Duration },
+    #[error("interrupted by {0}")]
+    Interrupted(&'static str),
+    /// The request exceeds the limits of the probe or the module. Nothing moved.
+    #[error("{0}")]
+    OutOfRange(String),
+}
+
+/// Whether the motor was stopped after a fault.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stopped {
+    /// It was never moved.
+    NotMoved,
+    /// The module confirmed that it stopped.
+    Confirmed,
+    /// The command to stop was sent, but the module did not confirm it: the reason.
+    Unconfirmed(String),
+    /// The command to stop could not be sent: the reason.
+    Failed(String),
+}
+
+/// A fault, where it occurred, and whether the motor was stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotorError {
+    pub port: String,
+    /// The operation that failed: "sweep", "home" ...
+    pub operation: &'static str,
+    pub fault: Fault,
+    pub stopped: Stopped,
+}
+
+impl std::error::Error for MotorError {}
+
+impl std::fmt::Display for MotorError {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}: {}: {}", self.port, self.operation, self.fault)?;
+        match &self.stopped {
+            Stopped::NotMoved => Ok(()),
+            Stopped::Confirmed => write!(f, ". The motor was stopped"),
+            Stopped::Unconfirmed(why) => {
+                write!(f, ". The motor was told to stop but has not confirmed it ({why}): if it turns, cut its power")
+            }
+            Stopped::Failed(why) => write!(f, ". The motor could not be stopped: {why}: cut its power"),
+        }
+    }
+}

@@ -4,7 +4,7 @@
 //! the port's input is discarded before each request, and after a time-out also what still arrives. Only requests that may be carried
 //! out twice are sent again ([`Request::repeatable`]).
 
-use super::fault::Fault;
+use super::Fault;
 use super::tmcl::{LENGTH, Reply, Request, SUCCESS};
 use serialport::{ClearBuffer, SerialPort};
 use std::io::{self, ErrorKind};

@@ -1,6 +1,6 @@
 //! A sweep: its speed, and the position and direction of the array at any time, from the positions that were read. Pure.
 
-use super::fault::Fault;
+use super::Fault;
 use super::port::PERIOD;
 use super::table::MotorTable;
 use std::time::Duration;

@@ -3,16 +3,14 @@
 
 mod frame;
 
-use super::command::{Command, Tool};
+use super::command::{Command, HeldKeys, Tool};
 use super::controls::{Change, Controls};
 use super::export::Exporter;
-use super::frame_budget::FrameBudget;
+use super::frame_budget::{FrameBudget, Rung, built_in_ladder};
 use super::gestures::Gestures;
 use super::input::Input;
-use super::keys::HeldKeys;
 use super::panels::{self, Note, Panels};
 use super::picking::Viewport;
-use super::quality_ladder::{self, Rung};
 use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
@@ -80,7 +78,7 @@ impl Default for ConsoleOptions {
             queues: None,
             cine: CineLimits::default(),
             budget: None,
-            rungs: quality_ladder::built_in(),
+            rungs: built_in_ladder(),
             retry: None,
             record: None,
             folder: ".".into(),

@@ -1,11 +1,10 @@
 //! Keyboards, mice and touch screens read from the kernel (evdev), for a machine without a windowing system. `reader` reads them,
-//! `profile` classifies them, and `translator` converts their events to inputs.
+//! `profile` classifies them and their keys, and `translator` converts their events to inputs.
 //!
 //! One thread waits for all devices and sends messages through a channel of bounded length. With a thread per device, the thread of an
 //! idle device could not be ended and would hold its device. If devices were read between pictures, the kernel would drop events during
 //! a slow picture. If the channel is full the thread waits; events that the kernel then drops are detected and resynchronised.
 
-mod keymap;
 mod profile;
 mod reader;
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Translates the events of all devices into inputs. It knows devices only by number, so it is tested without hardware.
 
-use super::keymap::{self, Meaning};
-use super::profile::{Pointing, Profile};
+use super::profile::{self, Meaning, Pointing, Profile};
 use super::touch::{Area, Fingers, Pad, PadMotion};
 use crate::ui::input::{Input, Modifiers};
 use evdev::{AbsoluteAxisCode as Abs, EventType, KeyCode, RelativeAxisCode as Rel, SynchronizationCode};
@@ -70,8 +69,8 @@ impl Device {
     /// The meaning of a key or button of this device, if it has one.
     pub(super) fn meaning(&self, code: u16) -> Option<Meaning> {
         match self.profile.pointing {
-            Pointing::Absolute(_) => keymap::pen_meaning(code),
-            _ => keymap::meaning(code),
+            Pointing::Absolute(_) => profile::pen_meaning(code),
+            _ => profile::meaning(code),
         }
     }
 

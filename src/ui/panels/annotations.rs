@@ -1,7 +1,6 @@
 //! Annotations of the picture: a scale in every tile, the orientation of the axes, and a colour bar.
 
-use super::state::{PanelState, picture_rect};
-use super::theme::{SMALL_TEXT, TEXT, WEAK_TEXT};
+use super::{PanelState, SMALL_TEXT, TEXT, WEAK_TEXT, picture_rect};
 use crate::passes::postprocess::tone;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};

@@ -1,7 +1,8 @@
 //! The panels with buttons and sliders: modes and tools on the left, sliders on the right, the cine loop below.
 
-use super::state::{CINE_BAR_HEIGHT, MODES_WIDTH, PanelState, SLIDERS_WIDTH};
-use super::theme::{ACCENT, SMALL_TEXT, TOUCH_SIZE, WARNING, WEAK_TEXT};
+use super::{
+    ACCENT, CINE_BAR_HEIGHT, MODES_WIDTH, PanelState, SLIDERS_WIDTH, SMALL_TEXT, TOUCH_SIZE, WARNING, WEAK_TEXT,
+};
 use crate::scene::{ColourMap, Layout, Mode, PlaneName, Transfer, TransferName};
 use crate::ui::command::{Command, Tool};
 use crate::ui::sliders::{Group, SLIDERS};

@@ -1,19 +1,23 @@
 //! The panels around and over the picture, laid out by egui. They show a [`PanelState`] and return commands. Their positions depend only on
 //! the size of the window, so that the size of the picture is known before anything is drawn.
+//!
+//! The theme is dark, so that the picture is the brightest part of the screen, and large enough for gloves and for reading from 2 m.
 
 mod annotations;
 mod controls;
 mod overlays;
-mod state;
-mod theme;
-
-pub use state::picture_area;
-pub(super) use state::{Banner, Note, PanelState};
 
 use super::command::Command;
 use super::input::{Button, Input, Modifiers, Phase};
 use crate::gpu;
-use egui::{Event, Modifiers as EguiModifiers, MouseWheelUnit, PointerButton, Pos2, Rect, TouchPhase, pos2, vec2};
+use crate::scene::Scene;
+use crate::ui::controls::Controls;
+use crate::ui::times::Times;
+use egui::{
+    Color32, CornerRadius, Event, FontData, FontDefinitions, FontFamily, FontId, Modifiers as EguiModifiers,
+    MouseWheelUnit, PointerButton, Pos2, Rect, Stroke, TextStyle, Theme, TouchPhase, pos2, vec2,
+};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The result of a layout.
@@ -36,7 +40,7 @@ impl Panels {
     /// `scale`: pixels per point, limited to 0.5..=4; above 1 everything is larger.
     pub(super) fn new(scale: f32) -> Panels {
         let context = egui::Context::default();
-        theme::apply(&context);
+        apply_theme(&context);
         Panels { context, egui_input: EguiInput::default(), scale: scale.clamp(0.5, 4.0) }
     }
 
@@ -189,4 +193,138 @@ impl EguiInput {
     fn take(&mut self) -> (Vec<Event>, EguiModifiers) {
         (std::mem::take(&mut self.events), self.modifiers)
     }
+}
+
+/// Sizes of the panels, points: buttons on the left, sliders on the right, cine loop below.
+const MODES_WIDTH: f32 = 208.0;
+const SLIDERS_WIDTH: f32 = 330.0;
+const CINE_BAR_HEIGHT: f32 = 76.0;
+/// A smaller window shows the picture without panels, points.
+const MIN_WINDOW: [f32; 2] = [760.0, 420.0];
+
+/// What the panels show.
+pub(super) struct PanelState<'a> {
+    pub(super) controls: &'a Controls,
+    pub(super) scene: Option<&'a Scene>,
+    pub(super) times: &'a Times,
+    /// Upper left corner and size of the picture, pixels.
+    pub(super) picture: ([u32; 2], [u32; 2]),
+    pub(super) shows_panels: bool,
+    pub(super) shows_help: bool,
+    pub(super) shows_times: bool,
+    pub(super) is_frozen: bool,
+    pub(super) is_playing: bool,
+    /// Number of volumes in the cine loop, and the index of the one that is shown.
+    pub(super) cine: (usize, Option<usize>),
+    /// True after the first picture.
+    pub(super) has_drawn: bool,
+    /// The current rung of the quality ladder, and the frame budget.
+    pub(super) quality: &'a str,
+    pub(super) budget: Option<Duration>,
+    pub(super) banner: Option<Banner>,
+    pub(super) notes: &'a [Note],
+    /// The keys that end the program, for the help.
+    pub(super) exit_key: &'a str,
+    /// Where to draw a pointer, pixels of the window. None if the windowing system draws it.
+    pub(super) pointer: Option<[f64; 2]>,
+}
+
+/// A message that lasts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Banner {
+    pub(super) title: String,
+    pub(super) text: String,
+    pub(super) is_fault: bool,
+}
+
+/// A message about an event.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Note {
+    pub(super) text: String,
+    pub(super) is_fault: bool,
+}
+
+/// The area that the panels leave for the picture in a window of this size: upper left corner and size, pixels.
+pub fn picture_area(size: [u32; 2], scale: f32, shows_panels: bool) -> ([u32; 2], [u32; 2]) {
+    let points = size.map(|n| n as f32 / scale);
+    if !shows_panels || points[0] < MIN_WINDOW[0] || points[1] < MIN_WINDOW[1] {
+        return ([0, 0], size.map(|n| n.max(1)));
+    }
+    let [left, right, below] = [MODES_WIDTH, SLIDERS_WIDTH, CINE_BAR_HEIGHT].map(|edge| (edge * scale).round() as u32);
+    ([left, 0], [(size[0] - left - right).max(1), (size[1] - below).max(1)])
+}
+
+/// The area of the picture in points.
+fn picture_rect(state: &PanelState, scale: f32) -> Rect {
+    let ([x, y], [w, h]) = state.picture;
+    let [x, y, w, h] = [x, y, w, h].map(|n| n as f32 / scale);
+    Rect::from_min_size(pos2(x, y), vec2(w, h))
+}
+
+const BACKGROUND: Color32 = Color32::from_rgb(9, 10, 13);
+const PANEL: Color32 = Color32::from_rgb(18, 21, 26);
+const BUTTON: Color32 = Color32::from_rgb(36, 42, 50);
+const TEXT: Color32 = Color32::from_rgb(214, 221, 229);
+const WEAK_TEXT: Color32 = Color32::from_rgb(138, 150, 163);
+const ACCENT: Color32 = Color32::from_rgb(64, 184, 220);
+const GOOD: Color32 = Color32::from_rgb(110, 200, 120);
+const WARNING: Color32 = Color32::from_rgb(250, 190, 70);
+const FAULT: Color32 = Color32::from_rgb(240, 96, 84);
+
+/// Size of running text, points: at a scale of 1 on a monitor with 96 dots per inch it is 5 mm high, which a healthy eye reads from 2 m.
+const TEXT_SIZE: f32 = 19.0;
+/// Size of important text, such as messages.
+const LARGE_TEXT: f32 = 26.0;
+const SMALL_TEXT: f32 = 15.0;
+/// Minimum size of a button for a gloved finger, points: 14 mm at 96 dots per inch.
+const TOUCH_SIZE: f32 = 52.0;
+
+/// Sets typeface, sizes and colours.
+fn apply_theme(context: &egui::Context) {
+    let mut fonts = FontDefinitions::empty();
+    let faces = [
+        ("sans", FontFamily::Proportional, dejavu::sans_condensed::regular()),
+        ("mono", FontFamily::Monospace, dejavu::sans_mono::regular()),
+    ];
+    for (name, family, bytes) in faces {
+        fonts.font_data.insert(name.into(), Arc::new(FontData::from_static(bytes)));
+        fonts.families.insert(family, vec![name.into()]);
+    }
+    context.set_fonts(fonts);
+    context.set_theme(Theme::Dark);
+    let mut style = (*context.style_of(Theme::Dark)).clone();
+    let text = |size| FontId::proportional(size);
+    style.text_styles = [
+        (TextStyle::Small, text(SMALL_TEXT)),
+        (TextStyle::Body, text(TEXT_SIZE)),
+        (TextStyle::Button, text(TEXT_SIZE)),
+        (TextStyle::Heading, text(LARGE_TEXT)),
+        (TextStyle::Monospace, FontId::monospace(SMALL_TEXT)),
+    ]
+    .into();
+    style.spacing.item_spacing = vec2(8.0, 8.0);
+    style.spacing.button_padding = vec2(8.0, 6.0);
+    style.spacing.interact_size = vec2(TOUCH_SIZE, TOUCH_SIZE * 0.7);
+    style.spacing.slider_rail_height = 10.0;
+    style.spacing.scroll.bar_width = 14.0;
+    style.interaction.selectable_labels = false;
+    // A tooltip would cover the picture, and a finger cannot hover.
+    style.interaction.tooltip_delay = f32::INFINITY;
+    let visuals = &mut style.visuals;
+    visuals.panel_fill = PANEL;
+    visuals.window_fill = PANEL;
+    visuals.extreme_bg_color = BACKGROUND;
+    visuals.override_text_color = Some(TEXT);
+    visuals.selection.bg_fill = ACCENT.gamma_multiply(0.55);
+    visuals.selection.stroke = Stroke::new(1.5, Color32::WHITE);
+    visuals.slider_trailing_fill = true;
+    for widget in [&mut visuals.widgets.inactive, &mut visuals.widgets.hovered, &mut visuals.widgets.active] {
+        (widget.bg_fill, widget.weak_bg_fill) = (BUTTON, BUTTON);
+        widget.corner_radius = CornerRadius::same(6);
+        widget.expansion = 0.0;
+    }
+    visuals.widgets.hovered.bg_stroke = Stroke::new(1.0, WEAK_TEXT);
+    visuals.widgets.active.bg_fill = ACCENT.gamma_multiply(0.4);
+    visuals.widgets.active.weak_bg_fill = ACCENT.gamma_multiply(0.4);
+    context.set_style_of(Theme::Dark, style);
 }

@@ -1,11 +1,10 @@
 //! What is drawn over the picture: banner and notes, times, help, and the pointer where no windowing system draws one.
 
-use super::state::{PanelState, picture_rect};
-use super::theme::{
-    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, SMALL_TEXT, TEXT, TEXT_SIZE, WARNING, WEAK_TEXT,
+use super::{
+    ACCENT, BACKGROUND, FAULT, GOOD, LARGE_TEXT, PANEL, PanelState, SMALL_TEXT, TEXT, TEXT_SIZE, WARNING, WEAK_TEXT,
+    picture_rect,
 };
-use crate::ui::command::Command;
-use crate::ui::keys;
+use crate::ui::command::{self, Command};
 use egui::{
     Align2, Area, Color32, Frame, Id, LayerId, Margin, Mesh, Order, Rect, RichText, ScrollArea, Shape, Stroke, Ui,
     Vec2, pos2, vec2,
@@ -194,7 +193,7 @@ pub(super) fn show_help(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMut
                 });
                 let height = (screen.height() - 150.0).max(0.0);
                 ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| {
-                    let keys: Vec<(String, &str)> = keys::help().collect();
+                    let keys: Vec<(String, &str)> = command::help().collect();
                     let half = keys.len().div_ceil(2);
                     let rows = |ui: &mut Ui, rows: &[(String, &str)]| {
                         for (key, label) in rows {

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::scene::{ColourMap, TransferName};
+use crate::ui::command::{HeldKeys, KEY_BINDINGS};
 use crate::ui::input::Phase;
-use crate::ui::keys::{HeldKeys, KEY_BINDINGS};
 use proptest::prelude::*;
 
 /// Numbers of users, and of broken drivers.

@@ -1,8 +1,7 @@
 //! Compares a run with an earlier one, also within tolerances: a driver whose results differ from those of the previous version is worth
 //! reporting before any check fails.
 
-use super::numbers::{amount, change, number};
-use super::{Figure, Outcome, Run, Unit, Verdict};
+use super::{Figure, Outcome, Run, Unit, Verdict, amount, change, number};
 use crate::profile::compare as profile;
 use crate::profile::compare::{Kind, Line, Series};
 use crate::text::escaped;

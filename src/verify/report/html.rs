@@ -1,9 +1,9 @@
 //! A run as a self-contained HTML page: no network, no script, no other file. Failures come first.
 
 use super::baseline::{BaselineComparison, Class};
-use super::numbers::{amount, percent, seconds, value_of_limit};
-use super::summary::fault_items;
-use super::{Figure, Outcome, PictureComparison, Run, Unit, Verdict};
+use super::{
+    Figure, Outcome, PictureComparison, Run, Unit, Verdict, amount, fault_items, percent, seconds, value_of_limit,
+};
 use crate::picture::Picture;
 use crate::profile::LEVEL;
 use crate::profile::statistics::Sample;

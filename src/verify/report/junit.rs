@@ -1,8 +1,7 @@
 //! A run as JUnit XML for CI systems: one suite per group, one case per check.
 
 use super::baseline::BaselineComparison;
-use super::numbers::value_of_limit;
-use super::{Outcome, Run, Verdict, summary};
+use super::{Outcome, Run, Verdict, comparison, failure, value_of_limit};
 use crate::text::escaped;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::time::Duration;
@@ -63,7 +62,7 @@ fn case(outcome: &Outcome) -> TestCase {
                 0 | 1 => String::new(),
                 count => format!(" (and {} more)", count - 1),
             };
-            status.set_message(first + &more).set_type("failed").set_description(summary::failure(outcome));
+            status.set_message(first + &more).set_type("failed").set_description(failure(outcome));
             status
         }
         Verdict::LeftOut => {
@@ -97,13 +96,13 @@ fn baseline(run: &Run, compared: &BaselineComparison) -> TestSuite {
                 if worse == 1 { "check is" } else { "checks are" },
                 compared.baseline
             );
-            status.set_message(message).set_type("worse").set_description(summary::comparison(compared));
+            status.set_message(message).set_type("worse").set_description(comparison(compared));
             status
         }
     };
     let mut case = TestCase::new("nothing is worse than before", status);
     case.set_classname("baseline").set_time(Duration::ZERO);
-    case.set_system_out(summary::comparison(compared));
+    case.set_system_out(comparison(compared));
     let mut suite = suite_on(run, "baseline");
     suite.set_time(Duration::ZERO).add_test_case(case);
     suite

@@ -1,18 +1,21 @@
-//! The result of `echolume verify`: every check with its errors, times and faults, and the device it ran on; and its reports as JSON (here),
-//! text, JUnit XML and HTML. Nothing here runs a device.
+//! The result of `echolume verify`: every check with its errors, times and faults, and the device it ran on; and its reports as JSON and as
+//! text for a terminal (here), JUnit XML and HTML. Nothing here runs a device.
+//!
+//! The text has lines of groups, failures, the summary, and the comparison with a baseline. Numbers with units have as many digits as a
+//! reader needs.
 
 pub mod baseline;
 pub mod html;
 pub mod junit;
-pub mod numbers;
-pub mod summary;
 
 use crate::machine::Device;
 use crate::picture::Picture;
 use crate::profile::statistics::{Sample, SampleError};
 use crate::text::escaped;
+use baseline::{BaselineComparison, Class};
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
+use std::fmt::Write as _;
 
 /// Version of the JSON format.
 pub const FORMAT: &str = "echolume-verify-1";
@@ -433,5 +436,238 @@ mod any_number {
                 _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
             }
         }
+    }
+}
+
+/// Maximum number of changes of a class that are listed, except those that fail the run.
+const MAX_CHANGES: usize = 40;
+
+/// One line on a group, without line break: verdicts, duration, and the check that is closest to its tolerance.
+pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
+    let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
+    let mut line =
+        format!("{:<18} {}", escaped(group), counts([Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(count)));
+    let _ = write!(line, " in {}", seconds(outcomes.iter().map(|o| o.seconds).sum()));
+    let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
+    let used = passed.filter_map(|o| Some((o, o.tightest()?.used()?))).filter(|(_, used)| *used > 0.0);
+    if let Some((outcome, used)) = used.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
+        let _ = write!(line, "; nearest to its tolerance: {}, {}", escaped(&outcome.name), percent(used));
+    }
+    line
+}
+
+/// Numbers of passed, failed and left out checks; zeros are omitted.
+fn counts(of: [usize; 3]) -> String {
+    let words = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(Verdict::word);
+    let texts = of.iter().zip(words).filter(|(count, _)| **count > 0).map(|(count, word)| format!("{count} {word}"));
+    let texts: Vec<String> = texts.collect();
+    if texts.is_empty() { "no checks".into() } else { texts.join(", ") }
+}
+
+/// A failed check in full, one line per item, each with line break.
+pub fn failure(outcome: &Outcome) -> String {
+    let mut text = format!("{}: {}\n", outcome.title(), outcome.verdict.word());
+    for fault in &outcome.faults {
+        let _ = writeln!(text, "  {}", escaped(&fault.what));
+        for (name, value) in fault_items(fault) {
+            let _ = writeln!(text, "    {name}: {value}");
+        }
+    }
+    for figure in outcome.figures.iter().filter(|f| f.used().is_some_and(|used| used > 1.0)) {
+        let _ = writeln!(text, "  {}: {}", escaped(&figure.what), value_of_limit(figure));
+    }
+    for note in &outcome.notes {
+        let _ = writeln!(text, "  {}", escaped(note));
+    }
+    text
+}
+
+/// Details of a fault as names and values, one line each.
+fn fault_items(fault: &Fault) -> Vec<(&'static str, String)> {
+    let mut items = Vec::new();
+    items.extend(fault.pass.as_deref().map(|pass| ("pass", escaped(pass))));
+    if !fault.input.is_empty() {
+        items.push(("input", escaped(&fault.input)));
+    }
+    if let Some(worst) = &fault.worst {
+        let [expected, got] = expected_and_got(worst.expected, worst.got);
+        items.push(("worst pixel", place(worst)));
+        items.push(("expected", expected));
+        items.push(("got", got));
+        items.push(("beyond tolerance", beyond(worst)));
+    }
+    if !fault.files.is_empty() {
+        items.push(("files", fault.files.iter().map(|f| escaped(f)).collect::<Vec<_>>().join(", ")));
+    }
+    items
+}
+
+/// Position of the worst texel.
+fn place(worst: &Worst) -> String {
+    let [x, y, z] = worst.at;
+    format!("at ({x}, {y}, {z}) of {}, channel {}", escaped(&worst.output), worst.channel)
+}
+
+fn beyond(worst: &Worst) -> String {
+    let share = 100.0 * worst.beyond as f64 / worst.texels.max(1) as f64;
+    format!("{} of {} texels ({} %)", worst.beyond, worst.texels, number(share))
+}
+
+/// The last line of a run, without line break.
+pub fn summary(run: &Run) -> String {
+    let device = &run.device;
+    let validation = if run.validation { ", validation layer watching" } else { "" };
+    format!(
+        "passed {}, failed {}, left out {} in {} on {}, {}, Vulkan {} ({}{validation})",
+        run.count(Verdict::Passed),
+        run.count(Verdict::Failed),
+        run.count(Verdict::LeftOut),
+        seconds(run.seconds),
+        escaped(&device.name),
+        escaped(&device.driver),
+        escaped(&device.api),
+        run.level.word(),
+    )
+}
+
+/// Changes since an earlier run, the worst first, in lines. Changes that fail the run are all listed; of the others only some, with
+/// the number of the rest.
+pub fn comparison(compared: &BaselineComparison) -> String {
+    let mut text = format!("compared with {}\n", compared.baseline);
+    for line in compared.differences.iter().chain(&compared.notes) {
+        let _ = writeln!(text, "{line}");
+    }
+    for class in Class::ALL {
+        let changes: Vec<_> = compared.changes.iter().filter(|c| c.class == class).collect();
+        let listed = if class == Class::Worse { changes.len() } else { changes.len().min(MAX_CHANGES) };
+        if listed > 0 {
+            let _ = writeln!(text, "{}:", class.word());
+        }
+        for change in &changes[..listed] {
+            let _ = writeln!(text, "  {change}");
+        }
+        if listed < changes.len() {
+            let _ = writeln!(text, "  and {} more", changes.len() - listed);
+        }
+    }
+    let _ = writeln!(text, "{}", compared.conclusion());
+    text
+}
+
+/// Significant digits.
+const DIGITS: usize = 3;
+/// Significant digits that distinguish all f64.
+const MAX_DIGITS: usize = 17;
+
+/// Three significant digits; scientific notation for very large and very small numbers.
+pub fn number(value: f64) -> String {
+    to_digits(value, DIGITS)
+}
+
+fn to_digits(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "NaN".into();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 { "infinity".into() } else { "-infinity".into() };
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let power = value.abs().log10().floor() as i32;
+    let trimmed = |text: String| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
+        false => text,
+    };
+    if (-3..6).contains(&power) {
+        let decimals = (digits as i32 - 1 - power).max(0) as usize;
+        return trimmed(format!("{value:.decimals$}"));
+    }
+    let text = format!("{value:.*e}", digits - 1);
+    match text.split_once('e') {
+        Some((mantissa, power)) => format!("{}e{power}", trimmed(mantissa.into())),
+        None => text,
+    }
+}
+
+/// The factor and the suffix with which values of a unit are printed.
+fn scale(unit: Unit, largest: f64) -> (f64, &'static str) {
+    match unit {
+        Unit::Value | Unit::Count => (1.0, ""),
+        Unit::Levels => (1.0, " levels"),
+        Unit::Millimetres => (1.0, " mm"),
+        Unit::Share => (100.0, " %"),
+        Unit::Ns if largest >= 1e9 => (1e-9, " s"),
+        Unit::Ns if largest >= 1e6 => (1e-6, " ms"),
+        Unit::Ns if largest >= 1e3 => (1e-3, " us"),
+        Unit::Ns => (1.0, " ns"),
+    }
+}
+
+/// A value times a factor with this many significant digits; counts with all digits.
+fn shown(value: f64, unit: Unit, factor: f64, digits: usize) -> String {
+    match unit {
+        Unit::Count if value.fract() == 0.0 && value.abs() < 1e15 => format!("{value:.0}"),
+        _ => to_digits(value * factor, digits),
+    }
+}
+
+/// A value with its unit.
+pub fn amount(value: f64, unit: Unit) -> String {
+    let (factor, word) = scale(unit, value);
+    match shown(value, unit, factor, DIGITS) {
+        one if one == "1" && unit == Unit::Levels => "1 level".into(),
+        shown => shown + word,
+    }
+}
+
+/// Two values with enough digits to distinguish them, and their unit.
+fn distinguishable(values: [f64; 2], unit: Unit) -> ([String; 2], &'static str) {
+    let (factor, word) = scale(unit, values[0].abs().max(values[1].abs()));
+    let with = |digits| values.map(|v| shown(v, unit, factor, digits));
+    let texts = (DIGITS..=MAX_DIGITS).map(with).find(|[a, b]| a != b || values[0] == values[1]);
+    (texts.unwrap_or_else(|| with(DIGITS)), word)
+}
+
+/// Expected and actual value with enough digits to distinguish them.
+pub fn expected_and_got(expected: f64, got: f64) -> [String; 2] {
+    distinguishable([expected, got], Unit::Value).0
+}
+
+/// Two values and their unit: `0.8 -> 1.9 levels`.
+pub fn change(old: f64, new: f64, unit: Unit) -> String {
+    let ([old, new], word) = distinguishable([old, new], unit);
+    format!("{old} -> {new}{word}")
+}
+
+/// A figure's value and its limit: `0.8 of 2 levels`.
+pub fn value_of_limit(figure: &Figure) -> String {
+    let Some(allowed) = figure.allowed else { return amount(figure.value, figure.unit) };
+    let ([value, allowed], word) = distinguishable([figure.value, allowed], figure.unit);
+    let word = if allowed == "1" && figure.unit == Unit::Levels { " level" } else { word };
+    format!("{value} of {allowed}{word}")
+}
+
+/// A share in integer percent; 100 only if exactly 1.
+pub fn percent(share: f64) -> String {
+    match share {
+        s if !s.is_finite() || s >= 100.0 => "over 9999 %".into(),
+        s if s > 1.0 => format!("{:.0} %", (s * 100.0).ceil()),
+        s if s > 0.0 && s < 0.01 => "under 1 %".into(),
+        s if s < 1.0 => format!("{:.0} %", (s * 100.0).floor()),
+        _ => "100 %".into(),
+    }
+}
+
+/// A duration, given in s.
+pub fn seconds(s: f64) -> String {
+    match s {
+        s if s >= 3600.0 => format!("{} h {} min", (s / 3600.0) as u64, ((s % 3600.0) / 60.0) as u64),
+        s if s >= 120.0 => format!("{} min {} s", (s / 60.0) as u64, (s % 60.0) as u64),
+        s if s >= 10.0 => format!("{s:.0} s"),
+        s if s >= 1.0 => format!("{s:.1} s"),
+        s if s >= 0.001 => format!("{:.0} ms", s * 1e3),
+        s if s > 0.0 => "under 1 ms".into(),
+        _ => "0 s".into(),
     }
 }

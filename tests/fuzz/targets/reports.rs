@@ -5,8 +5,8 @@ use echolume::error_report::{Measure, Report, choose, export as error_export};
 use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
 #[cfg(feature = "view")]
-use echolume::ui::quality_ladder;
-use echolume::verify::report::{self, baseline, html as page, junit, summary};
+use echolume::ui::frame_budget::measured_ladder;
+use echolume::verify::report::{self, baseline, html as page, junit};
 
 pub fn error_report(bytes: &[u8]) -> String {
     let report = match Report::from_json(&String::from_utf8_lossy(bytes)) {
@@ -24,7 +24,7 @@ pub fn error_report(bytes: &[u8]) -> String {
     #[cfg(not(feature = "view"))]
     let rungs = 0;
     #[cfg(feature = "view")]
-    let rungs = quality_ladder::measured(&report).map_or(0, |rungs| rungs.len());
+    let rungs = measured_ladder(&report).map_or(0, |rungs| rungs.len());
     format!("{} {rungs} {}", outcome.len(), error_export::csv(&report).len())
 }
 
@@ -68,5 +68,5 @@ pub fn verification(bytes: &[u8]) -> String {
     assert!(compared.lines().is_empty(), "{:?}", compared.lines());
     junit::junit(&run, Some(&compared)).expect("XML");
     page::html(&run, Some(&compared)).expect("a page");
-    told(summary::summary(&run))
+    told(report::summary(&run))
 }

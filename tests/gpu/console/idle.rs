@@ -50,7 +50,7 @@ fn an_exceeded_frame_budget_lowers_quality_only_during_interaction() {
     let mut desk = Desk::new(&device, ConsoleOptions { settings, budget, ..options() });
     desk.begin();
     desk.live(0);
-    let last = quality_ladder::built_in().len() - 1;
+    let last = built_in_ladder().len() - 1;
     let mut coarse = 0;
     desk.console.input(&Input::Moved([40.0, 36.0]));
     desk.console.input(&Input::Button { button: Button::Left, pressed: true });

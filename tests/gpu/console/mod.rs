@@ -19,8 +19,8 @@ use echolume::source::Frame;
 use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
 use echolume::ui::console::{Console, ConsoleError, ConsoleOptions, LoopRequest};
+use echolume::ui::frame_budget::built_in_ladder;
 use echolume::ui::input::{Button, Input, Key, Modifiers};
-use echolume::ui::quality_ladder;
 use echolume::ui::source_supervisor::OpenSource;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -43,7 +43,7 @@ pub fn options() -> ConsoleOptions {
         queues: None,
         cine: ROOM,
         budget: None,
-        rungs: quality_ladder::built_in(),
+        rungs: built_in_ladder(),
         retry: None,
         record: None,
         folder: std::env::temp_dir(),

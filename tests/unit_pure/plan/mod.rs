@@ -10,7 +10,7 @@ use crate::common::scenes::{self, BYTES};
 use echolume::passes::{Frequency, Slot};
 use echolume::plan::{Plan, Step, affected};
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::Scene;
+use echolume::scene::{Scene, VisibleBounds};
 
 fn fan(advance: Advance) -> Geometry {
     Geometry::Sweep(Probe { advance, ..wobbler() })
@@ -112,4 +112,13 @@ fn runs_of_slices_end_where_the_volume_does() {
     // Adjacent without an overlap: one run all the same.
     assert_eq!(affected(&changed(&[0, 3]), 1), vec![0..5; 1]);
     assert_eq!(affected(&changed(&[1, 2]), 0), vec![1..3; 1]);
+}
+
+#[test]
+fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
+    for side in [[30.0, 38.0], [-38.0, -30.0]] {
+        let settings = format!("mode = 'mip'\nregion = {{ lateral = {side:?}, depth = [2, 6] }}");
+        let scene = scene(fan(Advance::None), &settings);
+        assert_eq!((scene.seen, scene.share_seen(), scene.frames_seen()), (VisibleBounds::default(), 0.0, 0..0));
+    }
 }

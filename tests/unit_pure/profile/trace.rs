@@ -2,7 +2,7 @@
 
 use super::simulated::{Random, pass, profile};
 use echolume::profile::Profile;
-use echolume::profile::trace::{Span, Track, chrome};
+use echolume::profile::export::{Span, Track, chrome_trace};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ fn span(name: &str, track: Track, begin_ns: f64, end_ns: f64) -> Span {
 }
 
 fn events(profile: &Profile, spans: &[Span]) -> Vec<Value> {
-    let text = chrome(profile, spans).unwrap_or_else(|e| panic!("{e}"));
+    let text = chrome_trace(profile, spans).unwrap_or_else(|e| panic!("{e}"));
     let trace: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(trace["displayTimeUnit"], "ns");
     assert_eq!(trace["otherData"]["device"], "simulated");
@@ -131,7 +131,8 @@ fn a_clock_that_is_not_tied_is_named() {
 #[test]
 fn invalid_time_spans_are_refused() {
     for (begin, end) in [(5.0, 4.0), (f64::NAN, 1.0), (0.0, f64::INFINITY), (-1e300, 0.0)] {
-        let error = chrome(&profile(1), &[span("bad", Track::Host, begin, end)]).expect_err("refused").to_string();
+        let error =
+            chrome_trace(&profile(1), &[span("bad", Track::Host, begin, end)]).expect_err("refused").to_string();
         assert!(error.starts_with("span \"bad\" of repeat 0: from "), "{error}");
     }
 }

@@ -4,7 +4,7 @@ use super::profile;
 use super::profile::Random;
 use super::simulated::{any_run, check, fail, outcome, run, slower};
 use echolume::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
-use echolume::verify::report::{Figure, Level, Run, Unit, Verdict, summary};
+use echolume::verify::report::{self, Figure, Level, Run, Unit, Verdict};
 use proptest::prelude::*;
 
 fn compared(old: &Run, new: &Run) -> BaselineComparison {
@@ -120,12 +120,12 @@ fn the_terminal_lists_every_worse_check_and_some_others() {
         }
         many
     };
-    let text = summary::comparison(&compared(&many(0.5), &many(1.0)));
+    let text = report::comparison(&compared(&many(0.5), &many(1.0)));
     assert!(
         text.contains("input 39: ") && !text.contains("input 40: ") && text.contains("\n  and 60 more\n"),
         "{text}"
     );
-    let text = summary::comparison(&compared(&many(0.5), &many(3.0)));
+    let text = report::comparison(&compared(&many(0.5), &many(3.0)));
     assert!(text.contains("input 99: ") && !text.contains(" more\n"), "{text}");
 }
 
@@ -243,7 +243,7 @@ fn the_text_lists_the_worst_first() {
         check(new, "passes", "median").figures[0].value = 1.0;
         fail(new, "modes", "vr");
     });
-    let text = summary::comparison(&both);
+    let text = report::comparison(&both);
     let expected = "compared with the run of 2026-01-02T03:04:05Z (echolume 0.1.0, release, quick) on simulated, none 1.0\n\
         driver: none 1.0 -> none 1.1\n\
         worse:\n  modes / vr: passed -> failed: the output differs by more than its tolerance\n\

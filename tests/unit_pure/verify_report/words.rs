@@ -2,8 +2,9 @@
 
 use super::simulated::{any_run, check, empty, fail, outcome, run};
 use echolume::text::escaped;
-use echolume::verify::report::numbers::{amount, change, expected_and_got, number, percent, seconds, value_of_limit};
-use echolume::verify::report::{Figure, Outcome, Unit, Verdict, summary};
+use echolume::verify::report::{
+    self, Figure, Outcome, Unit, Verdict, amount, change, expected_and_got, number, percent, seconds, value_of_limit,
+};
 use proptest::prelude::*;
 
 #[test]
@@ -25,7 +26,7 @@ fn a_failure_is_reported_in_full() {
   largest error: 2.0004 of 2 levels
   without validation
 ";
-    assert_eq!(summary::failure(shade), expected);
+    assert_eq!(report::failure(shade), expected);
 }
 
 #[test]
@@ -34,19 +35,19 @@ fn a_group_and_a_run_have_one_line_each() {
     fail(&mut run, "passes", "tone");
     let groups = run.groups();
     assert_eq!(groups.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["passes", "modes", "formats", "speed"]);
-    let line = |at: usize| summary::group_line(groups[at].0, &groups[at].1);
+    let line = |at: usize| report::group_line(groups[at].0, &groups[at].1);
     assert_eq!(
         line(0),
         "passes             7 passed, 1 failed in 2.0 s; nearest to its tolerance: raycast_surface, 81 %"
     );
     assert_eq!(line(2), "formats            1 left out in 250 ms");
-    assert_eq!(summary::group_line("none", &[]), "none               no checks in 0 s");
+    assert_eq!(report::group_line("none", &[]), "none               no checks in 0 s");
     let expected = "passed 19, failed 1, left out 1 in 48 s on simulated, none 1.0, Vulkan 1.3.0 (quick, validation layer \
                     watching)";
-    assert_eq!(summary::summary(&run), expected);
+    assert_eq!(report::summary(&run), expected);
     run.validation = false;
-    assert!(summary::summary(&run).ends_with("Vulkan 1.3.0 (quick)"));
-    assert!(summary::summary(&empty()).starts_with("passed 0, failed 0, left out 0 in 48 s"));
+    assert!(report::summary(&run).ends_with("Vulkan 1.3.0 (quick)"));
+    assert!(report::summary(&empty()).starts_with("passed 0, failed 0, left out 0 in 48 s"));
 }
 
 #[test]
@@ -123,11 +124,11 @@ proptest! {
     #[test]
     fn any_run_is_reported_in_lines(run in any_run()) {
         let is_line = |text: &str| !text.chars().any(char::is_control);
-        prop_assert!(is_line(&summary::summary(&run)));
+        prop_assert!(is_line(&report::summary(&run)));
         for (group, outcomes) in run.groups() {
-            prop_assert!(is_line(&summary::group_line(group, &outcomes)));
+            prop_assert!(is_line(&report::group_line(group, &outcomes)));
         }
-        for text in run.outcomes.iter().map(|o: &Outcome| summary::failure(o)) {
+        for text in run.outcomes.iter().map(|o: &Outcome| report::failure(o)) {
             prop_assert!(text.ends_with('\n') && text.lines().all(is_line), "{text:?}");
         }
     }

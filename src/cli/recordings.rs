@@ -1,9 +1,11 @@
-//! `echolume convert`.
+//! `echolume convert`, `echolume info` and `echolume phantom`: recordings are converted, described and made.
 
 use crate::args::{Output, check_outputs};
 use crate::files::signals::Writing;
+use crate::picture::check_target;
 use crate::probe::Geometry;
 use crate::source::convert::{Volume, VolumeFile, lattice};
+use crate::source::phantom::{Body, Phantom, PhantomOptions};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
@@ -140,6 +142,70 @@ impl Convert {
         let frames = writer.frames();
         writer.finish().map_err(failed)?;
         say!("frames: {}, {frames} of {} volumes", self.output.display(), recording.volumes());
+        Ok(())
+    }
+}
+
+#[derive(clap::Args)]
+pub struct Info {
+    /// MetaImage (.mha, .mhd), Kretz (.vol) or .frames file
+    file: PathBuf,
+    /// Geometry of the probe (TOML) [default: NAME.probe.toml or probe.toml next to the file]
+    #[arg(long, value_name = "FILE")]
+    probe: Option<PathBuf>,
+}
+
+impl Info {
+    pub fn run(&self) -> Result<(), Failure> {
+        let facts = source::description(&self.file, self.probe.as_deref()).map_err(input)?;
+        let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+        for (name, value) in facts {
+            say!("{name:width$}  {value}");
+        }
+        Ok(())
+    }
+}
+
+#[derive(clap::Args)]
+pub struct MakePhantom {
+    /// The sweep to write (.mha). Its geometry goes to NAME.probe.toml next to it
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Seed of the speckle; the same seed gives the same bytes
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// head, or a body whose picture has a closed formula: sphere, step, wires, constant, ramp
+    #[arg(long, value_name = "NAME", default_value = "head")]
+    body: String,
+    /// Number of volumes in time; the head moves
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    volumes: usize,
+    /// Sweep every second volume backwards; the motor moves while frames are acquired
+    #[arg(long)]
+    both_ways: bool,
+    /// Share of the frame pitch that the motor travels during one frame, 0..1 [default: 0, with --both-ways 0.5]
+    #[arg(long, value_name = "SHARE")]
+    speed_ratio: Option<f64>,
+    /// Write the echogenicity without speckle
+    #[arg(long)]
+    no_speckle: bool,
+}
+
+impl MakePhantom {
+    pub fn run(&self) -> Result<(), Failure> {
+        let options = PhantomOptions {
+            seed: self.seed,
+            body: self.body.parse::<Body>().map_err(input)?,
+            volumes: self.volumes,
+            both_ways: self.both_ways,
+            speckle: !self.no_speckle,
+            speed_ratio: self.speed_ratio.unwrap_or(if self.both_ways { 0.5 } else { 0.0 }),
+            ..PhantomOptions::default()
+        };
+        let phantom = Phantom::new(options).map_err(input)?;
+        check_target(&self.output).map_err(failed)?;
+        phantom.write(&self.output).map_err(failed)?;
+        say!("sweep: {}", self.output.display());
         Ok(())
     }
 }

@@ -1,14 +1,63 @@
-//! `echolume support-bundle`.
+//! `echolume devices` and `echolume support-bundle`: what this machine has.
 
 use crate::args::SourceArgs;
+use crate::gpu::{DeviceChoice, context, device_selection};
 use crate::kiosk::bundle::Bundle;
-use crate::kiosk::config::Config;
+use crate::kiosk::config::{Config, DEFAULT_PATH};
 use crate::picture;
 use crate::terminal::{Failure, failed, input, say};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant, SystemTime};
+
+#[derive(clap::Args)]
+pub struct Devices {
+    /// Print also the capabilities of each device: queues and every Vulkan limit
+    #[arg(long)]
+    limits: bool,
+}
+
+impl Devices {
+    pub fn run(&self) -> Result<(), Failure> {
+        let devices = context::list().map_err(failed)?;
+        let picked = device_selection::choose(&devices, &DeviceChoice::Best);
+        for (i, device) in devices.iter().enumerate() {
+            say!(
+                "{i} {} ({}, Vulkan {}, {})",
+                device.name,
+                device.kind_name(),
+                device.api_version(),
+                device.driver.trim()
+            );
+            if !device.missing.is_empty() {
+                say!("    cannot be used: lacks {}", device.missing.join(", "));
+            }
+            for without in &device.missing_optional {
+                say!("    works without {without}");
+            }
+            match &picked {
+                Ok(n) if *n == i && device.is_software() => {
+                    say!("    picked: no other device fits. It is a software device: the same pictures, slowly");
+                }
+                Ok(n) if *n == i => say!("    picked: the best device that lacks nothing"),
+                _ if !device.missing.is_empty() => {}
+                _ if device.is_software() => {
+                    say!("    not picked: a software device is the last choice; --device {i} selects it")
+                }
+                _ => say!("    not picked: another device is preferred; --device {i} selects it"),
+            }
+            if self.limits {
+                for queue in &device.queues {
+                    say!("    {queue:?}");
+                }
+                say!("    largest allocation and buffer: {} MiB", device.max_bytes >> 20);
+                format!("{:#?}", device.limits).lines().for_each(|line| say!("    {line}"));
+            }
+        }
+        picked.map(drop).map_err(failed)
+    }
+}
 
 /// Time-out for listing the devices. A driver that takes longer is itself a finding.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -54,7 +103,7 @@ impl SupportBundle {
             return Err(input(format!("--config {}: is not a file", config.display())));
         }
         let mut bundle = Bundle::new(self.config.as_deref());
-        let config = self.config.as_deref().unwrap_or(Path::new(crate::kiosk::config::DEFAULT_PATH));
+        let config = self.config.as_deref().unwrap_or(Path::new(DEFAULT_PATH));
         if let Some(Err(Failure::Input(fault))) =
             Config::read(config).ok().map(|config| SourceArgs::from_config(&config))
         {
