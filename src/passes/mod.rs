@@ -10,12 +10,6 @@ pub mod pass;
 pub mod slots;
 pub mod texels;
 
-pub mod preprocess {
-    pub mod condition;
-    pub mod load_slice;
-    pub mod packed_neighbours;
-    pub mod scan_convert;
-}
 pub mod filter {
     pub mod aos;
     pub mod bilateral;
@@ -37,6 +31,7 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod empty_space;
+pub mod preprocess;
 pub mod shade;
 pub mod postprocess {
     pub mod assemble;
@@ -47,9 +42,9 @@ pub use pass::*;
 
 /// All passes in the order in which they run.
 pub const PASSES: &[Pass] = &[
-    preprocess::condition::PASS,
-    preprocess::load_slice::PASS,
-    preprocess::scan_convert::PASS,
+    preprocess::CONDITION,
+    preprocess::LOAD_SLICE,
+    preprocess::SCAN_CONVERT,
     filter::median::SLICE,
     filter::estimator::SLICE,
     filter::sigma::SLICE,
@@ -60,7 +55,7 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
-    preprocess::packed_neighbours::PASS,
+    preprocess::PACKED_NEIGHBOURS,
     empty_space::TILE_RANGES,
     empty_space::BRICK_RANGES,
     empty_space::CLASSIFY_SURFACE,
