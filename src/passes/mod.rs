@@ -31,12 +31,9 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod empty_space;
+pub mod postprocess;
 pub mod preprocess;
 pub mod shade;
-pub mod postprocess {
-    pub mod assemble;
-    pub mod tone;
-}
 
 pub use pass::*;
 
@@ -76,12 +73,12 @@ pub const PASSES: &[Pass] = &[
     shade::SHADOW,
     shade::OCCLUSION,
     shade::LIGHT,
-    postprocess::assemble::PASS,
+    postprocess::ASSEMBLE,
     filter::sigma::PICTURE,
     filter::enhanced_sigma::PICTURE,
     filter::perona_malik::PICTURE,
     filter::aos::PICTURE,
-    postprocess::tone::PASS,
+    postprocess::TONE,
 ];
 
 /// Time of one pass over a run.
