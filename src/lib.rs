@@ -8,7 +8,7 @@
 //!   motor.
 //! - [`scene`] is everything that determines a picture: geometry, mode, filters, camera, light.
 //! - [`passes`] declares every compute pass in one place: its slots (GPU resources), parameters, constants, tolerance and f64 reference.
-//!   Its folders are the four stages preprocess, raycast, shade and postprocess, and the filters that several stages share.
+//!   Its modules are the four stages preprocess, raycast, shade and postprocess, and the filters that several stages share.
 //! - [`plan`] derives the passes and slots that a scene needs, and what must run again after a change. [`barriers`] derives the barriers
 //!   between passes, [`queues`] the waits between queues. [`spirv`] reflects and rewrites shaders. These modules need no GPU.
 //! - [`gpu`] is the only module that uses Vulkan and the only one with unsafe code.

@@ -3,8 +3,7 @@
 use crate::args::{check_outputs, open_device};
 use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions};
 use crate::passes::{Slot, Texels};
-use crate::picture::regions::{self, Region};
-use crate::picture::{self, Grey};
+use crate::picture::{self, Grey, Region};
 use crate::profile::export::pass_time_table;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
@@ -121,7 +120,7 @@ impl Filter {
             grey.with(&filtered).save(output).map_err(failed)?;
             say!("picture: {}", output.display());
             if let Some(region) = &region {
-                let table = regions::table(&grey.shares(), &filtered, grey.width, region, background.as_ref());
+                let table = picture::region_table(&grey.shares(), &filtered, grey.width, region, background.as_ref());
                 say!("{}", table.trim_end());
             }
             if self.timings {

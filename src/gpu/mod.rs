@@ -1,17 +1,13 @@
 //! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
-//! - `resources` are images and buffers, `slots` those of a scene, `formats` what the device can do with them.
-//! - `pipelines` compiles shaders, `async_compiler` does so on its own thread, `shader_reload` takes them from a folder that is watched.
-//! - `recorder` records one command buffer with the barriers of `barrier_recorder` and the time stamps of `timing`;
-//!   `timeline` says when a submission is done.
+//! - `resources` are images and buffers, also those of a scene's slots, `formats` what the device can do with them.
+//! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
+//! - `recorder` records one command buffer with its barriers and the time stamps of `timing`; `timeline` says when a submission is done.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
-mod async_compiler;
-mod barrier_recorder;
 pub mod context;
-mod descriptor_sets;
 pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
@@ -22,15 +18,13 @@ mod recorder;
 mod renderer;
 pub mod resources;
 pub mod shader_reload;
-mod slots;
 mod timeline;
 mod timing;
 pub mod window;
 
-pub use async_compiler::Wake;
 pub use context::{Context, ContextOptions};
 pub use device_selection::{Candidate, DeviceChoice};
 pub use error::GpuError;
 pub use formats::TexelAccess;
-pub use pipelines::Shaders;
+pub use pipelines::{Shaders, Wake};
 pub use renderer::{Renderer, RendererOptions};

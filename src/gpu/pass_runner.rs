@@ -1,13 +1,11 @@
 //! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
-use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, embedded};
-use super::recorder::{Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, shape_size};
-use super::slots::Slots;
+use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, Slots, shape_size};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::slots::{Initializer, Shape};

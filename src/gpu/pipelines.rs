@@ -1,4 +1,5 @@
-//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants.
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants; a thread that
+//! compiles them in the background, so that drawing goes on meanwhile; and their descriptor sets.
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
@@ -11,8 +12,10 @@ use crate::scene::Scene;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
 /// A compute pipeline and its layout.
 pub struct Pipeline {
@@ -24,14 +27,14 @@ pub struct Pipeline {
 }
 
 /// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
-pub(super) type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 
 /// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
 /// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
 pub struct Pipelines {
-    pub(super) context: Arc<Context>,
+    context: Arc<Context>,
     made: Mutex<HashMap<Key, Arc<Pipeline>>>,
     shaders: Arc<Shaders>,
     texel_access: TexelAccess,
@@ -74,12 +77,12 @@ impl Pipelines {
         Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, texel_access, sampler })
     }
 
-    pub(super) fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
+    fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
         (pass.shader(scene, args), (pass.constants)(scene, args), formats)
     }
 
-    pub(super) fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
+    fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
     }
 
@@ -237,5 +240,215 @@ impl Drop for Pipeline {
             self.context.device.destroy_pipeline_layout(self.layout, None);
             self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
         }
+    }
+}
+
+/// Wakes the event loop of a view.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+struct Job {
+    key: Key,
+    pass: &'static Pass,
+    scene: Arc<Scene>,
+    args: DispatchArgs,
+}
+
+/// A thread that compiles pipelines, and its requests.
+pub struct AsyncPipelineCompiler {
+    jobs: Option<Sender<Job>>,
+    thread: Option<JoinHandle<()>>,
+    asked: HashSet<Key>,
+    stop: Arc<AtomicBool>,
+    faults: Arc<Mutex<HashMap<Key, String>>>,
+}
+
+impl AsyncPipelineCompiler {
+    /// `wake` is called after each pipeline.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn new(pipelines: &Arc<Pipelines>, wake: Option<Wake>) -> Result<AsyncPipelineCompiler, GpuError> {
+        let (jobs, asked_for) = channel::<Job>();
+        let faults = Arc::new(Mutex::new(HashMap::new()));
+        let stop = Arc::new(AtomicBool::new(false));
+        let (theirs, pipelines, over) = (faults.clone(), pipelines.clone(), stop.clone());
+        let work = move || {
+            for Job { key, pass, scene, args } in asked_for {
+                if over.load(Ordering::Relaxed) {
+                    break;
+                }
+                let is_new = pipelines.cached(&key).is_none();
+                match pipelines.get(pass, &scene, &args) {
+                    Ok(_) => drop(pipelines.context.counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed)),
+                    Err(fault) => drop(theirs.lock().unwrap_or_else(|e| e.into_inner()).insert(key, fault.to_string())),
+                }
+                if let Some(wake) = &wake {
+                    wake();
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("pipelines".into()).spawn(work);
+        let thread =
+            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
+        Ok(AsyncPipelineCompiler { jobs: Some(jobs), thread: Some(thread), asked: HashSet::new(), stop, faults })
+    }
+
+    /// True if every pipeline of a plan is compiled; requests those that are not.
+    ///
+    /// # Errors
+    /// A pipeline that could not be compiled.
+    pub fn prepare(&mut self, pipelines: &Pipelines, plan: &Plan, scene: &Scene) -> Result<bool, GpuError> {
+        let mut shared = None;
+        let mut is_ready = true;
+        for step in &plan.steps {
+            let args = step.args();
+            let key = Pipelines::key(step.pass, scene, &args);
+            if pipelines.cached(&key).is_some() {
+                continue;
+            }
+            if let Some(fault) = self.faults.lock().unwrap_or_else(|e| e.into_inner()).get(&key) {
+                return Err(GpuError::Shader { shader: key.0.into(), fault: fault.clone() });
+            }
+            is_ready = false;
+            if self.asked.insert(key.clone()) {
+                let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
+                // If the thread has died, pipelines are compiled at their first use.
+                let sent =
+                    self.jobs.as_ref().is_some_and(|j| j.send(Job { key, pass: step.pass, scene, args }).is_ok());
+                is_ready |= !sent;
+            }
+        }
+        Ok(is_ready)
+    }
+}
+
+impl Drop for AsyncPipelineCompiler {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.jobs = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Number of sets in a pool; few pictures need more dispatches.
+const SETS: u32 = 64;
+/// Number of descriptors of each type in a pool.
+const DESCRIPTORS: u32 = 4 * SETS;
+const KINDS: [Kind; 6] = [Kind::Params, Kind::Sampled, Kind::Filtered, Kind::Storage, Kind::Buffer, Kind::Texels(1)];
+
+/// What is left in a pool. It is counted here, because drivers differ in whether they allocate beyond the size of a pool.
+#[derive(Clone, Copy)]
+struct PoolSpace {
+    sets: u32,
+    /// Descriptors, in the order of [`KINDS`].
+    descriptors: [u32; KINDS.len()],
+}
+
+const FULL: PoolSpace = PoolSpace { sets: SETS, descriptors: [DESCRIPTORS; KINDS.len()] };
+
+impl PoolSpace {
+    /// What is left after a set with these descriptors is allocated; `None` if there is not enough.
+    fn after(mut self, kinds: impl Iterator<Item = Kind>) -> Option<PoolSpace> {
+        self.sets = self.sets.checked_sub(1)?;
+        for kind in kinds {
+            let of = KINDS.iter().position(|k| descriptor_type(*k) == descriptor_type(kind))?;
+            self.descriptors[of] = self.descriptors[of].checked_sub(1)?;
+        }
+        Some(self)
+    }
+}
+
+/// Descriptor sets of one command buffer, for a device without push descriptors. They are allocated from pools and freed all at once.
+pub struct DescriptorSets {
+    context: Arc<Context>,
+    pools: Vec<vk::DescriptorPool>,
+    /// What is left in the current pool.
+    left: PoolSpace,
+    current: usize,
+}
+
+impl DescriptorSets {
+    /// Allocates no pool yet: push descriptors need none.
+    pub fn new(context: &Arc<Context>) -> DescriptorSets {
+        DescriptorSets { context: context.clone(), pools: Vec::new(), left: FULL, current: 0 }
+    }
+
+    /// Frees all sets. The device must be done with the command buffer.
+    pub fn begin(&mut self) -> Result<(), GpuError> {
+        for pool in &self.pools {
+            // SAFETY: the pool is alive, and the device is done with what was taken from it.
+            unsafe { self.context.device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()) }
+                .context(|| "reset a descriptor pool".into())?;
+        }
+        (self.left, self.current) = (FULL, 0);
+        Ok(())
+    }
+
+    /// Allocates a set for a pipeline; it is valid until [`DescriptorSets::begin`].
+    pub fn take(&mut self, pipeline: &Pipeline) -> Result<vk::DescriptorSet, GpuError> {
+        let kinds = || pipeline.module.bindings.iter().map(|binding| binding.kind);
+        let (current, left) = match self.left.after(kinds()) {
+            Some(left) => (self.current, left),
+            None => {
+                let left = FULL.after(kinds()).ok_or_else(|| GpuError::Limit {
+                    what: "descriptors of one type in one dispatch".into(),
+                    needed: kinds().count() as u64,
+                    allowed: u64::from(DESCRIPTORS),
+                })?;
+                (self.current + 1, left)
+            }
+        };
+        if current == self.pools.len() {
+            self.pools.push(self.pool()?);
+        }
+        let layouts = [pipeline.set_layout];
+        let allocate =
+            vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pools[current]).set_layouts(&layouts);
+        // SAFETY: pool and layout are alive, and there is room for one set more.
+        let sets = unsafe { self.context.device.allocate_descriptor_sets(&allocate) };
+        let set = sets.context(|| "allocate a descriptor set".into())?[0];
+        (self.current, self.left) = (current, left);
+        Ok(set)
+    }
+
+    fn pool(&self) -> Result<vk::DescriptorPool, GpuError> {
+        let sizes =
+            KINDS.map(|kind| vk::DescriptorPoolSize { ty: descriptor_type(kind), descriptor_count: DESCRIPTORS });
+        let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
+        // SAFETY: the structure is complete and outlives the call.
+        let pool = unsafe { self.context.device.create_descriptor_pool(&create, None) };
+        let pool = pool.context(|| "create a descriptor pool".into())?;
+        self.context.name(pool, "descriptor sets");
+        Ok(pool)
+    }
+}
+
+impl Drop for DescriptorSets {
+    fn drop(&mut self) {
+        for pool in &self.pools {
+            // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
+            unsafe { self.context.device.destroy_descriptor_pool(*pool, None) };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pool_is_full_when_its_sets_or_the_descriptors_of_one_type_run_out() {
+        let images = |count| std::iter::repeat_n(Kind::Storage, count);
+        let mut left = FULL;
+        for _ in 0..SETS {
+            left = left.after(images(1).chain([Kind::Texels(2), Kind::Texels(4)])).expect("room");
+        }
+        assert!(left.after(images(0)).is_none(), "{} sets are left", left.sets);
+        assert!(FULL.after(images(DESCRIPTORS as usize)).is_some());
+        assert!(FULL.after(images(DESCRIPTORS as usize + 1)).is_none());
+        let rest = FULL.after(images(200)).expect("room");
+        assert!(rest.after(images(57)).is_none() && rest.after(images(56)).is_some());
     }
 }

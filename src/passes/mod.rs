@@ -10,12 +10,6 @@ pub mod pass;
 pub mod slots;
 pub mod texels;
 
-pub mod preprocess {
-    pub mod condition;
-    pub mod load_slice;
-    pub mod packed_neighbours;
-    pub mod scan_convert;
-}
 pub mod filter {
     pub mod aos;
     pub mod bilateral;
@@ -37,19 +31,17 @@ pub mod raycast {
     pub mod volume;
 }
 pub mod empty_space;
+pub mod postprocess;
+pub mod preprocess;
 pub mod shade;
-pub mod postprocess {
-    pub mod assemble;
-    pub mod tone;
-}
 
 pub use pass::*;
 
 /// All passes in the order in which they run.
 pub const PASSES: &[Pass] = &[
-    preprocess::condition::PASS,
-    preprocess::load_slice::PASS,
-    preprocess::scan_convert::PASS,
+    preprocess::CONDITION,
+    preprocess::LOAD_SLICE,
+    preprocess::SCAN_CONVERT,
     filter::median::SLICE,
     filter::estimator::SLICE,
     filter::sigma::SLICE,
@@ -60,14 +52,14 @@ pub const PASSES: &[Pass] = &[
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,
-    preprocess::packed_neighbours::PASS,
-    empty_space::ranges::TILES,
-    empty_space::ranges::BRICKS,
-    empty_space::classify::SURFACE,
-    empty_space::distance::SURFACE,
+    preprocess::PACKED_NEIGHBOURS,
+    empty_space::TILE_RANGES,
+    empty_space::BRICK_RANGES,
+    empty_space::CLASSIFY_SURFACE,
+    empty_space::DISTANCE_SURFACE,
     raycast::surface::PASS,
-    empty_space::classify::VOLUME,
-    empty_space::distance::VOLUME,
+    empty_space::CLASSIFY_VOLUME,
+    empty_space::DISTANCE_VOLUME,
     raycast::volume::PASS,
     raycast::projection::PASS,
     raycast::planes::PASS,
@@ -78,15 +70,15 @@ pub const PASSES: &[Pass] = &[
     filter::sigma::DISTANCE,
     filter::enhanced_sigma::DISTANCE,
     filter::perona_malik::DISTANCE,
-    shade::shadow::PASS,
-    shade::occlusion::PASS,
-    shade::light::PASS,
-    postprocess::assemble::PASS,
+    shade::SHADOW,
+    shade::OCCLUSION,
+    shade::LIGHT,
+    postprocess::ASSEMBLE,
     filter::sigma::PICTURE,
     filter::enhanced_sigma::PICTURE,
     filter::perona_malik::PICTURE,
     filter::aos::PICTURE,
-    postprocess::tone::PASS,
+    postprocess::TONE,
 ];
 
 /// Time of one pass over a run.

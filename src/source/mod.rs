@@ -15,7 +15,6 @@ pub mod live;
 mod metaimage;
 pub mod motor_tracking;
 pub mod phantom;
-pub mod phantom_source;
 pub mod piped;
 pub mod recorder;
 pub mod recording;

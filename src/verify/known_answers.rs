@@ -6,7 +6,7 @@ use super::passes::POISON;
 use super::{Check, DeviceUnderTest, Findings, render};
 use crate::gpu::resources::shape_size;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
-use crate::passes::shade::shadow;
+use crate::passes::shade::SHADOW;
 use crate::passes::slots::Format;
 use crate::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, is_hit};
 use crate::picture::Picture;
@@ -459,16 +459,16 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let distances =
         Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| f64::from((60.0 - 12.0 * (-hill(x, y)).exp()) as f32));
     let (args, mut inputs, mut expected) = (DispatchArgs::default(), Arrays::default(), Arrays::default());
-    for bind in shadow::PASS.reads(&scene, &args) {
+    for bind in SHADOW.reads(&scene, &args) {
         inputs.insert(bind.name, distances.clone());
     }
-    let writes = shadow::PASS.writes(&scene, &args);
+    let writes = SHADOW.writes(&scene, &args);
     for bind in &writes {
         expected.insert(bind.name, Texels::untouched(shape_size(Slot::Shadow.shape(&scene)), 1));
     }
-    shadow::PASS.expected(&scene, &args, &inputs, &mut expected);
-    let got = dut.pass_runner()?.run(&scene, &shadow::PASS, &args, &inputs, POISON)?;
-    let compared = compare_outputs(&shadow::PASS, &scene, ExtraTolerance::default(), POISON, &expected, &got, &writes);
+    SHADOW.expected(&scene, &args, &inputs, &mut expected);
+    let got = dut.pass_runner()?.run(&scene, &SHADOW, &args, &inputs, POISON)?;
+    let compared = compare_outputs(&SHADOW, &scene, ExtraTolerance::default(), POISON, &expected, &got, &writes);
     let edge = expected.get("shadow").values.iter().filter(|v| (0.02..0.98).contains(*v)).count();
     findings.expect(edge > 150, || format!("only {edge} texels are an edge of the shadow"));
     if let Some(worst) = compared.worst {
@@ -479,7 +479,7 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         });
         findings.faults.push(Fault { worst: Some(worst), ..Fault::new("the edge of a shadow is another") });
     }
-    let allowed = shadow::PASS.tolerance.outliers;
+    let allowed = SHADOW.tolerance.outliers;
     findings.figures.push(Figure::error("texels beyond tolerance", compared.outliers, allowed, Unit::Share));
     findings.figures.push(Figure {
         what: "texels of edge".into(),

@@ -7,7 +7,7 @@ use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
 use crate::gpu::resources::shape_size;
-use crate::passes::preprocess::packed_neighbours;
+use crate::passes::preprocess::PACKED_NEIGHBOURS;
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{Arrays, Bind, DispatchArgs, MISS, PASSES, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
@@ -297,7 +297,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         packed
             .insert("packed_neighbours", Texels::untouched(shape_size(Slot::PackedNeighbours.shape(scene)), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
-        packed_neighbours::PASS.reference(scene, &all, &inputs, &mut packed);
+        PACKED_NEIGHBOURS.reference(scene, &all, &inputs, &mut packed);
         inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());
     }
     inputs

@@ -4,15 +4,12 @@
 mod draw;
 mod ingest;
 
-use super::async_compiler::{AsyncPipelineCompiler, Wake};
-use super::barrier_recorder::BarrierRecorder;
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
-use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
-use super::recorder::{Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, shape_size};
-use super::slots::Slots;
+use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake, embedded};
+use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, Slots, shape_size};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::chain;

@@ -1,21 +1,41 @@
 //! Presentation: `target` is a window or a monitor, `swapchain` the images of its surface, `screen` copies the picture into
-//! one of them and draws the panels over it, `overlay` draws the panels. A build without the feature `view` has only a target
-//! that cannot exist.
+//! one of them and draws the panels over it. A build without the feature `view` has only a target that cannot exist.
 
-#[cfg(feature = "view")]
-mod overlay;
 #[cfg(feature = "view")]
 pub(super) mod screen;
 #[cfg(feature = "view")]
 mod swapchain;
-#[cfg_attr(not(feature = "view"), path = "no_target.rs")]
+#[cfg(feature = "view")]
 pub(super) mod target;
 
 #[cfg(feature = "view")]
-pub use overlay::Panels;
-#[cfg(feature = "view")]
-pub use screen::{PresentOutcome, Screen, monitor_size};
+pub use screen::{Panels, PresentOutcome, Screen, monitor_size};
 #[cfg(feature = "view")]
 pub use swapchain::PresentMode;
 #[cfg(feature = "view")]
 pub use target::{MonitorChoice, Target, WindowHandles};
+
+/// The target of presentation in a build without the feature `view`. No value of it exists, so nothing here is ever called.
+#[cfg(not(feature = "view"))]
+pub(super) mod target {
+    use crate::gpu::device_selection::Candidate;
+    use crate::gpu::error::GpuError;
+    use ash::{Entry, Instance};
+    use std::ffi::CStr;
+
+    pub enum Target {}
+
+    impl Target {
+        pub fn extensions(&self, _: &Entry) -> Result<Vec<&'static CStr>, GpuError> {
+            match *self {}
+        }
+
+        pub fn check_support(&self, _: &Entry, _: &Instance, _: &mut Candidate) {
+            match *self {}
+        }
+
+        pub fn is_monitor(&self) -> bool {
+            match *self {}
+        }
+    }
+}

@@ -3,7 +3,7 @@
 
 use super::ray;
 use crate::passes::pass::*;
-use crate::passes::postprocess::tone;
+use crate::passes::postprocess;
 use crate::scene::planes::Sheet;
 use crate::scene::{Scene, Slab};
 use glam::DVec3;
@@ -55,8 +55,8 @@ pub const TONED: Pass = Pass {
         (false, _) => Err("planes do not make up the picture"),
     },
     writes: |_, _| vec![whole("screen", Slot::Screen)],
-    params: |s, _| tone::params(s, params(s)).f32("line_strength", tone::LINE_STRENGTH),
-    constants: |s, _| [constants(s), tone::constants(s, true)].concat(),
+    params: |s, _| postprocess::tone_params(s, params(s)).f32("line_strength", postprocess::LINE_STRENGTH),
+    constants: |s, _| [constants(s), postprocess::tone_constants(s, true)].concat(),
     tolerance: Tolerance {
         absolute: 2.01 / 255.0,
         relative: 0.0,
@@ -70,7 +70,7 @@ pub const TONED: Pass = Pass {
         let [width, height, _] = screen.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let colour = value_at(scene, volume, &sheet, x, y).map(|v| [v; 3]);
-            screen.set([x, y, 0], &tone::shown(scene, Some(&sheet), colour, x, y));
+            screen.set([x, y, 0], &postprocess::shown(scene, Some(&sheet), colour, x, y));
         }
     },
     ..PASS

@@ -3,7 +3,7 @@
 use crate::passes::empty_space::Skipping;
 use crate::passes::lookup_tables::{is_non_uniform, line_parameter, sweep_span};
 use crate::passes::pass::*;
-use crate::passes::preprocess::packed_neighbours;
+use crate::passes::preprocess::packed_sampling;
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use crate::scene::{MAX_CLIPS, Scene, View};
 use glam::DVec3;
@@ -88,7 +88,7 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
     let mut constants = constants(scene);
     if scene.packs() {
         constants.retain(|(name, _)| *name != "SAMPLING");
-        constants.push(("SAMPLING", packed_neighbours::sampling(scene)));
+        constants.push(("SAMPLING", packed_sampling(scene)));
     }
     constants.push(skipping.constant());
     constants.push(("SLIDING", scene.settings.ray.sliding as i32));

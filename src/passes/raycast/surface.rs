@@ -24,7 +24,7 @@ pub const PASS: Pass = Pass {
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
             .f32("noise", surface.noise)
-            .f32("quiet_level", empty_space::classify::quiet_level(s))
+            .f32("quiet_level", empty_space::quiet_level(s))
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::surface_skipping(s));

@@ -1,8 +1,7 @@
 //! A connection on a thread of its own, which reconnects, and the queue that the thread fills.
 
-use super::codec::{BODY_LIMIT, Decoded, decode};
+use super::codec::{BODY_LIMIT, DecodeError, Decoded, decode};
 use super::message::Message;
-use super::wire::DecodeError;
 use crate::files::escaped;
 use std::collections::VecDeque;
 use std::io::{self, BufReader, ErrorKind, Read};

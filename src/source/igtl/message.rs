@@ -1,6 +1,5 @@
 //! The messages, as the user of a client receives them.
 
-use super::wire::{Fault, Fields};
 use glam::{DMat4, DVec3, DVec4};
 
 /// A decoded message.
@@ -93,23 +92,6 @@ pub struct Other {
     pub kind: String,
     /// Length of the body, bytes.
     pub bytes: usize,
-}
-
-impl ToolKind {
-    pub(super) fn read(number: u8) -> Option<ToolKind> {
-        [ToolKind::Tracker, ToolKind::SixD, ToolKind::ThreeD, ToolKind::FiveD]
-            .into_iter()
-            .find(|k| k.number() == number)
-    }
-
-    pub(super) fn number(self) -> u8 {
-        match self {
-            ToolKind::Tracker => 1,
-            ToolKind::SixD => 2,
-            ToolKind::ThreeD => 3,
-            ToolKind::FiveD => 4,
-        }
-    }
 }
 
 impl Message {
@@ -215,21 +197,6 @@ pub enum Coordinates {
     Lps,
 }
 
-const SCALARS: [(u8, Scalar); 8] = [
-    (2, Scalar::I8),
-    (3, Scalar::U8),
-    (4, Scalar::I16),
-    (5, Scalar::U16),
-    (6, Scalar::I32),
-    (7, Scalar::U32),
-    (10, Scalar::F32),
-    (11, Scalar::F64),
-];
-/// Version of the image's own header.
-const VERSION: u16 = 1;
-const BIG: u8 = 1;
-const LITTLE: u8 = 2;
-
 impl Scalar {
     pub fn bytes(self) -> usize {
         match self {
@@ -260,88 +227,5 @@ impl Image {
     /// Distance between neighbouring pixels along i, j and k, mm.
     pub fn spacing(&self) -> [f64; 3] {
         self.axes.map(|a| DVec3::from(a.map(f64::from)).length())
-    }
-
-    pub(super) fn read(device: String, time: f64, content: &[u8]) -> Result<Image, Fault> {
-        let mut fields = Fields(content);
-        let version = fields.u16("image version")?;
-        if version != VERSION {
-            return Err(Fault::new("image version", format!("is {version}, must be {VERSION}")));
-        }
-        let components = fields.u8("components")?;
-        let scalar = fields.u8("scalar type")?;
-        let endian = fields.u8("byte order")?;
-        let coordinates = fields.u8("coordinates")?;
-        if components == 0 {
-            return Err(Fault::new("components", "is 0, must be 1 to 255"));
-        }
-        let Some((_, scalar)) = SCALARS.into_iter().find(|(number, _)| *number == scalar) else {
-            return Err(Fault::new("scalar type", format!("is {scalar}, must be 2 to 7, 10 or 11")));
-        };
-        if ![BIG, LITTLE].contains(&endian) {
-            return Err(Fault::new("byte order", format!("is {endian}, must be 1 (big) or 2 (little)")));
-        }
-        let coordinates = match coordinates {
-            1 => Coordinates::Ras,
-            2 => Coordinates::Lps,
-            other => return Err(Fault::new("coordinates", format!("is {other}, must be 1 (RAS) or 2 (LPS)"))),
-        };
-        let size = fields.three("size")?;
-        let axes = [fields.vector("axes")?, fields.vector("axes")?, fields.vector("axes")?];
-        let centre = fields.vector("position")?;
-        let region = Region { offset: fields.three("sub-volume's start")?, size: fields.three("sub-volume's size")? };
-        let bytes = fields.0.to_vec();
-        let mut image = Image { device, time, size, region, scalar, components, coordinates, axes, centre, bytes };
-        image.check()?;
-        if endian == BIG && scalar.bytes() > 1 {
-            image.bytes.chunks_exact_mut(scalar.bytes()).for_each(<[u8]>::reverse);
-        }
-        Ok(image)
-    }
-
-    /// Checks that the sizes agree with each other and with the samples.
-    fn check(&self) -> Result<(), Fault> {
-        let Region { offset, size } = self.region;
-        if self.size.contains(&0) {
-            let [i, j, k] = self.size;
-            return Err(Fault::new("size", format!("is {i} x {j} x {k}, each must be 1 to 65535")));
-        }
-        for axis in 0..3 {
-            let (start, count, whole) = (u32::from(offset[axis]), u32::from(size[axis]), u32::from(self.size[axis]));
-            if count == 0 || start + count > whole {
-                let end = start + count;
-                let fault = format!(
-                    "covers {start} to {end} of {whole} pixels along {}, must lie within",
-                    ["i", "j", "k"][axis]
-                );
-                return Err(Fault::new("sub-volume", fault));
-            }
-        }
-        // Cannot overflow: each below 2^16, at most 255 components of 8 bytes.
-        let pixels: u64 = size.iter().map(|n| u64::from(*n)).product();
-        let bytes = pixels * u64::from(self.components) * self.scalar.bytes() as u64;
-        match self.bytes.len() as u64 == bytes {
-            true => Ok(()),
-            false => Err(Fault::new("samples", format!("are {} bytes, must be {bytes}", self.bytes.len()))),
-        }
-    }
-
-    pub(super) fn write(&self, content: &mut Vec<u8>) -> Result<(), Fault> {
-        if self.components == 0 {
-            return Err(Fault::new("components", "is 0, must be 1 to 255"));
-        }
-        if let Some(value) = self.axes.iter().flatten().chain(&self.centre).find(|v| !v.is_finite()) {
-            return Err(Fault::new("axes and position", format!("have {value}, must be finite")));
-        }
-        self.check()?;
-        let scalar = SCALARS.iter().find(|(_, s)| *s == self.scalar).map_or(0, |(number, _)| *number);
-        let coordinates = if self.coordinates == Coordinates::Ras { 1 } else { 2 };
-        content.extend(VERSION.to_be_bytes());
-        content.extend([self.components, scalar, LITTLE, coordinates]);
-        content.extend(self.size.iter().flat_map(|v| v.to_be_bytes()));
-        content.extend(self.axes.iter().flatten().chain(&self.centre).flat_map(|v| v.to_be_bytes()));
-        content.extend(self.region.offset.iter().chain(&self.region.size).flat_map(|v| v.to_be_bytes()));
-        content.extend_from_slice(&self.bytes);
-        Ok(())
     }
 }

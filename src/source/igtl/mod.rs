@@ -11,13 +11,11 @@ mod codec;
 mod message;
 mod network;
 mod pairing;
-mod wire;
 
 pub use client::{Client, ClientOptions, ClientStatistics, PORT, Received};
-pub use codec::{BODY_LIMIT, Decoded, Version, decode, encode};
+pub use codec::{BODY_LIMIT, DecodeError, Decoded, HEADER, MessageError, Version, crc64, decode, encode};
 pub use message::{
     Coordinates, Image, Message, Other, Region, Scalar, Status, Text, Tool, ToolKind, TrackingData, Transform,
 };
 pub use network::{Network, NetworkOptions, Poses};
 pub use pairing::{PairedFrame, Pairing, PairingCounts};
-pub use wire::{DecodeError, HEADER, MessageError, crc64};

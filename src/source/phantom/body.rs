@@ -1,7 +1,7 @@
 //! The bodies of the phantom: their echoes, and the ground truth of those that have a formula.
 
-use super::beam::{Beam, DYNAMIC_RANGE, Echo};
 use super::head::Head;
+use super::speckle::{Beam, DYNAMIC_RANGE, Echo};
 use crate::files::InputError;
 use crate::probe::Probe;
 use glam::DVec3;

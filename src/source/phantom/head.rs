@@ -1,7 +1,7 @@
 //! The fetal head in fluid: echoes and attenuation along a scan line.
 
 use super::anatomy::{self, normal};
-use super::beam::{Beam, Echo};
+use super::speckle::{Beam, Echo};
 use glam::{Mat3, Vec3, vec3};
 use std::f32::consts::TAU;
 

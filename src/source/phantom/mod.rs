@@ -1,26 +1,27 @@
 //! The phantom: simulated sweeps of an exactly known body with a wobbling abdominal probe.
 //!
-//! Each scan line is a straight line through the body, at the motor's angle and the time at which it is fired (`beam`). The body defines
-//! an echogenicity (`body`, `head`), and `speckle` adds the speckle of a real image. The same options give the same bytes on every machine
+//! Each scan line is a straight line through the body, at the motor's angle and the time at which it is fired. The body defines
+//! an echogenicity (`body`, `head`), and `speckle` adds the speckle of a real image. `source` hands out the frames. The same options give the same bytes on every machine
 //! with the same mathematics library, with any number of threads.
 
 mod anatomy;
-mod beam;
 mod body;
 mod head;
+mod source;
 mod speckle;
 
-pub use beam::DYNAMIC_RANGE;
 pub use body::{Body, RampTruth, Truth, Wire};
+pub use source::{CachedPhantom, PhantomSource};
+pub use speckle::DYNAMIC_RANGE;
 
 use crate::files::InputError;
 use crate::probe::{Advance, Array, Axis, Motion, Probe, Volumes};
 use crate::source::frame::Frame;
 use crate::source::samples::SampleType;
 use crate::source::sequence::{self, MAX_FRAMES};
-use beam::{Beam, Echo, grey};
 use body::{Scatterers, refusal};
 use rayon::prelude::*;
+use speckle::{Beam, Echo, grey};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;

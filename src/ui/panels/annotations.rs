@@ -1,7 +1,7 @@
 //! Annotations of the picture: a scale in every tile, the orientation of the axes, and a colour bar.
 
 use super::{PanelState, SMALL_TEXT, TEXT, WEAK_TEXT, picture_rect};
-use crate::passes::postprocess::tone;
+use crate::passes::postprocess;
 use crate::scene::{Layout, Mode, Scene, transfer};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
@@ -171,7 +171,7 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
     let area = Rect::from_min_size(pos2(picture.right() - 34.0, picture.top() + 26.0), vec2(16.0, height));
     for n in 0..STEPS {
         let value = (n as f64 + 0.5) / STEPS as f64;
-        let [r, g, b] = tone::toned(scene, ramp(value)).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        let [r, g, b] = postprocess::toned(scene, ramp(value)).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
         let low = area.bottom() - height * n as f32 / STEPS as f32;
         let part = Rect::from_min_max(pos2(area.left(), low - height / STEPS as f32 - 0.5), pos2(area.right(), low));
         painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));

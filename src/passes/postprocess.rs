@@ -1,14 +1,15 @@
-//! Contrast, brightness, gamma and colour map; cross-lines and frames over planes; the picture in 8 bits.
+//! Stage 4: the picture from the rendering, toned to 8 bits.
 
 use crate::passes::pass::*;
 use crate::scene::planes::{Frame, Plane, Sheet, Tile};
-use crate::scene::{ColourMap, Scene, transfer};
+use crate::scene::{ColourMap, Layout, Scene, transfer};
 use glam::DVec3;
 
 /// Opacity of a cross-line: the anatomy below it stays visible.
 pub(in crate::passes) const LINE_STRENGTH: f64 = 0.7;
 
-pub const PASS: Pass = Pass {
+/// Contrast, brightness, gamma and colour map; cross-lines and frames over planes; the picture in 8 bits.
+pub const TONE: Pass = Pass {
     name: "tone",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
@@ -27,14 +28,14 @@ pub const PASS: Pass = Pass {
     extent: picture_extent,
     repeat: once,
     params: |s, _| {
-        let params = params(s, Params::default());
+        let params = tone_params(s, Params::default());
         if !s.draws_lines() {
             return params;
         }
         let [columns, rows] = s.tile_grid();
         params.i32("columns", columns).i32("rows", rows).f32("line_strength", LINE_STRENGTH)
     },
-    constants: |s, _| constants(s, s.draws_lines()),
+    constants: |s, _| tone_constants(s, s.draws_lines()),
     tolerance: Tolerance {
         absolute: 1.01 / 255.0,
         relative: 0.0,
@@ -54,7 +55,7 @@ pub const PASS: Pass = Pass {
 };
 
 /// Adds the numbers of toning to those of a pass.
-pub fn params(scene: &Scene, params: Params) -> Params {
+pub fn tone_params(scene: &Scene, params: Params) -> Params {
     let post = &scene.settings.post;
     let [a, b, c, d, e] = transfer::colour_map(post.colour_map);
     params
@@ -69,7 +70,7 @@ pub fn params(scene: &Scene, params: Params) -> Params {
 }
 
 /// The constants of toning; with `lines`, over planes.
-pub fn constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
+pub fn tone_constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
     let post = &scene.settings.post;
     let mut constants = vec![("COLOUR_MAP", (post.colour_map != ColourMap::None) as i32)];
     constants.push(("GAMMA", (post.gamma != 1.0) as i32));
@@ -122,10 +123,89 @@ fn with_lines(sheet: &Sheet, tile: &Tile, mut colour: [f64; 3], x: usize, y: usi
 
 /// Distance in mm of a place in a plane from the line where another plane cuts that plane: to a point of the line, across
 /// the line's direction.
-pub fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
+fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
     let along = plane.normal.cross(other.normal);
     // The point of the line that is nearest to the plane's own point: down the other plane's slope within this one.
     let slope = along.cross(plane.normal);
     let on_line = plane.at + slope * (other.normal.dot(other.at - plane.at) / other.normal.dot(slope));
     (place - on_line).cross(along.normalize()).length()
+}
+
+/// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
+/// four pixels; in a 4-up picture, the rendering next to the planes.
+pub const ASSEMBLE: Pass = Pass {
+    name: "assemble",
+    stage: Stage::Postprocess,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |s, _| match s.settings.layout {
+        Layout::Single => "postprocess/assemble.alone",
+        Layout::Four => "postprocess/assemble.four",
+    },
+    needed: |s| match (rendered(s), s.settings.layout) {
+        (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
+        (_, Layout::Four) => Ok("the rendering stands beside three planes"),
+        (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),
+        (_, Layout::Single) => Ok("several rays make a pixel"),
+    },
+    reads: |s, _| {
+        let mut reads = vec![whole("rendered", Slot::Rendered)];
+        reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
+        reads
+    },
+    writes: |_, _| vec![whole("picture", Slot::Picture)],
+    extent: picture_extent,
+    repeat: once,
+    params: |_, _| Params::default(),
+    constants: |s, _| vec![("RAYS", s.settings.ray.rays as i32), ("HALF", s.settings.ray.half as i32)],
+    tolerance: Tolerance {
+        absolute: 1e-3,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4",
+    },
+    reference: |scene, _, reads, writes| {
+        let rendered = reads.get("rendered");
+        let picture = writes.get_mut("picture");
+        let rays = scene.settings.ray.rays as usize;
+        let corner = match scene.settings.layout {
+            Layout::Single => [0, 0],
+            // The lower right tile.
+            Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
+        };
+        for y in 0..picture.size[1] {
+            for x in 0..picture.size[0] {
+                if x < corner[0] || y < corner[1] {
+                    let plane = reads.get("planes").get([x, y, 0]).to_vec();
+                    picture.set([x, y, 0], &plane);
+                    continue;
+                }
+                if scene.settings.ray.half {
+                    picture.set([x, y, 0], &between(rendered, x - corner[0], y - corner[1]));
+                    continue;
+                }
+                let mut mean = [0.0; 4];
+                for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
+                    let ray = rendered.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
+                    mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
+                }
+                picture.set([x, y, 0], &mean);
+            }
+        }
+    },
+};
+
+/// Linear interpolation between the rays around a pixel. Ray i goes through the common corner of pixels 2 i and 2 i + 1. Beyond
+/// the outermost ray its value repeats.
+fn between(rendered: &Texels, x: usize, y: usize) -> [f64; 4] {
+    let along = |pixel: usize, rays: usize| {
+        let at = ((pixel as f64 - 0.5) / 2.0).clamp(0.0, (rays - 1) as f64);
+        let low = at.floor() as usize;
+        (low, (low + 1).min(rays - 1), at - at.floor())
+    };
+    let ((x0, x1, u), (y0, y1, v)) = (along(x, rendered.size[0]), along(y, rendered.size[1]));
+    std::array::from_fn(|c| {
+        let at = |x, y| rendered.get([x, y, 0])[c];
+        (1.0 - v) * ((1.0 - u) * at(x0, y0) + u * at(x1, y0)) + v * ((1.0 - u) * at(x0, y1) + u * at(x1, y1))
+    })
 }

@@ -1,10 +1,10 @@
 //! The phantom as a source: frames in order of acquisition, computed one volume at a time or all in advance.
 
-use super::frame::{Frame, Header, Source};
-use super::phantom::Phantom;
-use super::samples::StoredType;
+use super::Phantom;
 use crate::files::InputError;
 use crate::probe::Geometry;
+use crate::source::frame::{Frame, Header, Source};
+use crate::source::samples::StoredType;
 use std::collections::VecDeque;
 
 /// A source that computes the phantom one volume at a time.

@@ -1,27 +1,33 @@
-//! Assembles volumes from messages: samples of an IMAGE, Cartesian volumes, and freehand sweeps of tracked frames.
+//! OpenIGTLink as a live source: Cartesian volumes, and tracked 2D frames that are compounded into a volume.
+//!
+//! An IMAGE of several slices is a Cartesian volume; one with only some complete slices of it updates those. An IMAGE of one slice is a
+//! frame of a freehand sweep. After a change, all slices of the volume are emitted under a new volume number, so that the receiver
+//! always gets complete volumes and need not know their origin.
 
-use super::faults::{FaultKind, Faults};
+use super::client::{Client, ClientOptions, ClientStatistics};
+use super::codec::BODY_LIMIT;
+use super::message::{Image, Message, Scalar};
+use super::pairing::Pairing;
+use crate::files::escaped;
 use crate::probe::{Geometry, Grid};
-use crate::source::frame::Header;
+use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
-use crate::source::igtl::client::ClientOptions;
-use crate::source::igtl::codec::BODY_LIMIT;
-use crate::source::igtl::message::{Image, Message, Scalar};
-use crate::source::igtl::pairing::Pairing;
+use crate::source::live::{Event, Live};
 use crate::source::samples::{Replaced, SampleType, StoredType, not_empty, store, widen};
 use glam::DAffine3;
+use std::io;
 use std::time::{Duration, Instant};
 
 /// The origin of the poses of 2D frames.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Poses {
-    /// TRANSFORM and TDATA messages, selected as [`Pairing::new`](crate::source::igtl::Pairing::new) documents: device, tolerance and patience in s.
+    /// TRANSFORM and TDATA messages, selected as [`Pairing::new`] documents: device, tolerance and patience in s.
     Messages { device: Option<String>, tolerance: f64, patience: f64 },
     /// The image's own matrix.
     Image,
 }
 
-/// Options of a [`Network`](super::Network).
+/// Options of a [`Network`].
 #[derive(Clone, Debug)]
 pub struct NetworkOptions {
     pub client: ClientOptions,
@@ -51,6 +57,179 @@ impl Default for NetworkOptions {
     }
 }
 
+/// How often the statistics are checked while nothing arrives.
+const POLL: Duration = Duration::from_millis(100);
+/// Messages that are processed even if no time is left, so that a caller with zero patience makes progress.
+const MAX_AT_ONCE: usize = 256;
+
+/// A live source: the images of an OpenIGTLink server. It reconnects whenever the connection is lost, and never ends by itself.
+///
+/// No messages are processed while slices are emitted; messages that then exceed the client's queue are dropped and counted. Faults are
+/// reported as [`Event::Fault`], each kind at most once a second and with its count.
+///
+/// Memory: that of the [`Client`], one volume of at most `volume_bytes` and its message, the first frames of a sweep (256 MiB), and that
+/// of a [`Compounder`] and a [`Pairing`].
+pub struct Network {
+    client: Client,
+    /// Statistics that were reported as faults.
+    known: ClientStatistics,
+    last_error: Option<String>,
+    /// There was at least one connection.
+    connected: bool,
+    /// Lost connections.
+    lost: u64,
+    faults: Faults,
+    whole: Option<CartesianVolume>,
+    sweep: FreehandSweep,
+    volume_bytes: usize,
+    /// Header of the last `Begin`.
+    begun: Option<Header>,
+    output: Option<VolumeOutput>,
+    volumes: u32,
+}
+
+/// A volume whose slices are being emitted.
+struct VolumeOutput {
+    of_sweep: bool,
+    begin: bool,
+    volume: u32,
+    next: usize,
+    time: Option<f64>,
+}
+
+impl Network {
+    /// Starts to connect, as [`Client::connect`].
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn connect(address: &str, options: NetworkOptions) -> io::Result<Network> {
+        Ok(Network {
+            client: Client::connect(address, options.client.clone())?,
+            known: ClientStatistics::default(),
+            last_error: None,
+            connected: false,
+            lost: 0,
+            faults: Faults::new(address),
+            whole: None,
+            volume_bytes: options.volume_bytes,
+            sweep: FreehandSweep::new(options),
+            begun: None,
+            output: None,
+            volumes: 0,
+        })
+    }
+
+    /// Statistics of the connection.
+    pub fn statistics(&self) -> ClientStatistics {
+        self.client.statistics()
+    }
+
+    /// Records what happened to the connection since the last call.
+    fn check_connection(&mut self) {
+        let now = self.client.statistics();
+        let error = self.client.last_error();
+        let why = error.as_deref().unwrap_or("no reason is known");
+        let (known, faults) = (&self.known, &mut self.faults);
+        faults.note(FaultKind::Checksum, now.checksum_failures - known.checksum_failures, why);
+        faults.note(FaultKind::Malformed, now.malformed - known.malformed, why);
+        faults.note(FaultKind::Dropped, now.dropped - known.dropped, "they came faster than they were taken");
+        faults.note(FaultKind::Again, now.reconnects - known.reconnects, "");
+        // Every connection except the present one was lost.
+        self.connected |= now.connected || now.bytes > 0 || now.reconnects > 0;
+        let lost = now.reconnects + u64::from(self.connected) - u64::from(now.connected);
+        faults.note(FaultKind::Lost, lost.saturating_sub(self.lost), why);
+        let is_reported = lost > self.lost || error == self.last_error;
+        if !now.connected && !is_reported && error.is_some() {
+            faults.note(FaultKind::Unreachable, 1, why);
+        }
+        (self.known, self.last_error, self.lost) = (now, error, lost);
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Image(image) if image.size[2] > 1 => {
+                let time = (image.time > 0.0).then_some(image.time);
+                match CartesianVolume::take(&mut self.whole, image, self.volume_bytes) {
+                    Ok(replaced) => {
+                        self.faults.note(FaultKind::Samples, replaced, "they read as 0");
+                        self.start_output(false, time);
+                    }
+                    Err(fault) => self.faults.note(FaultKind::Image, 1, &fault),
+                }
+            }
+            other => self.sweep.take(other, &mut self.faults),
+        }
+    }
+
+    /// Starts to emit a volume.
+    fn start_output(&mut self, of_sweep: bool, time: Option<f64>) {
+        let header = if of_sweep { self.sweep.header() } else { self.whole.as_ref().map(CartesianVolume::header) };
+        let Some(header) = header else { return };
+        if let Err((field, fault)) = header.check() {
+            return self.faults.note(FaultKind::Image, 1, &format!("{field} {fault}"));
+        }
+        let begin = self.begun.as_ref() != Some(&header);
+        self.begun = Some(header);
+        self.output = Some(VolumeOutput { of_sweep, begin, volume: self.volumes, next: 0, time });
+        self.volumes = self.volumes.wrapping_add(1);
+    }
+
+    /// The next event of the volume that is being emitted.
+    fn next_output(&mut self) -> Option<Event> {
+        let output = self.output.as_mut()?;
+        if std::mem::take(&mut output.begin) {
+            return self.begun.clone().map(|header| Event::Begin(Box::new(header)));
+        }
+        let k = output.next;
+        output.next += 1;
+        let slice = match output.of_sweep {
+            true => self.sweep.slice(k),
+            false => self.whole.as_ref().and_then(|whole| whole.slice(k)),
+        };
+        let Some(slice) = slice else {
+            self.output = None;
+            return None;
+        };
+        let (volume, time, bytes) = (output.volume, output.time, slice.to_vec());
+        Some(Event::Frame(Frame { volume, number: k as u32, slice: k, backward: false, time, bytes }))
+    }
+}
+
+impl Live for Network {
+    fn next(&mut self, patience: Duration) -> Event {
+        let started = Instant::now();
+        let mut taken = 0;
+        loop {
+            self.check_connection();
+            if let Some(fault) = self.faults.due() {
+                return Event::Fault(fault);
+            }
+            if let Some(event) = self.next_output() {
+                return event;
+            }
+            if let Some(time) = self.sweep.update(&mut self.faults) {
+                self.start_output(true, time);
+                continue;
+            }
+            let left = patience.saturating_sub(started.elapsed());
+            // Poses alone may arrive without end.
+            if left.is_zero() && taken >= MAX_AT_ONCE {
+                return Event::Idle;
+            }
+            match self.client.next(left.min(POLL)) {
+                Some(received) => self.take(received.message),
+                None if left.is_zero() => return Event::Idle,
+                None => {}
+            }
+            taken += 1;
+        }
+    }
+
+    fn can_wait(&self) -> bool {
+        false
+    }
+}
+
 /// Longest wait for the first frames, and most bytes of them.
 const MAX_FIRST_WAIT: Duration = Duration::from_secs(10);
 const MAX_FIRST_BYTES: usize = 256 << 20;
@@ -61,7 +240,8 @@ struct BufferedFrame {
     bytes: Vec<u8>,
 }
 
-pub(super) struct FreehandSweep {
+/// A freehand sweep: tracked frames that are compounded into a volume.
+struct FreehandSweep {
     options: NetworkOptions,
     pairing: Pairing,
     /// Sample type of all frames. A different type begins a new sweep.
@@ -78,7 +258,7 @@ pub(super) struct FreehandSweep {
 }
 
 impl FreehandSweep {
-    pub fn new(options: NetworkOptions) -> FreehandSweep {
+    fn new(options: NetworkOptions) -> FreehandSweep {
         let pairing = match options.poses.clone() {
             Poses::Messages { device, tolerance, patience } => Pairing::new(device, tolerance, patience),
             Poses::Image => Pairing::new(None, 0.0, 0.0),
@@ -98,7 +278,7 @@ impl FreehandSweep {
     }
 
     /// Takes frames and poses; skips other messages.
-    pub fn take(&mut self, message: Message, faults: &mut Faults) {
+    fn take(&mut self, message: Message, faults: &mut Faults) {
         match (message, &self.options.poses) {
             (Message::Image(image), Poses::Image) => self.frame(image, DAffine3::IDENTITY, faults),
             (message, _) => {
@@ -146,7 +326,7 @@ impl FreehandSweep {
     }
 
     /// Updates the volume if that is due. Then returns the time stamp of its last frame.
-    pub fn update(&mut self, faults: &mut Faults) -> Option<Option<f64>> {
+    fn update(&mut self, faults: &mut Faults) -> Option<Option<f64>> {
         let waited = self.since?.elapsed();
         if self.compounder.is_none() {
             let enough = self.buffered.len() >= self.options.first.max(1) || self.buffered_bytes >= MAX_FIRST_BYTES;
@@ -184,13 +364,13 @@ impl FreehandSweep {
     }
 
     /// None before the volume is placed.
-    pub fn header(&self) -> Option<Header> {
+    fn header(&self) -> Option<Header> {
         let geometry = Geometry::Cartesian(self.compounder.as_ref()?.lattice().grid);
         Some(Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range })
     }
 
     /// A slice; None beyond the last.
-    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+    fn slice(&self, k: usize) -> Option<&[u8]> {
         self.compounder.as_ref()?.slice(k)
     }
 }
@@ -207,7 +387,7 @@ fn push(compounder: &mut Compounder, pose: Pose, bytes: &[u8], faults: &mut Faul
 const SPACING_TOLERANCE: f64 = 1e-5;
 
 /// A Cartesian volume, as of the last message.
-pub(super) struct CartesianVolume {
+struct CartesianVolume {
     scalar: Scalar,
     components: u8,
     stored: StoredType,
@@ -225,7 +405,7 @@ impl CartesianVolume {
     ///
     /// # Errors
     /// In words, an image that cannot be used. The volume is not changed.
-    pub fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
+    fn take(volume: &mut Option<CartesianVolume>, image: Image, max_bytes: usize) -> Result<u64, String> {
         let [i, j, _] = image.size;
         let ([x, y, first], [columns, rows, slices]) = (image.region.offset, image.region.size);
         if (x, y, columns, rows) != (0, 0, i, j) {
@@ -270,13 +450,13 @@ impl CartesianVolume {
         self.grid.spacing.iter().zip(grid.spacing).all(|(a, b)| (a - b).abs() <= SPACING_TOLERANCE * a.max(b))
     }
 
-    pub fn header(&self) -> Header {
+    fn header(&self) -> Header {
         let geometry = Geometry::Cartesian(self.grid);
         Header { forward: geometry.clone(), backward: geometry, stored: self.stored, range: self.range }
     }
 
     /// A slice; None beyond the last.
-    pub fn slice(&self, k: usize) -> Option<&[u8]> {
+    fn slice(&self, k: usize) -> Option<&[u8]> {
         let [x, y, _] = self.grid.size;
         self.bytes.chunks_exact(x * y * self.stored.bytes()).nth(k)
     }
@@ -301,7 +481,7 @@ const LUMINANCE: [f64; 3] = [0.299, 0.587, 0.114];
 const I8_SHIFT: f64 = 128.0;
 
 /// The stored type of a scalar: 8 and 16 bits unchanged, signed ones shifted to begin at 0, all others f32.
-pub(super) fn stored(scalar: Scalar) -> StoredType {
+fn stored(scalar: Scalar) -> StoredType {
     match scalar {
         Scalar::I8 | Scalar::U8 => StoredType::U8,
         Scalar::I16 | Scalar::U16 => StoredType::U16,
@@ -315,7 +495,7 @@ pub(super) fn stored(scalar: Scalar) -> StoredType {
 ///
 /// # Errors
 /// Pixels with another number of components.
-pub(super) fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
+fn samples(mut image: Image) -> Result<(Vec<u8>, u64), String> {
     let scalar = image.scalar;
     let mut bytes = match (image.components, scalar) {
         (1, Scalar::I8) => {
@@ -374,10 +554,89 @@ fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
     }
 }
 
+/// Shortest time between two reports of one kind.
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest reason, characters.
+const MAX_REASON: usize = 400;
+
+/// The kinds of faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FaultKind {
+    Unreachable,
+    Lost,
+    Again,
+    Checksum,
+    Malformed,
+    Dropped,
+    /// An image that is neither a volume nor a frame.
+    Image,
+    Samples,
+    /// A frame without a pose.
+    Unpaired,
+    Pose,
+    Outside,
+    Volume,
+}
+
+const KINDS: [(FaultKind, &str); 12] = [
+    (FaultKind::Unreachable, "not connected"),
+    (FaultKind::Lost, "connection lost"),
+    (FaultKind::Again, "connected again"),
+    (FaultKind::Checksum, "messages with a wrong checksum passed over"),
+    (FaultKind::Malformed, "malformed messages passed over"),
+    (FaultKind::Dropped, "messages dropped"),
+    (FaultKind::Image, "images passed over"),
+    (FaultKind::Samples, "samples that are not finite or are denormal"),
+    (FaultKind::Unpaired, "frames without a pose left out"),
+    (FaultKind::Pose, "frames refused"),
+    (FaultKind::Outside, "frames outside of the volume"),
+    (FaultKind::Volume, "no volume for the sweep"),
+];
+
+#[derive(Clone, Default)]
+struct Fault {
+    count: u64,
+    /// Reason of the last one.
+    why: String,
+    reported: Option<Instant>,
+}
+
+/// The faults of the source. Each kind is reported at most once a second, with its count.
+struct Faults {
+    address: String,
+    faults: [Fault; KINDS.len()],
+}
+
+impl Faults {
+    fn new(address: &str) -> Faults {
+        Faults { address: escaped(address, MAX_REASON), faults: Default::default() }
+    }
+
+    fn note(&mut self, kind: FaultKind, count: u64, why: &str) {
+        let place = KINDS.iter().position(|(k, _)| *k == kind).and_then(|n| self.faults.get_mut(n));
+        if let Some(fault) = place.filter(|_| count > 0) {
+            fault.count = fault.count.saturating_add(count);
+            fault.why = escaped(why, MAX_REASON);
+        }
+    }
+
+    /// A fault whose kind was not reported within the last second.
+    fn due(&mut self) -> Option<String> {
+        let waited = |fault: &Fault| fault.reported.is_none_or(|reported| reported.elapsed() >= REPORT_INTERVAL);
+        let mut faults = self.faults.iter_mut().zip(KINDS);
+        let (fault, (_, what)) = faults.find(|(fault, _)| fault.count > 0 && waited(fault))?;
+        let count = std::mem::take(&mut fault.count);
+        fault.reported = Some(Instant::now());
+        let times = if count == 1 { String::new() } else { format!(" ({count})") };
+        let why = if fault.why.is_empty() { String::new() } else { format!(": {}", fault.why) };
+        Some(format!("OpenIGTLink from {}: {what}{times}{why}", self.address))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::igtl::{Coordinates, Region};
+    use crate::source::igtl::message::{Coordinates, Region};
 
     fn image(scalar: Scalar, components: u8, bytes: Vec<u8>) -> Image {
         Image {
@@ -426,6 +685,42 @@ mod tests {
         for components in [2, 5, 255] {
             let refused = samples(image(Scalar::U8, components, vec![0; usize::from(components)])).unwrap_err();
             assert!(refused.contains(&format!("{components} components")), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_flood_of_faults_is_one_line_a_second_and_none_is_forgotten() {
+        let mut faults = Faults::new("host\n:1");
+        assert_eq!(faults.due(), None);
+        faults.note(FaultKind::Lost, 1, "gone");
+        faults.note(FaultKind::Dropped, 3, "");
+        faults.note(FaultKind::Image, 0, "never");
+        assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: connection lost: gone"));
+        assert_eq!(faults.due().as_deref(), Some("OpenIGTLink from host\\n:1: messages dropped (3)"));
+        for n in 0..1000 {
+            faults.note(FaultKind::Dropped, 2, &format!("the {n}th\u{1b}[2J"));
+            assert_eq!(faults.due(), None);
+        }
+        for fault in &mut faults.faults {
+            fault.reported = fault.reported.and_then(|reported| reported.checked_sub(REPORT_INTERVAL));
+        }
+        let reported = faults.due().unwrap();
+        assert!(reported.contains("messages dropped (2000): the 999th") && !reported.contains('\u{1b}'), "{reported}");
+    }
+
+    #[test]
+    fn every_kind_has_its_words() {
+        for kind in [
+            FaultKind::Unreachable,
+            FaultKind::Again,
+            FaultKind::Checksum,
+            FaultKind::Samples,
+            FaultKind::Unpaired,
+            FaultKind::Volume,
+        ] {
+            let mut faults = Faults::new("host");
+            faults.note(kind, 1, "");
+            assert!(faults.due().is_some(), "{kind:?}");
         }
     }
 }

@@ -1,0 +1,369 @@
+//! Empty-space skipping: value ranges of tiles and bricks, updated slice by slice; the kind of each brick to a mode; and the
+//! distance to the nearest brick of another kind. Each mode's rule is exact: the picture is the same bit for bit.
+
+use crate::passes::lookup_tables::brick_reaches;
+use crate::passes::pass::*;
+use crate::probe::Geometry;
+use crate::scene::{Compositing, Mode, Scene, Side, TILE, View, transfer};
+
+/// Kinds of bricks, as in classify.comp. The samples of an active brick are needed.
+const ACTIVE: u32 = 0;
+/// Outside the insonified region, or transparent.
+const EMPTY: u32 = 1;
+/// Inside, and the result of its samples is known.
+const HOMOGENEOUS: u32 = 2;
+/// Largest distance that is stored, bricks; the kind is in the two bits above.
+const MAX_DISTANCE: u32 = 16;
+
+/// How a ray caster skips empty space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::passes) enum Skipping {
+    /// Not at all: it takes every sample.
+    None,
+    /// By the kinds of bricks and the distance to the nearest brick of another kind, in this slot.
+    Kinds(Slot),
+    /// By the value ranges of bricks, which are compared with the largest or smallest sample so far.
+    Ranges,
+}
+
+impl Skipping {
+    /// The 3D texture that shaders name "bricks".
+    pub fn slot(self) -> Option<Slot> {
+        match self {
+            Skipping::None => None,
+            Skipping::Kinds(slot) => Some(slot),
+            Skipping::Ranges => Some(Slot::BrickRanges),
+        }
+    }
+
+    /// SKIP of empty_space.glsl.
+    pub fn constant(self) -> (&'static str, i32) {
+        let value = match self {
+            Skipping::None => 0,
+            Skipping::Kinds(_) => 1,
+            Skipping::Ranges => 2,
+        };
+        ("SKIP", value)
+    }
+}
+
+/// How the surface detector skips empty space.
+pub(in crate::passes) fn surface_skipping(scene: &Scene) -> Skipping {
+    if scene.skips() { Skipping::Kinds(Slot::SurfaceBrickDistances) } else { Skipping::None }
+}
+
+/// How compositing and projections skip empty space.
+pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Skipping {
+    match scene.settings.mode {
+        _ if !scene.skips() => Skipping::None,
+        Mode::Mip | Mode::MinIp => Skipping::Ranges,
+        _ => Skipping::Kinds(Slot::VolumeBrickDistances),
+    }
+}
+
+fn asked(scene: &Scene) -> Need {
+    match scene.skips() {
+        true => Ok("rays skip bricks that cannot change the picture"),
+        false => Err("no ray skips bricks: none is cast, or every sample is asked for"),
+    }
+}
+
+/// The smallest and the largest value of every tile of a slice. Only tiles of the slices that a new frame changes are updated.
+pub const TILE_RANGES: Pass = Pass {
+    name: "tile_ranges",
+    stage: Stage::Preprocess,
+    frequency: Frequency::Volume,
+    link: Link::None,
+    shader: |_, _| "empty_space/tile_ranges.plain",
+    needed: asked,
+    // A slice changes with the frames that are smoothed into it.
+    reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],
+    writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("tile_ranges", Slot::TileRanges) }],
+    extent: |s, t| {
+        let [width, height, _] = s.tile_counts();
+        [width, height, t.slices]
+    },
+    repeat: once,
+    params: |_, t| Params::default().i32("slice", t.slice),
+    constants: |_, _| vec![("TILE", TILE as i32)],
+    tolerance: Tolerance { absolute: 2e-5, relative: 0.0, outliers: 0.0, why: "one of 65535 steps, up or down" },
+    reference: |_, args, reads, writes| {
+        let volume = reads.get("volume");
+        let target = writes.get_mut("tile_ranges");
+        let edge = TILE as usize;
+        for z in args.slice as usize..(args.slice + args.slices) as usize {
+            for y in 0..target.size[1] {
+                for x in 0..target.size[0] {
+                    let (mut low, mut high) = (1.0f64, 0.0f64);
+                    for row in edge * y..(edge * (y + 1)).min(volume.size[1]) {
+                        for column in edge * x..(edge * (x + 1)).min(volume.size[0]) {
+                            let value = volume.one(column, row, z);
+                            (low, high) = (low.min(value), high.max(value));
+                        }
+                    }
+                    let steps = [(low * 65535.0).floor(), (high * 65535.0).ceil()];
+                    target.set([x, y, z], &steps.map(|n| n / 65535.0));
+                }
+            }
+        }
+    },
+};
+
+/// The smallest and the largest value that samples in each brick may have, from the tiles that they may touch. Only bricks that
+/// depend on the slices that a new frame changes are updated.
+pub const BRICK_RANGES: Pass = Pass {
+    name: "brick_ranges",
+    stage: Stage::Preprocess,
+    frequency: Frequency::Volume,
+    link: Link::None,
+    shader: |_, _| "empty_space/brick_ranges.plain",
+    needed: asked,
+    reads: |s, _| {
+        let part = Part::Around(s.smoothing_radius()[2]);
+        vec![whole("brick_table", Slot::BrickTable), Bind { part, ..whole("tile_ranges", Slot::TileRanges) }]
+    },
+    writes: |_, _| vec![whole("brick_ranges", Slot::BrickRanges)],
+    extent: |s, _| s.bricks().count,
+    repeat: once,
+    params: |_, t| Params::default().i32("slice", t.slice).i32("slices", t.slices),
+    constants: no_constants,
+    tolerance: Tolerance {
+        absolute: 0.0,
+        relative: 0.0,
+        outliers: 0.0,
+        why: "the smallest and the largest of values that are stored alike",
+    },
+    reference: |scene, args, reads, writes| {
+        let tiles = reads.get("tile_ranges");
+        let target = writes.get_mut("brick_ranges");
+        let bricks = scene.bricks();
+        for (n, reach) in brick_reaches(scene, &bricks).into_iter().enumerate() {
+            let [first, last] = reach.slices;
+            let outside = reach.side == Side::Outside;
+            if !outside && (last < args.slice || first >= args.slice + args.slices) {
+                continue;
+            }
+            let (mut low, mut high) = (1.0f64, 0.0f64);
+            let [columns, rows] = reach.tiles;
+            let within = |[from, to]: [u32; 2]| if outside { 0..0 } else { from as usize..to as usize + 1 };
+            for z in within(reach.slices) {
+                for y in within(rows) {
+                    for x in within(columns) {
+                        let at = 2 * ((z * tiles.size[1] + y) * tiles.size[0] + x);
+                        (low, high) = (low.min(tiles.values[at]), high.max(tiles.values[at + 1]));
+                    }
+                }
+            }
+            let [width, height, _] = bricks.count.map(|n| n as usize);
+            target.set([n % width, n / width % height, n / (width * height)], &[low, high]);
+        }
+    },
+};
+
+/// The kind of each brick to the surface detector. A change of transfer function, threshold or window classifies bricks again and
+/// reads no voxel.
+pub const CLASSIFY_SURFACE: Pass = Pass {
+    name: "classify_bricks_surface",
+    stage: Stage::Raycast,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |_, _| "empty_space/classify.plain",
+    needed: |s| match (s.detects_surface(), asked(s)) {
+        (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
+        (true, not) => not,
+        (false, _) => Err("no surface in this mode"),
+    },
+    reads: |_, _| ranges(),
+    writes: |_, _| vec![whole("kinds", Slot::BrickKinds)],
+    extent: |s, _| s.bricks().count,
+    repeat: once,
+    params: |s, _| window(s, s.surface_view()).f32("quiet_level", quiet_level(s)),
+    constants: |_, _| vec![("MAX_DISTANCE", MAX_DISTANCE as i32)],
+    tolerance: Tolerance {
+        absolute: 0.0,
+        relative: 0.0,
+        outliers: 1e-3,
+        why: "kinds are whole numbers; a range that ends within rounding of the threshold may fall on either side",
+    },
+    reference: |s, _, reads, writes| {
+        let bar = quiet_level(s);
+        classify_reference(s, s.surface_view(), reads, writes, |side, range| match side {
+            Side::Outside => EMPTY,
+            Side::Inside if range[1] + 1e-6 <= bar => HOMOGENEOUS,
+            _ => ACTIVE,
+        });
+    },
+};
+
+/// The kind of each brick to the mode that composites, or takes the mean.
+pub const CLASSIFY_VOLUME: Pass = Pass {
+    name: "classify_bricks_volume",
+    shader: |s, _| if s.composites() { "empty_space/classify.transparent" } else { "empty_space/classify.plain" },
+    needed: |s| match (s.composites(), s.settings.mode, asked(s)) {
+        (true, _, Ok(_)) => Ok("what is transparent or outside is left out"),
+        (_, Mode::Mean, Ok(_)) => Ok("what is zero or outside is counted without looking"),
+        (true, _, not) | (_, Mode::Mean, not) => not,
+        _ => Err("nothing is composited or averaged in this mode"),
+    },
+    reads: |s, _| {
+        let mut reads = ranges();
+        reads.extend(s.composites().then_some(whole("opaque_before", Slot::OpaqueBefore)));
+        reads
+    },
+    params: |s, _| match s.composites() {
+        true => window(s, s.volume_view()),
+        false => window(s, s.projection_view()).f32("quiet_level", 0.0),
+    },
+    constants: |s, _| {
+        let mut constants = vec![("MAX_DISTANCE", MAX_DISTANCE as i32)];
+        if s.composites() {
+            constants.push(("FROM_ZERO", between_samples(s) as i32));
+            constants.push(("ENTRIES", transfer::ENTRIES as i32));
+        }
+        constants
+    },
+    reference: |s, _, reads, writes| {
+        if !s.composites() {
+            return classify_reference(s, s.projection_view(), reads, writes, |side, range| match side {
+                Side::Outside => EMPTY,
+                Side::Inside if range[1] == 0.0 => HOMOGENEOUS,
+                _ => ACTIVE,
+            });
+        }
+        let opaque = reads.get("opaque_before").values.clone();
+        let last_entry = (transfer::ENTRIES - 1) as f64;
+        let entry = |value: f64| (value * last_entry).clamp(0.0, last_entry) as usize;
+        classify_reference(s, s.volume_view(), reads, writes, |side, [low, high]| {
+            let first = if between_samples(s) { 0 } else { entry(low - 1e-6) };
+            let last = (entry(high + 1e-6) + 1).min(transfer::ENTRIES - 1);
+            let transparent = opaque[last + 1] == opaque[first];
+            if side == Side::Outside || transparent { EMPTY } else { ACTIVE }
+        });
+    },
+    ..CLASSIFY_SURFACE
+};
+
+/// The slots that every kind follows from.
+fn ranges() -> Vec<Bind> {
+    vec![whole("brick_table", Slot::BrickTable), whole("brick_ranges", Slot::BrickRanges)]
+}
+
+/// The level that no sample of a quiet brick exceeds: two means of samples in 0..=q differ by at most q, so that the detector
+/// cannot fire where q is below the lower threshold.
+pub(in crate::passes) fn quiet_level(scene: &Scene) -> f64 {
+    let surface = &scene.settings.surface;
+    let threshold = surface.threshold.min(surface.rough_threshold.unwrap_or(surface.threshold));
+    // Larger than 0, which means exact zeros.
+    (threshold * (1.0 - 1e-4) - 1e-5).max(1e-30)
+}
+
+/// True if a step uses every value between two samples, which may be in two bricks.
+fn between_samples(scene: &Scene) -> bool {
+    scene.settings.volume.compositing == Compositing::PreIntegrated
+}
+
+/// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.
+fn beyond(scene: &Scene) -> f64 {
+    if scene.settings.ray.sliding > 0 { 1.0 + 1e-5 } else { 1.0 }
+}
+
+fn window(scene: &Scene, view: View) -> Params {
+    let [low, high] = view.window;
+    Params::default().f32("window_low", low).f32("window_scale", 1.0 / (high - low)).f32("beyond", beyond(scene))
+}
+
+fn classify_reference(
+    scene: &Scene,
+    view: View,
+    reads: &Arrays,
+    writes: &mut Arrays,
+    kind: impl Fn(Side, [f64; 2]) -> u32,
+) {
+    let ranges = reads.get("brick_ranges");
+    let target = writes.get_mut("kinds");
+    let [low, high] = view.window;
+    let windowed = |v: f64| ((v - low) / (high - low)).clamp(0.0, 1.0);
+    for (n, reach) in brick_reaches(scene, &scene.bricks()).into_iter().enumerate() {
+        let range = [ranges.values[2 * n] / beyond(scene), ranges.values[2 * n + 1] * beyond(scene)];
+        let kind = kind(reach.side, range.map(windowed));
+        target.values[n] = f64::from(kind * 64 + MAX_DISTANCE) / 255.0;
+    }
+}
+
+/// The Chebyshev distance to the nearest brick of another kind, in bricks (Deakin and Knackstedt 2020), for the surface detector: one
+/// axis per dispatch, by d(p) = min over the line through p of max(|q - p|, d(q)).
+pub const DISTANCE_SURFACE: Pass = Pass {
+    name: "brick_distance_surface",
+    stage: Stage::Raycast,
+    frequency: Frequency::Picture,
+    link: Link::None,
+    shader: |_, _| "empty_space/distance.plain",
+    needed: CLASSIFY_SURFACE.needed,
+    reads: |_, t| vec![whole("source", link(Slot::SurfaceBrickDistances, t).0)],
+    writes: |_, t| vec![whole("target", link(Slot::SurfaceBrickDistances, t).1)],
+    extent: |s, _| s.bricks().count,
+    repeat: |_| 3,
+    params: |_, _| Params::default(),
+    constants: |s, t| distance_constants(beyond_surface(s), t),
+    tolerance: Tolerance { absolute: 0.0, relative: 0.0, outliers: 0.0, why: "whole numbers" },
+    reference: |s, t, reads, writes| distance_reference(beyond_surface(s), t, reads, writes),
+};
+
+/// The same for the mode that composites, or takes the mean.
+pub const DISTANCE_VOLUME: Pass = Pass {
+    name: "brick_distance_volume",
+    needed: CLASSIFY_VOLUME.needed,
+    reads: |_, t| vec![whole("source", link(Slot::VolumeBrickDistances, t).0)],
+    writes: |_, t| vec![whole("target", link(Slot::VolumeBrickDistances, t).1)],
+    constants: |_, t| distance_constants(EMPTY, t),
+    reference: |_, t, reads, writes| distance_reference(EMPTY, t, reads, writes),
+    ..DISTANCE_SURFACE
+};
+
+/// The slots that the dispatch of an axis reads and writes.
+fn link(last: Slot, args: &DispatchArgs) -> (Slot, Slot) {
+    match args.iteration {
+        0 => (Slot::BrickKinds, Slot::BrickDistancesX),
+        1 => (Slot::BrickDistancesX, Slot::BrickDistancesXy),
+        _ => (Slot::BrickDistancesXy, last),
+    }
+}
+
+/// The kind of the space beyond the bricks. The detector takes samples there, where a Cartesian volume repeats its last texels.
+fn beyond_surface(scene: &Scene) -> u32 {
+    if matches!(scene.geometry, Geometry::Cartesian(_)) { ACTIVE } else { EMPTY }
+}
+
+fn distance_constants(beyond: u32, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+    vec![("AXIS", args.iteration as i32), ("BEYOND", beyond as i32)]
+}
+
+fn distance_reference(beyond: u32, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+    let source = reads.get("source");
+    let target = writes.get_mut("target");
+    let axis = args.iteration as usize;
+    let size = source.size;
+    let code = |at: [usize; 3]| (source.one(at[0], at[1], at[2]) * 255.0).round() as u32;
+    for z in 0..size[2] {
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let at = [x, y, z];
+                let (kind, own) = (code(at) >> 6, code(at) & 63);
+                let mut best = own;
+                for along in 0..size[axis] {
+                    let away = along.abs_diff(at[axis]) as u32;
+                    let mut there = at;
+                    there[axis] = along;
+                    let other = code(there);
+                    if away > 0 {
+                        best = best.min(if other >> 6 == kind { away.max(other & 63) } else { away });
+                    }
+                }
+                if beyond != kind {
+                    best = best.min(at[axis] as u32 + 1).min((size[axis] - at[axis]) as u32);
+                }
+                target.set(at, &[f64::from(kind * 64 + best) / 255.0]);
+            }
+        }
+    }
+}

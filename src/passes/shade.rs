@@ -1,0 +1,424 @@
+//! Stage 3: lighting of the distance map, with the shadow and the ambient occlusion that it takes; then camera parameters, positions and
+//! normals that its passes share.
+
+use crate::passes::pass::*;
+use crate::scene::{Mode, Scene, Skin};
+use glam::DVec3;
+
+/// Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
+pub const LIGHT: Pass = Pass {
+    name: "light",
+    stage: Stage::Shade,
+    frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
+    shader: |s, _| {
+        let arrives = (casts_shadow(s), is_occluded(s));
+        match (lit_thing(s), arrives) {
+            (Lit::Surface, (false, false)) => "shade/light.plain",
+            (Lit::Surface, (true, false)) => "shade/light.shadowed",
+            (Lit::Surface, (false, true)) => "shade/light.occluded",
+            (Lit::Surface, (true, true)) => "shade/light.shadowed_occluded",
+            (Lit::BehindLayer, (false, false)) => "shade/light.behind_layer_plain",
+            (Lit::BehindLayer, (true, false)) => "shade/light.behind_layer_shadowed",
+            (Lit::BehindLayer, (false, true)) => "shade/light.behind_layer_occluded",
+            (Lit::BehindLayer, (true, true)) => "shade/light.behind_layer_shadowed_occluded",
+            (Lit::Composited, (false, false)) => "shade/light.composited_plain",
+            (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
+            (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
+            (Lit::Composited, (true, true)) => "shade/light.composited_shadowed_occluded",
+        }
+    },
+    needed: |s| match (s.has_distance(), s.lights_volume()) {
+        (true, false) => Ok("a surface is lit"),
+        (true, true) => Ok("the volume is lit where rays hit it first"),
+        (false, _) => Err("no surface in this mode"),
+    },
+    reads: |s, t| {
+        let mut reads = vec![whole("distance_map", t.source())];
+        reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
+        reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("volume_layer", Slot::VolumeLayer)));
+        reads.extend(casts_shadow(s).then_some(whole("shadow", Slot::Shadow)));
+        reads.extend(is_occluded(s).then_some(whole("occlusion", Slot::Occlusion)));
+        reads
+    },
+    writes: |s, _| vec![whole("picture", rendered(s))],
+    extent: ray_extent,
+    repeat: once,
+    params: |s, _| {
+        let light = &s.settings.light;
+        camera_params(s)
+            .vec3("light_at", light_at(s))
+            .f32("ambient", light.ambient)
+            .f32("diffuse", light.diffuse)
+            .f32("specular", light.specular)
+            .f32("shininess", light.shininess)
+            .vec3("light_colour", light.colour)
+            .vec3("surface_colour", light.surface_colour)
+            .f32("texture_share", light.texture)
+            .f32("shadow_strength", light.shadow.map_or(0.0, |s| s.strength))
+            .vec3("wrap", wrap(s.skin()))
+            .vec3("through", through(s.skin()))
+            .f32("layer_share", s.settings.volume.veil)
+    },
+    constants: |s, _| {
+        let light = &s.settings.light;
+        vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)]
+    },
+    tolerance: Tolerance {
+        absolute: 6e-3,
+        relative: 6e-3,
+        outliers: 5e-3,
+        why: "a slope is off by 1e-6 in f32, and a shininess of 1e6 multiplies what that does to a cosine; a neighbour at \
+              exactly the cliff's height may count or not",
+    },
+    reference: |scene, _, reads, writes| {
+        let picture = writes.get_mut("picture");
+        for y in 0..picture.size[1] {
+            for x in 0..picture.size[0] {
+                let light = lit(scene, reads, x, y);
+                picture.set([x, y, 0], &shown(scene, reads, light, x, y));
+            }
+        }
+    },
+};
+
+#[derive(PartialEq)]
+enum Lit {
+    Surface,
+    /// A surface behind a composited volume.
+    BehindLayer,
+    /// The volume itself, where rays hit it first.
+    Composited,
+}
+
+fn lit_thing(scene: &Scene) -> Lit {
+    match (scene.lights_volume(), scene.settings.mode) {
+        (true, _) => Lit::Composited,
+        (false, Mode::Mixed) => Lit::BehindLayer,
+        (false, _) => Lit::Surface,
+    }
+}
+
+/// The colour of a pixel: its light (body and highlight), with the composited volume in front of it or lit by it.
+fn shown(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
+    let layer = |share: f64| {
+        let layer = reads.get("volume_layer").get([x, y, 0]);
+        (DVec3::new(layer[0], layer[1], layer[2]) * share, layer[3] * share)
+    };
+    let (colour, opacity) = match (lit_thing(scene), light) {
+        (Lit::Surface, light) => light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0)),
+        (Lit::BehindLayer, light) => {
+            let (before, opacity) = layer(scene.settings.volume.veil);
+            light.map_or((before, opacity), |(body, highlight)| (before + (1.0 - opacity) * (body + highlight), 1.0))
+        }
+        (Lit::Composited, light) => {
+            let (colour, opacity) = layer(1.0);
+            match light {
+                Some((body, highlight)) => (colour * (1.0 - opacity + opacity * body) + opacity * highlight, opacity),
+                None => (colour, opacity),
+            }
+        }
+    };
+    [colour.x, colour.y, colour.z, opacity]
+}
+
+/// Red wraps furthest: light travels furthest through skin at long wavelengths.
+fn wrap(skin: Option<Skin>) -> DVec3 {
+    DVec3::new(1.0, 0.55, 0.35) * skin.map_or(0.0, |s| s.wrap)
+}
+
+fn through(skin: Option<Skin>) -> DVec3 {
+    skin.map_or(DVec3::ZERO, |s| DVec3::from(s.colour) * s.translucency)
+}
+
+/// Light from a pixel's surface: from its body, and its highlight.
+fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec3)> {
+    let distances = reads.get("distance_map");
+    let (place, _) = place(scene, distances, x as i64, y as i64)?;
+    let normal = normal(scene, distances, x as i64, y as i64)?;
+    let light = &scene.settings.light;
+    let (_, along) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+    let (to_light, _) = to_light(scene, place, normal);
+    let cosine = normal.dot(to_light);
+    let facing = cosine.max(0.0);
+    let halfway = (to_light - along).try_normalize().unwrap_or(DVec3::ZERO);
+    let gloss = normal.dot(halfway).max(0.0).powf(light.shininess);
+    let (colour, found, behind) = match lit_thing(scene) {
+        Lit::Composited => (DVec3::ONE, 1.0, 1.0),
+        _ => {
+            let surface = reads.get("surface").get([x, y, 0]);
+            let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
+            (DVec3::from(light.surface_colour) * (1.0 + (echo - 1.0) * light.texture * found), found, behind)
+        }
+    };
+
+    let arrives = light.shadow.map_or(1.0, |s| match casts_shadow(scene) {
+        true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
+        false => 1.0,
+    });
+    let open = if is_occluded(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
+    let (diffused, glow) = match scene.skin() {
+        None => (DVec3::splat(facing * arrives), DVec3::ZERO),
+        Some(_) => {
+            let wrap = wrap(scene.skin());
+            let wrapped = ((DVec3::splat(cosine) + wrap) / (1.0 + wrap)).max(DVec3::ZERO);
+            // What a shadow leaves is red first.
+            let softened = DVec3::splat(arrives) + (1.0 - arrives) * 0.5 * wrap;
+            let thin = found * (1.0 - behind.clamp(0.0, 1.0));
+            (wrapped * softened, through(scene.skin()) * thin * (0.35 + 0.65 * (-cosine).max(0.0)))
+        }
+    };
+    let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
+    let body = colour * (light.ambient * open + light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0)));
+    let colour = DVec3::from(light.colour);
+    Some((colour * (body + glow * open), colour * shine))
+}
+
+/// Samples on the segment to the light.
+const SHADOW_STEPS: u32 = 96;
+
+/// Shadow, by tracing the distance map towards the light (thesis Fig. 41): the map is taken as the front of matter that is
+/// `thickness` deep, and a place on the way to the light that lies in it is where the light is blocked.
+pub const SHADOW: Pass = Pass {
+    name: "shadow",
+    stage: Stage::Shade,
+    frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
+    shader: |_, _| "shade/shadow",
+    needed: |s| match (s.has_distance(), s.settings.light.shadow) {
+        (false, _) => Err("no surface in this mode"),
+        (true, None) => Err("not asked for"),
+        (true, Some(shadow)) if shadow.strength == 0.0 => Err("a strength of 0 casts none"),
+        _ => Ok("asked for"),
+    },
+    reads: |_, t| vec![whole("distance_map", t.source())],
+    writes: |_, _| vec![whole("shadow", Slot::Shadow)],
+    extent: ray_extent,
+    repeat: once,
+    params: |s, _| {
+        let shadow = s.settings.light.shadow.unwrap_or_default();
+        camera_params(s)
+            .vec3("forward", s.rays.forward)
+            .vec3("light_at", light_at(s))
+            .f32("reach", shadow.reach)
+            .f32("thickness", shadow.thickness)
+            .f32("bias", shadow.bias)
+            .f32("softness", shadow.softness)
+    },
+    constants: |s, _| {
+        let soft = s.settings.light.shadow.is_some_and(|s| s.softness > 0.0);
+        vec![
+            ("POINT", s.settings.light.position.is_some() as i32),
+            ("PERSPECTIVE", s.rays.is_perspective as i32),
+            ("SOFT", soft as i32),
+            ("STEPS", SHADOW_STEPS as i32),
+        ]
+    },
+    tolerance: Tolerance {
+        absolute: 5e-3,
+        relative: 0.0,
+        outliers: 3e-2,
+        why: "a place is off by 2e-5 mm in f32, and an edge of softness 0.15 at 0.4 mm makes 3e-4 of that; where the map has a \
+              cliff, a thickness or a border, a place may fall on either side and the whole step counts or not",
+    },
+    reference: |scene, _, reads, writes| {
+        let distances = reads.get("distance_map");
+        let shadow = writes.get_mut("shadow");
+        for y in 0..shadow.size[1] {
+            for x in 0..shadow.size[0] {
+                let arrives = place(scene, distances, x as i64, y as i64)
+                    .map_or(1.0, |(place, _)| arriving(scene, distances, x, y, place));
+                shadow.set([x, y, 0], &[arrives]);
+            }
+        }
+    },
+};
+
+/// True if the light casts a shadow in this scene.
+fn casts_shadow(scene: &Scene) -> bool {
+    (SHADOW.needed)(scene).is_ok()
+}
+
+/// Share of the light that arrives at a place which pixel (x, y) sees.
+fn arriving(scene: &Scene, distances: &Texels, x: usize, y: usize, place: DVec3) -> f64 {
+    let shadow = scene.settings.light.shadow.unwrap_or_default();
+    let (_, along) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+    let (direction, far) = to_light(scene, place, -along);
+    let way = shadow.reach.min(far);
+    let mut arrives = 1.0f64;
+    for i in 1..=SHADOW_STEPS {
+        let gone = f64::from(i) * way / f64::from(SHADOW_STEPS);
+        let Some((at, distance)) = seen_at(scene, place + direction * gone, distances.size) else { break };
+        let Some(nearest) = map_at(scene, distances, at) else { continue };
+        let inside = distance - nearest - shadow.bias;
+        if inside > shadow.thickness {
+            continue;
+        }
+        let blocked = match shadow.softness > 0.0 {
+            true => (0.5 + inside / (shadow.softness * gone)).clamp(0.0, 1.0),
+            false => f64::from(inside > 0.0),
+        };
+        arrives = arrives.min(1.0 - blocked);
+    }
+    arrives
+}
+
+/// Pixel place of a place in space and its distance along that ray; none beyond the picture or behind the camera.
+fn seen_at(scene: &Scene, place: DVec3, size: [usize; 3]) -> Option<([f64; 2], f64)> {
+    let rays = &scene.rays;
+    let way = place - rays.origin;
+    let solve = |v: DVec3, dx: DVec3, dy: DVec3| [v.dot(dx) / dx.length_squared(), v.dot(dy) / dy.length_squared()];
+    let (at, distance) = if rays.is_perspective {
+        let depth = way.dot(rays.forward);
+        if depth <= 1e-6 {
+            return None;
+        }
+        (solve(way / depth - rays.direction, rays.direction_dx, rays.direction_dy), way.length())
+    } else {
+        (solve(way, rays.origin_dx, rays.origin_dy), way.dot(rays.forward))
+    };
+    let within = at[0] >= 0.0 && at[1] >= 0.0 && at[0] < size[0] as f64 && at[1] < size[1] as f64;
+    (within && distance >= 0.0).then_some((at, distance))
+}
+
+/// The distance map between pixel centres; across a cliff or a border, that of the pixel itself.
+fn map_at(scene: &Scene, distances: &Texels, at: [f64; 2]) -> Option<f64> {
+    let (x, y) = ((at[0] - 0.5).floor(), (at[1] - 0.5).floor());
+    let (u, v) = (at[0] - 0.5 - x, at[1] - 0.5 - y);
+    let (x, y) = (x as i64, y as i64);
+    let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| hit_at(distances, x + dx, y + dy));
+    let own = || hit_at(distances, at[0].floor() as i64, at[1].floor() as i64);
+    let [Some(a), Some(b), Some(c), Some(d)] = corners else { return own() };
+    let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+    if high - low > scene.cliff() {
+        return own();
+    }
+    Some((1.0 - v) * ((1.0 - u) * a + u * b) + v * ((1.0 - u) * c + u * d))
+}
+
+/// Samples around a pixel.
+const OCCLUSION_SAMPLES: u32 = 32;
+/// pi (3 - sqrt 5), rad: turning by it never comes back to a direction.
+const GOLDEN_ANGLE: f64 = 2.399_963_23;
+/// Cosine above the tangent plane that is ignored: the map's own roughness.
+const ROUGHNESS: f64 = 0.1;
+
+/// Ambient occlusion in image space: surfaces that rise above a pixel's tangent plane nearby occlude ambient light. (Mittring 2007;
+/// Bavoil and Sainz 2008.)
+pub const OCCLUSION: Pass = Pass {
+    name: "occlusion",
+    stage: Stage::Shade,
+    frequency: Frequency::Picture,
+    link: Link::Observer(Chain::Distances),
+    shader: |_, _| "shade/occlusion",
+    needed: |s| match (s.has_distance(), s.settings.light.occlusion) {
+        (false, _) => Err("no surface in this mode"),
+        (true, None) => Err("not asked for"),
+        (true, Some(occlusion)) if occlusion.strength == 0.0 => Err("a strength of 0 takes nothing"),
+        _ => Ok("asked for"),
+    },
+    reads: |_, t| vec![whole("distance_map", t.source())],
+    writes: |_, _| vec![whole("occlusion", Slot::Occlusion)],
+    extent: ray_extent,
+    repeat: once,
+    params: |s, _| {
+        let occlusion = s.settings.light.occlusion.unwrap_or_default();
+        camera_params(s).f32("radius", occlusion.radius).f32("strength", occlusion.strength)
+    },
+    constants: |_, _| vec![("SAMPLES", OCCLUSION_SAMPLES as i32)],
+    tolerance: Tolerance {
+        absolute: 4e-3,
+        relative: 0.0,
+        outliers: 3e-2,
+        why: "a sum of 32 cosines in f32; a place on the spiral at a pixel's very border may be read from its neighbour, and a \
+              neighbour at exactly the cliff's height may tilt the normal or not",
+    },
+    reference: |scene, _, reads, writes| {
+        let distances = reads.get("distance_map");
+        let occlusion = writes.get_mut("occlusion");
+        for y in 0..occlusion.size[1] {
+            for x in 0..occlusion.size[0] {
+                occlusion.set([x, y, 0], &[open(scene, distances, x as i64, y as i64).unwrap_or(1.0)]);
+            }
+        }
+    },
+};
+
+/// True if ambient occlusion darkens this scene.
+fn is_occluded(scene: &Scene) -> bool {
+    (OCCLUSION.needed)(scene).is_ok()
+}
+
+fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
+    let settings = scene.settings.light.occlusion.unwrap_or_default();
+    let (here, distance) = place(scene, distances, x, y)?;
+    let normal = normal(scene, distances, x, y)?;
+    let rays = &scene.rays;
+    let pixels = settings.radius / (rays.origin_dx + rays.direction_dx * distance).length().max(1e-9);
+    let mut taken = 0.0;
+    for i in 0..OCCLUSION_SAMPLES {
+        let share = ((f64::from(i) + 0.5) / f64::from(OCCLUSION_SAMPLES)).sqrt();
+        let (sin, cos) = (GOLDEN_ANGLE * f64::from(i)).sin_cos();
+        let tap = |at: i64, along: f64| (at as f64 + 0.5 + pixels * share * along).floor() as i64;
+        let Some((there, _)) = place(scene, distances, tap(x, cos), tap(y, sin)) else { continue };
+        let far = there.distance(here);
+        if far >= 1e-6 {
+            let falls = (1.0 - (far / settings.radius).powi(2)).max(0.0);
+            taken += (normal.dot(there - here) / far - ROUGHNESS).max(0.0) * falls;
+        }
+    }
+    Some((1.0 - settings.strength * 2.0 * taken / f64::from(OCCLUSION_SAMPLES)).clamp(0.0, 1.0))
+}
+
+fn camera_params(scene: &Scene) -> Params {
+    ray_params(scene).f32("cliff", scene.cliff())
+}
+
+/// Unit direction to a directional light, or the position of a point light, in space.
+fn light_at(scene: &Scene) -> DVec3 {
+    scene.light_place().unwrap_or_else(|| scene.rays.from_camera(scene.settings.light.direction.normalize()))
+}
+
+/// Unit direction from a place to the light, and the distance to it; the direction is `otherwise` for a light at that place.
+fn to_light(scene: &Scene, place: DVec3, otherwise: DVec3) -> (DVec3, f64) {
+    match scene.light_place() {
+        Some(light) => ((light - place).try_normalize().unwrap_or(otherwise), light.distance(place)),
+        None => (light_at(scene), f64::MAX),
+    }
+}
+
+/// The distance at a pixel; none for a miss, or beyond the picture.
+fn hit_at(distances: &Texels, x: i64, y: i64) -> Option<f64> {
+    let [width, height, _] = distances.size;
+    if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 {
+        return None;
+    }
+    Some(distances.one(x as usize, y as usize, 0)).filter(|d| is_hit(*d))
+}
+
+/// The point of the surface at a pixel in space, and its distance.
+fn place(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<(DVec3, f64)> {
+    let distance = hit_at(distances, x, y)?;
+    let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+    Some((origin + direction * distance, distance))
+}
+
+/// Unit normal at a pixel, towards the viewer. No difference is taken across a cliff.
+pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3> {
+    let (here, distance) = place(scene, distances, x, y)?;
+    let slope = |dx: i64, dy: i64, facing: DVec3| {
+        let same = |p: &(DVec3, f64)| (p.1 - distance).abs() <= scene.cliff();
+        let back = place(scene, distances, x - dx, y - dy).filter(same);
+        let on = place(scene, distances, x + dx, y + dy).filter(same);
+        match (back, on) {
+            (None, None) => facing,
+            (back, on) => on.map_or(here, |p| p.0) - back.map_or(here, |p| p.0),
+        }
+    };
+    let rays = &scene.rays;
+    let sx = slope(1, 0, rays.origin_dx + rays.direction_dx);
+    let sy = slope(0, 1, rays.origin_dy + rays.direction_dy);
+    let (_, along) = rays.at(x as f64 + 0.5, y as f64 + 0.5);
+    let normal = sy.cross(sx).try_normalize().unwrap_or(-along);
+    Some(if normal.dot(along) > 0.0 { -normal } else { normal })
+}
