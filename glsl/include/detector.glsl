@@ -1,14 +1,18 @@
 // The surface detector: a state machine over the samples of a ray. D is the mean of the newer half of the last RING samples
-// minus the mean of the older half. A rough detector with longer steps ignores specks; where it fires, the ray steps back and
-// a fine detector finds the position. The adaptive detector requires that an edge exceed the noise in front of it; if the ray
-// has no such edge, it examines its largest weaker edge again.
+// minus the mean of the older half: each half is as long as the edge, in mm, at every step. A rough detector with longer steps
+// ignores specks; where it fires, the ray steps back and a fine detector finds the position. The adaptive detector requires
+// that an edge exceed the noise in front of it; if the ray has no such edge, it examines its largest weaker edge again.
 layout(constant_id = 3) const int ROUGH = 2; // fine steps in a rough step; 1: no rough detector
-layout(constant_id = 4) const int PEAK = 1;   // 0: the surface is at the first crossing
+layout(constant_id = 4) const int PLACE = 1;  // the surface is 0 at the first crossing, 1 at the peak, 2 in the middle of the edge
 layout(constant_id = 5) const int NUMBER = 1; // which surface of the ray to report
 layout(constant_id = 7) const int DETECTOR = 0; // 0 threshold, 1 adaptive, 2 adaptive and ignores specks
+layout(constant_id = 24) const int HALF = 4;    // samples of half a ring, at least 4
+layout(constant_id = 25) const int FOLLOW_LENGTH = 8; // samples after the crossing in which the peak may be
 
-const int RING = 8;
-const int MEMORY = 16; // samples in the noise estimate
+const int RING = 2 * HALF;
+const int MEMORY = 2 * RING; // samples in the noise estimate
+const float FOLLOW_LEVEL = 0.7; // an edge has been followed when D falls below this share of its largest value
+const float UNIT = 4194304.0; // of a sample in a long ring
 const int SEARCH_ROUGH = 0, SEARCH_FINE = 1, FOLLOW = 2;
 const int START = ROUGH > 1 ? SEARCH_ROUGH : SEARCH_FINE;
 const int NEVER = 0x7fffffff;
@@ -22,12 +26,23 @@ int filled = 0;
 int fired = 0;
 int surfaces_passed = 0; // surfaces found so far
 bool found = false;
+// A ring of 8 samples is in registers. A longer one is an array, with the sums of its halves. Those are integers, in units of
+// 2^-22: they do not depend on the samples that have left the ring, and a ring that was refilled is the same ring.
 vec4 older = vec4(0.0), newer = vec4(0.0);
+int ring[RING];
+int older_sum = 0, newer_sum = 0;
+int quiet_samples = 0; // the last samples that cannot fire the detector
+int leaving = 0; // the sample that went from the newer half to the older
 float previous = 0.0;
 // The largest difference since the crossing, the differences before and after it, its sample, and the echo behind it. Until the
 // sample after it is known, it may not be the largest, and there is no surface.
 float best = 0.0, before = 0.0, after = 0.0, top = 0.0;
 int best_at = 0;
+bool followed = false; // the peak is known
+bool confirmed = false; // the echo behind a rejected edge lasts
+// Place where D falls below FOLLOW_LEVEL of the peak, samples; NEVER where it did not. First sample that the ring may use.
+float fallen_at = float(NEVER);
+int fine_from = 0;
 float first_echo = 0.0; // echo behind the crossing
 // Noise in front of the edge: number of samples, their mean and variance.
 float samples_learnt = 0.0, noise_mean = 0.0, noise_variance = 0.0;
@@ -43,15 +58,36 @@ float variance_of(vec4 samples) {
     return dot(off, off) / 3.0;
 }
 
+// Of a half of a long ring; `away`: its newest sample, 0 the newest of all.
+float variance_from(int away, int sum) {
+    float mean = float(sum) / (UNIT * float(HALF)), squares = 0.0;
+    for (int n = away; n < away + HALF; ++n) {
+        float off = float(ring[(filled - 1 - n) % RING]) / UNIT - mean;
+        squares += off * off;
+    }
+    return squares / float(HALF - 1);
+}
+
+float older_mean() { return HALF == 4 ? dot(older, QUARTER) : float(older_sum) / (UNIT * float(HALF)); }
+float newer_mean() { return HALF == 4 ? dot(newer, QUARTER) : float(newer_sum) / (UNIT * float(HALF)); }
+float older_variance() { return HALF == 4 ? variance_of(older) : variance_from(HALF, older_sum); }
+float newer_variance() { return HALF == 4 ? variance_of(newer) : variance_from(0, newer_sum); }
+
+// True if no sample of the ring can fire the detector.
+bool is_quiet() {
+    vec4 most = max(older, newer);
+    return HALF == 4 ? max(max(most.x, most.y), max(most.z, most.w)) <= quiet_level : quiet_samples >= RING;
+}
+
 // Running mean and sample variance of the samples that left the newer half, over MEMORY samples.
 void learn() {
     if (samples_learnt == 0.0) {
-        noise_mean = dot(older, QUARTER);
-        noise_variance = variance_of(older);
-        samples_learnt = 4.0;
+        noise_mean = older_mean();
+        noise_variance = older_variance();
+        samples_learnt = float(HALF);
         return;
     }
-    float off = older.w - noise_mean;
+    float off = (HALF == 4 ? older.w : float(leaving) / UNIT) - noise_mean;
     samples_learnt += 1.0;
     float n = min(samples_learnt, float(MEMORY));
     noise_mean += off / n;
@@ -65,6 +101,7 @@ void restart(int i) {
     stride = ROUGH;
     limit = NEVER;
     segment = i;
+    fine_from = i;
     samples_learnt = 0.0;
     noise_variance = 0.0;
 }
@@ -79,10 +116,26 @@ bool skip_sample(inout int i) {
 
 // Adds a sample to the ring; returns the new difference.
 float push_sample(float value) {
-    older = vec4(older.yzw, newer.x);
-    newer = vec4(newer.yzw, value);
+    if (HALF == 4) {
+        older = vec4(older.yzw, newer.x);
+        newer = vec4(newer.yzw, value);
+        ++filled;
+        return polarity * dot(newer - older, QUARTER);
+    }
+    if (filled == 0) older_sum = newer_sum = quiet_samples = 0;
+    int at = filled % RING;
+    if (filled >= RING) older_sum -= ring[at];
+    if (filled >= HALF) {
+        leaving = ring[(filled - HALF) % RING];
+        newer_sum -= leaving;
+        older_sum += leaving;
+    }
+    int rounded = int(value * UNIT + 0.5);
+    ring[at] = rounded;
+    newer_sum += rounded;
+    quiet_samples = value <= quiet_level ? quiet_samples + 1 : 0;
     ++filled;
-    return polarity * dot(newer - older, QUARTER);
+    return polarity * float(newer_sum - older_sum) / (UNIT * float(HALF));
 }
 
 // The bar that an edge must exceed because of noise, after sample i entered the ring. The bar is higher while few samples are
@@ -94,15 +147,17 @@ float noise_bar_at(int i, float difference) {
         bool searches = ready && state == START;
         // A Cartesian volume repeats its border in front of the region: its constant value is no estimate of the noise.
         if (searches && (SWEEP > 0 || i >= (RING - 1) * stride)) learn();
-        bool has_statistics = SWEEP > 0 || samples_learnt > 0.0;
-        float deviation = noise * sqrt(has_statistics ? noise_variance : variance_of(newer));
-        noise_bar = deviation * (has_statistics ? 1.0 + float(RING) / max(samples_learnt, 1.0) : 1.0);
         float height = START == SEARCH_ROUGH ? rough_threshold : threshold;
-        if (searches && difference > max(height, weak) && i >= RING / 2) {
+        // The bar is that of the noise only where the difference exceeds the other.
+        if (difference <= min(height, threshold)) return 0.0;
+        bool has_statistics = SWEEP > 0 || samples_learnt > 0.0;
+        float deviation = noise * sqrt(has_statistics ? noise_variance : newer_variance());
+        noise_bar = deviation * (has_statistics ? 1.0 + float(RING) / max(samples_learnt, 1.0) : 1.0);
+        if (searches && difference > max(height, weak) && i >= HALF) {
             weak = difference;
             weak_at = i;
             weak_segment = segment;
-            weak_level = polarity * (has_statistics ? noise_mean : dot(older, QUARTER)) + 0.5 * deviation;
+            weak_level = polarity * (has_statistics ? noise_mean : older_mean()) + 0.5 * deviation;
         }
     }
     return noise_bar;
@@ -120,8 +175,9 @@ bool step_detector(float difference, float noise_bar, inout int i) {
         if (ready && difference > max(rough_threshold, noise_bar)) {
             limit = i + RING;
             // If the ring did not fire one sample earlier, the edge is in its newer half; in a new ring it may be anywhere.
-            int back = filled > RING ? RING / 2 * ROUGH + RING : RING * ROUGH;
+            int back = filled > RING ? HALF * ROUGH + RING : RING * ROUGH;
             i = max(i - back, segment);
+            fine_from = i;
             state = SEARCH_FINE;
             stride = 1;
             filled = 0;
@@ -130,17 +186,19 @@ bool step_detector(float difference, float noise_bar, inout int i) {
     } else if (state == SEARCH_FINE) {
         float bar = max(threshold, noise_bar);
         // A crossing. An edge that was already above the bar before the region began is none.
-        if (ready && i >= RING / 2 && difference > bar && (filled == RING || after_speck || previous <= bar)) {
+        if (ready && i >= HALF && difference > bar && (filled == RING || after_speck || previous <= bar)) {
             state = FOLLOW;
             fired = i;
             best = difference;
             best_at = i;
             before = filled > RING ? previous : difference;
-            top = dot(newer, QUARTER);
+            top = newer_mean();
             first_echo = top;
-            found = PEAK == 0;
+            found = PLACE == 0;
             lasts = true;
-            if (PEAK == 0 && surfaces_passed + 1 == NUMBER && !(DETECTOR == 2 || second_look)) return false;
+            followed = confirmed = false;
+            fallen_at = float(NEVER);
+            if (PLACE == 0 && surfaces_passed + 1 == NUMBER && !(DETECTOR == 2 || second_look)) return false;
         } else if (second_look && i >= limit) {
             return false;
         } else if (ROUGH > 1 && i >= limit) {
@@ -150,6 +208,7 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             filled = 0;
             i = limit - (RING - 2) * ROUGH;
             segment = i;
+            fine_from = i;
             return true;
         }
         after_speck = false;
@@ -159,11 +218,29 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             found = true;
         }
         // Half a ring after the edge at least half of the echo must remain, otherwise it is a speck.
-        if (DETECTOR == 2 && i == best_at + RING / 2) lasts = polarity * (dot(newer, QUARTER) - top) + 0.5 * best > 0.0;
-        if (i >= fired + RING && (DETECTOR < 2 || second_look || i >= best_at + RING / 2)) {
+        if (DETECTOR == 2 && i == best_at + HALF) lasts = polarity * (newer_mean() - top) + 0.5 * best > 0.0;
+        // The mean echo behind a rejected edge must exceed its level.
+        if (i == fired + RING) confirmed = polarity * (newer_mean() + older_mean()) > 2.0 * weak_level;
+        // Higher edges behind this one are others: its own difference does not fall far before it peaks.
+        if (!followed) {
+            float level = FOLLOW_LEVEL * best;
+            // In the second look a dip in front of the known peak is one of the noise.
+            bool falls = difference < level && (!second_look || i >= weak_at);
+            followed = falls || i >= (second_look ? max(fired + FOLLOW_LENGTH, weak_at + 2) : fired + FOLLOW_LENGTH);
+            if (falls) fallen_at = float(i) - (level - difference) / max(previous - difference, level - difference);
+            if (!followed && difference > best) {
+                best = difference;
+                best_at = i;
+                before = previous;
+                top = newer_mean();
+                lasts = true;
+                if (PLACE > 0) found = false;
+            }
+        }
+        bool is_last = DETECTOR < 2 && !second_look && surfaces_passed + 1 == NUMBER;
+        if (followed && (is_last || i >= fired + RING) && (DETECTOR < 2 || second_look || i >= best_at + HALF)) {
             if (second_look) {
-                // The mean echo behind a rejected edge must exceed its level.
-                found = found && polarity * dot(newer + older, QUARTER) > 2.0 * weak_level;
+                found = found && confirmed;
                 ++surfaces_passed;
                 return false;
             }
@@ -190,14 +267,6 @@ bool step_detector(float difference, float noise_bar, inout int i) {
             weak = 0.0;
             return true;
         }
-        if (difference > best && i < fired + RING) {
-            best = difference;
-            best_at = i;
-            before = previous;
-            top = dot(newer, QUARTER);
-            lasts = true;
-            if (PEAK == 1) found = false;
-        }
     }
     previous = difference;
     i += stride;
@@ -211,6 +280,7 @@ bool look_again(inout int i) {
     found = false;
     i = max(weak_at - RING * ROUGH, weak_segment);
     segment = i;
+    fine_from = i;
     state = SEARCH_FINE;
     stride = 1;
     filled = 0;
@@ -218,12 +288,15 @@ bool look_again(inout int i) {
     return true;
 }
 
-// Position of the surface found, in samples.
-float surface_place() {
-    if (PEAK == 0) return float(fired);
-    // The edge is in the middle of the ring where the difference is largest; a parabola through the neighbours refines it.
+// Position of the surface found, in samples. `risen_at`: where D rises above FOLLOW_LEVEL of the peak, or NEVER.
+float surface_place(float risen_at) {
+    if (PLACE == 0) return float(fired);
+    // The edge is in the middle of the ring where the difference is largest.
+    const float middle_of_ring = 0.5 * float(RING - 1);
+    if (PLACE == 2 && max(risen_at, fallen_at) < float(NEVER)) return 0.5 * (risen_at + fallen_at) - middle_of_ring;
+    // A parabola through the neighbours refines it.
     float curvature = before - 2.0 * best + after;
     // Two equal differences put it in the middle between them, whichever rounding made larger.
     float shift = curvature < 0.0 ? clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
-    return float(best_at) + shift - 0.5 * float(RING - 1);
+    return float(best_at) + shift - middle_of_ring;
 }

@@ -12,6 +12,7 @@ layout(scalar) uniform Params {
     float polarity; // +1 bright tissue in dark fluid, -1 a dark cavity
     float noise;    // an edge must exceed this many standard deviations of the noise
     float quiet_level;  // samples that do not exceed this cannot fire the detector
+    float behind_step;  // distance of the samples behind the surface, mm
 };
 #include "ray.glsl"
 #include "sliding.glsl"
@@ -25,6 +26,20 @@ const int MAX_SEARCH_SAMPLES = 64;
 
 vec3 place_of(Ray ray, int i) { return ray.origin + ray.direction * (ray.enter + offset_of(ray, float(i) + SAMPLE_AT)); }
 
+// Where D rises above FOLLOW_LEVEL of the peak for the last time before it, samples; NEVER if the ring is not full that early.
+float risen_at(Ray ray, inout Slices slices) {
+    float level = FOLLOW_LEVEL * best, at = float(NEVER), last = 0.0;
+    filled = 0;
+    for (int i = max(fine_from, fired - 2 * RING); i <= best_at; ++i) {
+        vec3 texel;
+        locate(place_of(ray, i), texel);
+        float difference = push_sample(sample_along(ray, i, SAMPLE_AT, texel, slices));
+        if (filled > RING && last <= level && difference > level) at = float(i) - (difference - level) / (difference - last);
+        last = difference;
+    }
+    return at;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
@@ -32,11 +47,11 @@ void main() {
     int count = ray.leave > ray.enter ? int(steps_to(ray, ray.leave - ray.enter)) : 0;
     // The region limits where surfaces may be, not which samples the detector uses: its ring is filled in front of the region,
     // and an edge that begins inside may peak behind it. Samples behind the camera are not used.
-    int first = max(-RING / 2 * ROUGH, int(ceil(steps_to(ray, -ray.enter) - 0.5)));
-    int end = count > 0 ? count + RING / 2 * ROUGH + RING : first;
+    int first = max(-HALF * ROUGH, int(ceil(steps_to(ray, -ray.enter) - 0.5)));
+    int end = count > 0 ? count + HALF * ROUGH + RING : first;
 
     Slices slices = no_slices();
-    segment = first;
+    segment = fine_from = first;
     bool goes_on = true;
     for (int i = first; goes_on && (i < end || look_again(i));) {
         if (SKIP == 1) {
@@ -48,12 +63,10 @@ void main() {
                 here = segment_at(ray, i, SAMPLE_AT);
             }
             if (here.kind == HOMOGENEOUS && DETECTOR == 0 && state == START && !second_look && filled >= RING) {
-                vec4 most = max(older, newer);
-                bool is_quiet = max(max(most.x, most.y), max(most.z, most.w)) <= quiet_level;
                 // Refill the ring with the last samples of the segment, so that it holds what it would hold without skipping.
                 int stop = min(here.stop, end);
                 int steps = (stop - i + stride - 1) / stride, left = stop == end ? 0 : RING;
-                if (is_quiet && steps > left) {
+                if (is_quiet() && steps > left) {
                     i += (steps - left) * stride;
                     filled = 0;
                 }
@@ -101,13 +114,13 @@ void main() {
     float distance = MISS;
     float behind = 0.0;
     if (found && surfaces_passed + 1 >= NUMBER) {
-        float at = offset_of(ray, surface_place() + SAMPLE_AT);
+        float at = offset_of(ray, surface_place(PLACE == 2 ? risen_at(ray, slices) : 0.0) + SAMPLE_AT);
         found = at >= 0.0 && at <= ray.leave - ray.enter;
         if (found) {
             distance = ray.enter + at;
             for (int i = 1; i <= BEHIND; ++i) {
                 vec3 texel;
-                if (locate(ray.origin + ray.direction * (distance + float(i) * step_length), texel)) behind += sample_volume(texel);
+                if (locate(ray.origin + ray.direction * (distance + float(i) * behind_step), texel)) behind += sample_volume(texel);
             }
             behind /= float(max(BEHIND, 1));
         }
@@ -115,5 +128,5 @@ void main() {
         found = false;
     }
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
-    imageStore(surface, pixel, vec4(found ? (PEAK == 1 ? top : first_echo) : 0.0, found ? 1.0 : 0.0, behind, 0.0));
+    imageStore(surface, pixel, vec4(found ? (PLACE > 0 ? top : first_echo) : 0.0, found ? 1.0 : 0.0, behind, 0.0));
 }

@@ -1,6 +1,6 @@
 //! The dials of a scene: settings that trade error for time, each with the values to measure and the settings of its reference.
 
-use crate::scene::{Mode, Sampling, Scene, Scheme, VolumeFormat};
+use crate::scene::{Edge, Mode, Sampling, Scene, Scheme, VolumeFormat};
 
 /// One setting of a dial.
 #[derive(Clone, Debug)]
@@ -69,10 +69,23 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             need(marches, "casts no ray")?;
             // From an eighth to four times the step; the reference is four times finer than the finest.
             let places = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
-            let others =
-                places.map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step));
+            // Steps with the same samples of the surface detector give the same picture.
+            let ring_half = |f: f64| match (s.mode, s.surface.edge) {
+                (Mode::Surface, None | Some(Edge::Length(_))) => scene.ring.half_at(f * step),
+                _ => 0,
+            };
+            let mut halves = vec![ring_half(1.0)];
+            let places = places.into_iter().filter(|f| {
+                let half = ring_half(*f);
+                let is_new = half == 0 || !halves.contains(&half);
+                halves.push(half);
+                is_new
+            });
+            let others: Vec<_> = places
+                .map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step))
+                .collect();
             let fine = |f: f64| [format!("ray.step={}", step * f)];
-            made("step", "mm", is(format!("{step:.3} mm"), step), others.into(), &fine(1.0 / 32.0), &fine(1.0 / 16.0))
+            made("step", "mm", is(format!("{step:.3} mm"), step), others, &fine(1.0 / 32.0), &fine(1.0 / 16.0))
         }
         "compositing" => {
             need(composites, "composites nothing")?;

@@ -129,7 +129,7 @@ impl Scene {
 
     /// Reach of the sliding filter around a sample, mm: its taps along the ray, and the same distance to both sides.
     fn tap_reach(&self) -> f64 {
-        reach(self, self.settings.ray.sliding / 2) * 3f64.sqrt()
+        reach(self, self.step.max(self.ring.step), self.settings.ray.sliding / 2) * 3f64.sqrt()
     }
 
     /// The values, apart from the geometry, that determine the brick tables. Equal keys give equal tables.

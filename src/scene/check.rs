@@ -2,8 +2,8 @@
 
 use super::planes::{MAX_SLAB, MAX_TILES};
 use super::{
-    Clip, Conditioning, Distance, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_DEVIATION, MAX_PICTURE, MAX_WINDOW,
-    Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma, refuse, transfer,
+    Clip, Conditioning, Distance, Edge, EnhancedSigma, Layout, Light, MAX_CLIPS, MAX_DEVIATION, MAX_PICTURE,
+    MAX_WINDOW, Mode, Noise, PeronaMalik, Scene, SceneError, Scheme, Settings, Sigma, refuse, transfer,
 };
 use crate::probe::Geometry;
 use glam::DVec3;
@@ -109,6 +109,9 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     let f = &settings.surface;
     within("surface.threshold", f.threshold, 1e-6, 1.0)?;
     within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
+    if let Some(Edge::Length(edge)) = f.edge {
+        within("surface.edge", edge, 1e-3, 1e3)?;
+    }
     within("surface.noise", f.noise, 0.0, 10.0)?;
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;

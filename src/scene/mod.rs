@@ -25,8 +25,6 @@ use region::{depth_offset, framed_low, is_still, slice_grid, visible_box};
 
 /// Maximum width and height of a picture, pixels.
 pub const MAX_PICTURE: u32 = 16384;
-/// Length of the surface detector's ring, samples (n of thesis 4-3).
-pub const RING: u32 = 8;
 /// Maximum standard deviation of a Gaussian, pixels: 193 taps.
 pub const MAX_DEVIATION: f64 = 32.0;
 /// Maximum window of a filter, pixels.
@@ -70,6 +68,48 @@ pub struct View {
     pub low: DVec3,
 }
 
+/// The samples that the surface detector compares at a place: a ring of two halves, each as long as an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ring {
+    /// Distance between two samples of the ring, mm.
+    pub step: f64,
+    /// Samples of a half, 4..=256.
+    pub half: u32,
+    /// The largest difference is among this many samples from the crossing of the threshold on.
+    pub follow: u32,
+}
+
+impl Ring {
+    pub(crate) fn new(edge: Edge, step: f64, threshold: f64) -> Ring {
+        let (step, half) = match edge {
+            Edge::Named(EdgeName::Samples) => (step, 4),
+            Edge::Length(length) => {
+                let half = Ring::half_of(length, step);
+                (length / f64::from(half), half)
+            }
+        };
+        // An edge with the shape of an error function and a height A peaks at most 0.242 A/threshold halves behind its crossing.
+        let follow = f64::from(half) * (0.25 / threshold).clamp(1.0, 16.0);
+        // One more, as the crossing lies up to a step in front of the sample that exceeds the threshold.
+        Ring { step, half, follow: follow.ceil() as u32 + 1 }
+    }
+
+    fn half_of(length: f64, step: f64) -> u32 {
+        // The slack is that of rounding: 1.6 mm are four steps of 0.4 mm.
+        (length / step - 1e-9).ceil().clamp(4.0, 256.0) as u32
+    }
+
+    /// Samples of a half for rays with another step, mm, and the same edge.
+    pub fn half_at(self, step: f64) -> u32 {
+        Ring::half_of(self.step * f64::from(self.half), step)
+    }
+
+    /// Number of samples (n of thesis 4-3).
+    pub fn samples(self) -> u32 {
+        2 * self.half
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub geometry: Geometry,
@@ -82,6 +122,8 @@ pub struct Scene {
     pub rays: Rays,
     /// Step along a ray, mm.
     pub step: f64,
+    /// Samples of the surface detector, whose step divides the length of an edge.
+    pub ring: Ring,
     /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
     pub sampling: Sampling,
     /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
@@ -139,12 +181,21 @@ impl Scene {
         let (low, high) = visible_box(&geometry, &settings)?;
         let framed = framed_low(&geometry, &settings, low, high)?;
         let rays = camera::rays(&settings, framed, high, depth_offset(&geometry), is_still(&geometry));
-        let step = settings.ray.step.unwrap_or(grid.pitch[0].min(grid.pitch[1]));
+        let pixel = grid.pitch[0].min(grid.pitch[1]);
+        let step = settings.ray.step.unwrap_or(pixel);
+        let ring =
+            Ring::new(settings.surface.edge.unwrap_or(Edge::Length(4.0 * pixel)), step, settings.surface.threshold);
         let longest = (high - low).length();
         if longest / step > 65536.0 {
             return refuse(
                 "ray.step",
                 format!("{step} mm makes {:.0} samples on a ray, at most 65536", longest / step),
+            );
+        }
+        if longest / ring.step > 65536.0 && matches!(settings.mode, Mode::Surface | Mode::Mixed) {
+            return refuse(
+                "surface.edge",
+                format!("4 steps of {} mm make {:.0} samples on a ray, at most 65536", ring.step, longest / ring.step),
             );
         }
         let sampling = settings.ray.sampling;
@@ -158,6 +209,7 @@ impl Scene {
             high,
             rays,
             step,
+            ring,
             sampling,
             apron: 0.0,
             distance,
@@ -338,9 +390,14 @@ impl Scene {
     /// Number of samples behind the surface whose mean echo skin shading needs; 0 for none.
     pub fn samples_behind(&self) -> u32 {
         match self.settings.light.skin {
-            Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.step).ceil() as u32).min(256),
+            Some(skin) if skin.translucency > 0.0 => ((skin.depth / self.ring.step).ceil() as u32).clamp(1, 256),
             _ => 0,
         }
+    }
+
+    /// Distance between these samples, mm: together they span the skin's depth.
+    pub fn step_behind(&self) -> f64 {
+        self.settings.light.skin.map_or(0.0, |skin| skin.depth) / f64::from(self.samples_behind().max(1))
     }
 
     /// Skin shading, if it has an effect: wrap or translucency is above 0.

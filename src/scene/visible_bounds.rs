@@ -1,7 +1,7 @@
 //! Visible bounds: the texels of the volume that any sample of stage 2 may touch. Stage 1 computes only these (after Solteszova and
 //! others 2017, who filter only what a picture shows). They do not depend on the camera, which may move at any time.
 
-use super::{Layout, Mode, RING, Scene, SliceGrid};
+use super::{Layout, Mode, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
@@ -89,8 +89,12 @@ pub(super) fn seen(scene: &Scene) -> VisibleBounds {
 
 fn looks(scene: &Scene) -> Vec<Look> {
     let clips: Vec<(DVec3, f64)> = scene.clips().collect();
-    let look =
-        |low, planes: &[_], steps| Look { low, high: scene.high, planes: planes.to_vec(), reach: reach(scene, steps) };
+    let look = |low, planes: &[_], steps| Look {
+        low,
+        high: scene.high,
+        planes: planes.to_vec(),
+        reach: reach(scene, scene.step, steps),
+    };
     // The sliding filter reaches along and across the ray, beyond the last step that starts within the region.
     let sliding = match scene.settings.ray.sliding {
         0 => 0,
@@ -98,9 +102,10 @@ fn looks(scene: &Scene) -> Vec<Look> {
     };
     let mut looks = Vec::new();
     if scene.detects_surface() {
-        let ring = RING / 2 * scene.settings.surface.rough + RING;
-        let mut look = look(scene.surface_view().low, &clips, ring + sliding);
-        look.reach += f64::from(scene.samples_behind()) * scene.step;
+        let ring = scene.ring.half * scene.settings.surface.rough + scene.ring.samples();
+        let mut look = look(scene.surface_view().low, &clips, 0);
+        look.reach = reach(scene, scene.ring.step, ring + sliding);
+        look.reach += f64::from(scene.samples_behind()) * scene.step_behind();
         looks.push(look);
     }
     if scene.composites() {
@@ -120,17 +125,17 @@ fn looks(scene: &Scene) -> Vec<Look> {
     looks
 }
 
-/// Maximum length of `steps` steps of a ray, mm. Growing steps keep growing outside the region.
-pub(super) fn reach(scene: &Scene, steps: u32) -> f64 {
+/// Maximum length of `steps` steps of a ray that are `step` mm long, mm. Growing steps keep growing outside the region.
+pub(super) fn reach(scene: &Scene, step: f64, steps: u32) -> f64 {
     let steps = f64::from(steps);
     let (mut widest, mut growth) = (1.0, 0.0);
     if let Some(probe) = scene.probe().filter(|_| scene.spreads()) {
         // The same rule as in the ray casters: proportional to the range, starting here.
         let (spread, from) = (scene.settings.ray.spread, probe.first_range().max(probe.last_range() / 8.0).max(1e-6));
         widest = 1.0 + spread * 7.0;
-        growth = scene.step * spread / from;
+        growth = step * spread / from;
     }
-    (scene.step * widest * steps * ((steps + 1.0) * growth).exp()).min(1e7)
+    (step * widest * steps * ((steps + 1.0) * growth).exp()).min(1e7)
 }
 
 /// An interval that grows to contain the values added to it.

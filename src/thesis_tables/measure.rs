@@ -7,7 +7,7 @@ use crate::gpu::{self, Context, GpuError, Renderer};
 use crate::machine;
 use crate::passes::{PassTime, Slot, Stage, by_name, is_hit};
 use crate::probe::{Advance, Array, Axis, Indices, Motion, Probe};
-use crate::scene::{Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth};
+use crate::scene::{Edge, EdgeName, Input, Mode, Place, Scene, SceneError, Settings, Sigma, SliceGrid, Smooth};
 use crate::source::{Frame, Geometry, StoredType};
 use crate::thesis_tables::{
     Conditions, DEPTH, FAN_ANGLE, Filter3d, Reached, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Table, tables,
@@ -142,6 +142,7 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     settings.region.elevation = Some([-HALF_REGION, HALF_REGION]);
     settings.region.depth = Some([0.0, DEPTH]);
     settings.ray.step = Some(DEPTH / f64::from(n));
+    settings.surface.edge = Some(Edge::Named(EdgeName::Samples));
     // The thesis takes every sample.
     settings.ray.brick = 0;
     settings.surface.rough = 1;

@@ -236,7 +236,7 @@ pub const ALL_FILTERS: &str = "
     picture = { size = [37, 29] }
     camera = { azimuth = 20, elevation = -35, roll = 10, field_of_view = 30 }
     ray = { step = 0.5, sampling = 'exact' }
-    surface = { threshold = 0.12 }
+    surface = { threshold = 0.12, edge = 2 }
 ";
 
 fn moved(mut probe: Probe, share: f64) -> Probe {
@@ -273,6 +273,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
         let toml = "slices = { pixels = 33 }
             picture = { size = [19, 33] }
             camera = { azimuth = -30, elevation = 25 }
+            surface.edge = 1.8
             ray = { step = 0.45, sampling = 'exact' }";
         add(name, geometry, BYTES, toml);
     }
@@ -325,6 +326,18 @@ fn ray_scenes() -> Vec<SceneSpec> {
         (
             "dark cavity, roughest",
             "surface = { sign = 'dark', rough = 8, rough_threshold = 0.05 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "long ring, middle of the edge",
+            "surface = { edge = 12, threshold = 0.03, place = 'middle', rough = 1 }\nslices = { pixels = 60 }",
+        ),
+        (
+            "long ring, lasting, third surface",
+            "surface = { edge = 6, detector = 'lasting', number = 3, threshold = 0.02 }\nslices = { pixels = 60 }",
+        ),
+        (
+            "long ring, adaptive",
+            "surface = { edge = 8, detector = 'adaptive', threshold = 0.02 }\nslices = { pixels = 60 }",
         ),
         ("parallel to a face", "camera = { elevation = 90 }\nslices = { pixels = 30 }"),
         ("inside the volume", "camera = { field_of_view = 90, zoom = 20 }\nslices = { pixels = 30 }"),

@@ -167,7 +167,8 @@ fn fine() -> Probe {
 /// A sphere through scan conversion, sweep map and detector.
 fn sphere(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let (mut findings, centre, radius) = (Findings::default(), DVec3::new(1.5, 50.0, -2.0), 9.0);
-    let toml = "mode = 'sr'\npicture = { size = [64, 64] }\nray = { step = 0.2 }\nsurface = { threshold = 0.2 }
+    let toml =
+        "mode = 'sr'\npicture = { size = [64, 64] }\nray = { step = 0.2 }\nsurface = { threshold = 0.2, edge = 0.8 }
                 camera = { zoom = 3.0, target = [1.5, 30.0, -2.0], elevation = 10, field_of_view = 20 }";
     let scene = scene(Geometry::Sweep(fine()), FLOATS, toml).map_err(GpuError::Broken)?;
     let frames = body_frames(&scene, |p| ((radius - p.distance(centre)) / 0.6 + 0.5).clamp(0.0, 1.0));
@@ -188,7 +189,7 @@ fn sphere(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
 fn plate(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let toml =
-        "mode = 'sr'\npicture = { size = [24, 24] }\nray = { step = 0.1 }\nsurface = { threshold = 0.2, rough = 1 }
+        "mode = 'sr'\npicture = { size = [24, 24] }\nray = { step = 0.1 }\nsurface = { threshold = 0.2, rough = 1, edge = 0.4 }
                 camera = { field_of_view = 0 }";
     let scene = made(block(0.25, [60, 120, 60]), toml)?;
     // Along the depth, which the rays follow: 0.25 mm a voxel.
@@ -308,7 +309,8 @@ fn contrast(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         for (height, is_surface) in [(1.01, true), (0.99, false)] {
             let toml = format!(
                 "mode = 'sr'\npicture = {{ size = [9, 9] }}\nslices.format = 'r32f'\nray = {{ step = {STEP}, sampling = 'exact' }}\n\
-                 surface = {{ threshold = {threshold}, place = '{place}', rough = 1 }}\ncamera = {{ field_of_view = 0 }}"
+                 surface = {{ threshold = {threshold}, place = '{place}', rough = 1, edge = {} }}\ncamera = {{ field_of_view = 0 }}",
+                4.0 * STEP
             );
             let scene = scene(block(VOXEL, [40, 80, 40]), FLOATS, &toml).map_err(GpuError::Broken)?;
             // Samples before the last dark voxel. There must be no sample between it and the first bright one.

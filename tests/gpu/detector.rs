@@ -13,8 +13,10 @@ pub fn columns(size: [usize; 3], depth_spacing: f64, surface: &str) -> Scene {
     let geometry = Geometry::Cartesian(Grid { size, spacing: [1.0, depth_spacing, 1.0], origin: [0.0; 3] });
     let toml = format!(
         "mode = 'sr'\npicture = {{ size = [{}, {}] }}\nray = {{ step = {STEP}, sampling = 'exact' }}\n\
-         slices = {{ format = 'r32f' }}\n[surface]\n{surface}",
-        size[0], size[2]
+         slices = {{ format = 'r32f' }}\n[surface]\nedge = {}\n{surface}",
+        size[0],
+        size[2],
+        4.0 * STEP
     );
     scene(geometry, FLOATS, &toml)
 }
@@ -132,7 +134,8 @@ fn a_sphere_is_within_a_tenth_of_a_step_from_any_side() {
         let toml = format!(
             "mode = 'sr'\npicture = {{ size = [72, 72] }}\nray = {{ step = {STEP}, sampling = 'exact' }}\n\
              slices = {{ format = 'r32f' }}\ncamera = {{ {camera} }}\n\
-             surface = {{ threshold = 0.1, sign = '{sign}', rough = {rough} }}"
+             surface = {{ threshold = 0.1, sign = '{sign}', rough = {rough}, edge = {} }}",
+            4.0 * STEP
         );
         let scene = scene(geometry.clone(), FLOATS, &toml);
         let frames = body_frames(&scene, |p| {

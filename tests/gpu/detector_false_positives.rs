@@ -51,8 +51,8 @@ fn noise_spreads_a_wall_within_the_measured_bounds() {
     let device = Device::new();
     // Threshold, rough; then for noise of 0, 0.05, 0.1 and 0.2 of the wall: spread in steps, share of wrong places.
     let measured = [
-        (0.1, 1, [(0.0, 0.0), (0.089, 0.0), (0.296, 0.311), (0.911, 0.981)]),
-        (0.1, 2, [(0.0, 0.0), (0.089, 0.0), (0.298, 0.071), (0.895, 0.806)]),
+        (0.1, 1, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.330), (0.515, 0.986)]),
+        (0.1, 2, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.099), (0.525, 0.870)]),
         (0.3, 1, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.382, 0.019)]),
         (0.3, 2, [(0.0, 0.0), (0.089, 0.0), (0.181, 0.0), (0.383, 0.0005)]),
     ];
@@ -237,7 +237,8 @@ fn the_adaptive_detector_has_fewer_false_positives_and_no_more_misses() {
             }
             let right = |f: &Found| 1.0 - f.early - f.missed;
             assert!(right(&adaptive) >= right(&plain), "{what}");
-            if right(&plain) > 0.02 {
+            // The few walls that the plain detector does find are those that the noise displaces least.
+            if right(&plain) > 0.1 {
                 assert!(adaptive.steps <= 1.05 * plain.steps + 0.001, "placed worse, {what}");
             }
             // Without specks the lasting detector equals the adaptive one.
@@ -300,12 +301,14 @@ fn every_detector_matches_its_reference_in_noise() {
             let detector = pick(&["adaptive", "lasting"], 1);
             let rough = pick(&["1", "2", "3", "8"], 2);
             let sign = pick(&["bright", "dark"], 8);
-            let place = pick(&["peak", "first-crossing", "peak"], 16);
+            let place = pick(&["peak", "first-crossing", "middle"], 16);
+            // Rings of 8, of 8 and of 22 samples.
+            let edge = [4.0, 4.0, 11.0][n / 6 % 3] * STEP;
             let number = pick(&["1", "2"], 3);
             let toml = format!(
                 "mode = 'sr'\npicture = {{ size = [40, 24] }}\nray = {{ step = {STEP}, sampling = 'exact' }}\n\
                  slices = {{ pixels = 96, format = 'r32f' }}\ncamera = {{ azimuth = 20 }}\n[surface]\n\
-                 detector = '{detector}'\nrough = {rough}\nsign = '{sign}'\nplace = '{place}'\nnumber = {number}\n\
+                 detector = '{detector}'\nrough = {rough}\nsign = '{sign}'\nplace = '{place}'\nnumber = {number}\nedge = {edge}\n\
                  threshold = 0.06\nnoise = {}",
                 [0.5, 1.5, 2.5][n % 3]
             );

@@ -50,7 +50,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-const MODES: [&str; 22] = [
+const MODES: [&str; 24] = [
     "mode = 'sr'\nsurface = { threshold = 0.2 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 1 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 4, rough_threshold = 0.1, number = 2 }",
@@ -58,6 +58,8 @@ const MODES: [&str; 22] = [
     "mode = 'sr'\nsurface = { threshold = 0.1, place = 'first-crossing', window = [0.1, 0.7] }",
     "mode = 'sr'\nsurface = { detector = 'adaptive', threshold = 0.1 }",
     "mode = 'sr'\nsurface = { detector = 'lasting', threshold = 0.1, rough = 1 }",
+    "mode = 'sr'\nsurface = { threshold = 0.2, edge = 5, place = 'middle' }",
+    "mode = 'sr'\nsurface = { detector = 'lasting', threshold = 0.1, edge = 7 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, start_depth = 8 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]",
     "mode = 'vr'",
     "mode = 'vr'\nvolume = { transfer = 'warm', threshold = 0.3, compositing = 'riemann' }",

@@ -28,7 +28,7 @@ fn goldens() -> Vec<(&'static str, Scene, Vec<Texels>)> {
             "fan-surface",
             Geometry::Sweep(probe.clone()),
             "sr",
-            "surface = { threshold = 0.15 }\ncamera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 3.2, target = [1.0, 32.0, 0.0] }",
+            "surface = { threshold = 0.15, edge = 2 }\ncamera = { azimuth = 15, elevation = 10, field_of_view = 25, zoom = 3.2, target = [1.0, 32.0, 0.0] }",
         ),
         (
             "fan-volume",
@@ -40,7 +40,7 @@ fn goldens() -> Vec<(&'static str, Scene, Vec<Texels>)> {
             "cartesian-surface",
             cartesian([32, 40, 16]),
             "sr",
-            "surface = { threshold = 0.15 }\ncamera = { azimuth = 15, elevation = 10 }",
+            "surface = { threshold = 0.15, edge = 2 }\ncamera = { azimuth = 15, elevation = 10 }",
         ),
     ] {
         let scene = scene(geometry, FLOATS, &format!("mode = '{mode}'\n{all}\n{more}"));

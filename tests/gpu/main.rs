@@ -9,6 +9,7 @@ mod conditioning;
 mod console;
 mod cube;
 mod detector;
+mod detector_convergence;
 mod detector_false_positives;
 mod diffusion;
 mod empty_space;

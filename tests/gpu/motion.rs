@@ -170,7 +170,7 @@ fn a_ball_swept_both_ways_does_not_move() {
     };
     let toml =
         "mode = 'sr'\npicture = { size = [48, 48] }\nslices = { pixels = 300 }\ncamera = { zoom = 2.0, elevation = 30 }
-                ray = { step = 0.3 }\nsurface = { threshold = 0.1 }";
+                ray = { step = 0.3 }\nsurface = { threshold = 0.1, edge = 1.2 }";
     let surface = |advance: f64, told: f64| -> (Scene, Texels) {
         let acquired = scene(Geometry::Sweep(probe(advance)), FLOATS, toml);
         let frames = body_frames(&acquired, |p| ((12.0 - p.distance(ball)) / 8.0 + 0.5).clamp(0.0, 1.0));
@@ -227,7 +227,7 @@ fn the_phantom_does_not_move_between_forward_and_backward_sweeps() {
     let Truth::Sphere { centre, radius, .. } = phantom.truth() else { panic!("a sphere") };
     let depth = centre.y - phantom.probe(0).array_radius();
     let toml = format!(
-        "mode = 'sr'\npicture = {{ size = [64, 64] }}\nray = {{ step = 0.25 }}\nsurface = {{ threshold = 0.1 }}\n\
+        "mode = 'sr'\npicture = {{ size = [64, 64] }}\nray = {{ step = 0.25 }}\nsurface = {{ threshold = 0.1, edge = 1 }}\n\
          slices = {{ pixels = 400, smooth = {{ lateral = 0.6, depth = 0.6, elevation = 0.6 }} }}\n\
          region = {{ lateral = [{}, {}], depth = [{}, {}], elevation = [{}, {}] }}\ncamera = {{ elevation = 25 }}",
         centre.x - 0.8 * radius,

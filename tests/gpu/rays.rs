@@ -56,7 +56,7 @@ fn sphere_scene(ray: &str) -> Scene {
     probe.slices = Axis::centred(0.8 / 60.0, 61);
     (probe.sample_pitch, probe.samples) = (0.2, 256);
     let toml = format!(
-        "mode = 'sr'\npicture = {{ size = [48, 48] }}\nray = {{ step = 0.2, {ray} }}\nsurface = {{ threshold = 0.2 }}
+        "mode = 'sr'\npicture = {{ size = [48, 48] }}\nray = {{ step = 0.2, {ray} }}\nsurface = {{ threshold = 0.2, edge = 0.8 }}
          camera = {{ zoom = 3.0, target = [1.5, 30.0, -2.0], elevation = 10, field_of_view = 20 }}"
     );
     scene(Geometry::Sweep(probe), FLOATS, &toml)

@@ -52,7 +52,7 @@ fn ripple(device: &Device, slices: &str) -> f64 {
     probe.sample_pitch = 0.4;
     probe.samples = 160;
     let toml = format!(
-        "mode = 'sr'\npicture = {{ size = [96, 96] }}\nray = {{ step = 0.2 }}\nsurface = {{ threshold = 0.2 }}\n\
+        "mode = 'sr'\npicture = {{ size = [96, 96] }}\nray = {{ step = 0.2 }}\nsurface = {{ threshold = 0.2, edge = 0.8 }}\n\
          camera = {{ zoom = 4.0, target = [0, 30, 0] }}\nslices = {{ pixels = 160, {slices} }}"
     );
     let scene = scene(Geometry::Sweep(probe), FLOATS, &toml);

@@ -21,7 +21,7 @@ fn surfaces_are_where_the_reference_has_them_on_every_ray() {
     for sliding in [3, 5] {
         for rough in [1, 2] {
             let toml = format!(
-                "mode = 'sr'\nsurface = {{ threshold = 0.2, rough = {rough} }}\npicture = {{ size = [64, 64] }}
+                "mode = 'sr'\nsurface = {{ threshold = 0.2, rough = {rough}, edge = 1.6 }}\npicture = {{ size = [64, 64] }}
                  slices = {{ pixels = 128 }}\ncamera = {{ azimuth = 25, elevation = -15, field_of_view = 35, zoom = 3 }}
                  ray = {{ sampling = 'exact', step = 0.4, sliding = {sliding}, brick = 0 }}"
             );

@@ -19,7 +19,7 @@ const SETTINGS: &str = "
     picture = { size = [512, 512] }
     slices = { smooth = { lateral = 1.2, depth = 0.63, elevation = 0.7 } }
     region = { lateral = [-26, 34], depth = [17, 60], elevation = [-28, 22] }
-    surface = { window = [0.61, 1.0], threshold = 0.08, rough = 2 }
+    surface = { window = [0.61, 1.0], threshold = 0.08, rough = 2, edge = 1.6 }
     ray = { step = 0.4 }
     distance = { median = 11, bilateral = { pixels = 8, distance = 2 } }
 ";

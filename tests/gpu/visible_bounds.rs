@@ -7,7 +7,7 @@ use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{DispatchArgs, Slot, Texels, by_name};
 use echolume::plan::Rerun;
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::{Mode, RING, Scene, VisibleBounds};
+use echolume::scene::{Mode, Scene, VisibleBounds};
 use glam::DVec3;
 
 fn moved(probe: Probe) -> Probe {
@@ -106,10 +106,11 @@ fn sampled(scene: &Scene, noise: &mut Noise) -> Option<DVec3> {
         return None;
     }
     let marches = !matches!(scene.settings.mode, Mode::Plane | Mode::Cube);
-    let ring = if sr { RING / 2 * scene.settings.surface.rough + RING } else { 0 };
+    let ring = if sr { scene.ring.half * scene.settings.surface.rough + scene.ring.samples() } else { 0 };
     let steps = if marches { ring + scene.settings.ray.sliding / 2 } else { 0 };
     let away = DVec3::from_array(std::array::from_fn(|_| noise.range(-1.0, 1.0))).normalize_or_zero();
-    Some(place + away * (f64::from(steps) * scene.step * within(noise, 0.0, 1.0)))
+    let step = if sr { scene.ring.step } else { scene.step };
+    Some(place + away * (f64::from(steps) * step * within(noise, 0.0, 1.0)))
 }
 
 #[test]
@@ -250,7 +251,8 @@ fn the_picture_equals_that_of_the_completely_filtered_volume() {
     assert!(smallest < 0.1, "{smallest}: the windows hide too little");
 }
 
-const WINDOW: &str = "mode = 'sr'\npicture.size = [24, 24]\nray.step = 0.1\ncamera = { target = [0, 25, 0] }";
+const WINDOW: &str =
+    "mode = 'sr'\npicture.size = [24, 24]\nray.step = 0.1\nsurface.edge = 0.4\ncamera = { target = [0, 25, 0] }";
 
 fn with(window: &str, slices: &str) -> Scene {
     scene(Geometry::Sweep(wobbler()), BYTES, &format!("{WINDOW}\nslices = {{ pixels = 200{slices} }}\n{window}"))

@@ -10,7 +10,8 @@ use echolume::scene::{Input, Sampling, Scene};
 use echolume::source::StoredType;
 use glam::DVec3;
 
-const LOOK: &str = "picture.size = [72, 56]\ncamera = { azimuth = 25, elevation = -15 }\nray.step = 0.3";
+const LOOK: &str =
+    "picture.size = [72, 56]\ncamera = { azimuth = 25, elevation = -15 }\nray.step = 0.3\nsurface.edge = 1.2";
 
 fn volume(stored: StoredType, full: f64, toml: &str) -> Scene {
     scene(cartesian([24, 33, 11]), Input { stored, range: [0.0, full] }, &format!("{toml}\n{LOOK}"))

@@ -59,6 +59,22 @@ fn errors_fall_with_the_step_down_to_the_devices_floor() {
     assert_eq!(dial.points.iter().filter(|p| p.is_default).count(), 1);
 }
 
+/// Prevents a detector that finds another surface, or none, at a finer step: then the finest step would have the largest error.
+#[test]
+fn errors_of_a_surface_fall_with_the_step_too() {
+    let _alone = alone();
+    let report = report(&["mode=sr", "surface.threshold=0.1"], &["step"], ReferenceChoice::F64);
+    let dial = &report.dials[0];
+    let mut points: Vec<_> = dial.points.iter().map(|p| (p.value, p.errors.rmse)).collect();
+    points.sort_by(|a, b| b.0.total_cmp(&a.0));
+    println!("{points:?}");
+    // The default is the coarsest: a longer step is no other for the detector.
+    assert!(points.len() >= 6 && dial.points.iter().position(|p| p.is_default) == Some(0), "{points:?}");
+    assert!(dial.points.iter().all(|p| p.value <= dial.points[0].value), "{points:?}");
+    // The wall has bumps as narrow as the edge: single rays jump between two surfaces.
+    assert!(points[0].1 < 0.1 && points[0].1 > 5.0 * points[points.len() - 1].1, "{points:?}");
+}
+
 /// Every sampling method against the f64 reference of the same scene.
 #[test]
 fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {

@@ -31,7 +31,7 @@ pub const PASS: Pass = Pass {
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
-        ray::params(s, s.whole_view(s.settings.cube.window))
+        ray::params(s, s.whole_view(s.settings.cube.window), s.step)
             .f32("stride", stride(s))
             .f32("shading", s.settings.cube.shading)
             .f32("edge_strength", EDGE.1)

@@ -85,7 +85,8 @@ fn reads(scene: &Scene) -> Vec<Bind> {
 /// No ray is cast: a camera that moves leaves the planes as they are.
 fn params(scene: &Scene) -> Params {
     let [columns, rows] = scene.tile_grid();
-    let params = ray::params(&unmoved(scene), scene.whole_view(scene.settings.planes.window));
+    let still = unmoved(scene);
+    let params = ray::params(&still, scene.whole_view(scene.settings.planes.window), still.step);
     params.i32("columns", columns).i32("rows", rows)
 }
 

@@ -20,7 +20,7 @@ pub const PASS: Pass = Pass {
     writes: |s, _| vec![whole("picture", rendered(s))],
     extent: ray_extent,
     repeat: once,
-    params: |s, _| ray::params(s, s.projection_view()),
+    params: |s, _| ray::params(s, s.projection_view(), s.step),
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
         constants.push(("KEPT", kept(s)));
@@ -38,7 +38,7 @@ pub const PASS: Pass = Pass {
         let picture = writes.get_mut("picture");
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.projection_view(), x, y);
+                let ray = ray::Ray::cast(scene, volume, scene.projection_view(), scene.step, x, y);
                 let value = projected(scene, &ray);
                 picture.set([x, y, 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
             }

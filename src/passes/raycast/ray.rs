@@ -95,7 +95,7 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
     constants
 }
 
-pub(super) fn params(scene: &Scene, view: View) -> Params {
+pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
     let [window_low, window_high] = view.window;
     let grid = &scene.grid;
     let mut clips = [[0.0; 4]; MAX_CLIPS];
@@ -115,7 +115,7 @@ pub(super) fn params(scene: &Scene, view: View) -> Params {
         .vec4("clip_3", clip_3)
         .vec3("box_low", view.low)
         .vec3("box_high", scene.high)
-        .f32("step_length", scene.step)
+        .f32("step_length", step)
         .f32("window_low", window_low)
         .f32("window_scale", 1.0 / (window_high - window_low))
         .vec2("grid_origin", grid.origin)
@@ -163,6 +163,8 @@ fn sector(params: Params, [range_low, range_high, line_low, line_high]: [f64; 4]
 pub(super) struct Ray<'a> {
     scene: &'a Scene,
     volume: &'a Texels,
+    /// mm, at the place where steps are shortest if they grow.
+    step: f64,
     window: [f64; 2],
     origin: DVec3,
     direction: DVec3,
@@ -177,7 +179,7 @@ pub(super) struct Ray<'a> {
 }
 
 impl<'a> Ray<'a> {
-    pub fn cast(scene: &'a Scene, volume: &'a Texels, view: View, x: usize, y: usize) -> Ray<'a> {
+    pub fn cast(scene: &'a Scene, volume: &'a Texels, view: View, step: f64, x: usize, y: usize) -> Ray<'a> {
         let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
         let (enter, leave) = span(scene, view, origin, direction);
         let sideways = scene.rays.origin_dx + scene.rays.direction_dx;
@@ -190,7 +192,7 @@ impl<'a> Ray<'a> {
             false => (1.0, 0.0),
         };
         let across = [across, across.cross(direction)];
-        Ray { scene, volume, window: view.window, origin, direction, across, enter, leave, wider, widening }
+        Ray { scene, volume, step, window: view.window, origin, direction, across, enter, leave, wider, widening }
     }
 
     pub fn path(&self) -> f64 {
@@ -199,9 +201,9 @@ impl<'a> Ray<'a> {
 
     /// mm behind the entry after n steps: dt/dn = step (wider + widening t).
     pub fn offset(&self, n: f64) -> f64 {
-        let rate = self.scene.step * self.widening;
+        let rate = self.step * self.widening;
         match rate == 0.0 {
-            true => self.scene.step * self.wider * n,
+            true => self.step * self.wider * n,
             false => self.wider / self.widening * (rate * n).exp_m1(),
         }
     }
@@ -214,8 +216,8 @@ impl<'a> Ray<'a> {
     /// Steps to an offset.
     pub fn steps_to(&self, offset: f64) -> f64 {
         match self.widening == 0.0 {
-            true => offset / (self.scene.step * self.wider),
-            false => (self.widening / self.wider * offset).max(-0.999_999).ln_1p() / (self.scene.step * self.widening),
+            true => offset / (self.step * self.wider),
+            false => (self.widening / self.wider * offset).max(-0.999_999).ln_1p() / (self.step * self.widening),
         }
     }
 

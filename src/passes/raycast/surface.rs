@@ -4,7 +4,7 @@ use super::detector::{detect, polarity};
 use super::ray;
 use crate::passes::empty_space;
 use crate::passes::pass::*;
-use crate::scene::{Detector, Place, RING, Scene};
+use crate::scene::{Detector, Place, Scene};
 
 pub const PASS: Pass = Pass {
     name: "raycast_surface",
@@ -19,12 +19,13 @@ pub const PASS: Pass = Pass {
     repeat: once,
     params: |s, _| {
         let surface = &s.settings.surface;
-        ray::params(s, s.surface_view())
+        ray::params(s, s.surface_view(), s.ring.step)
             .f32("threshold", surface.threshold)
             .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
             .f32("polarity", polarity(s))
             .f32("noise", surface.noise)
             .f32("quiet_level", empty_space::quiet_level(s))
+            .f32("behind_step", s.step_behind())
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::surface_skipping(s));
@@ -34,7 +35,14 @@ pub const PASS: Pass = Pass {
             Detector::Lasting => 2,
         };
         constants.push(("ROUGH", s.settings.surface.rough as i32));
-        constants.push(("PEAK", (s.settings.surface.place == Place::Peak) as i32));
+        let place = match s.settings.surface.place {
+            Place::FirstCrossing => 0,
+            Place::Peak => 1,
+            Place::Middle => 2,
+        };
+        constants.push(("PLACE", place));
+        constants.push(("HALF", s.ring.half as i32));
+        constants.push(("FOLLOW_LENGTH", s.ring.follow as i32));
         constants.push(("NUMBER", s.settings.surface.number as i32));
         constants.push(("DETECTOR", detector));
         constants.push(("BEHIND", s.samples_behind() as i32));
@@ -52,12 +60,12 @@ pub const PASS: Pass = Pass {
         let size = writes.get("distance_map").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.surface_view(), x, y);
+                let ray = ray::Ray::cast(scene, volume, scene.surface_view(), scene.ring.step, x, y);
                 let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
                 // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
-                let half = i64::from(RING / 2 * scene.settings.surface.rough);
+                let half = i64::from(scene.ring.half * scene.settings.surface.rough);
                 let first = (-half).max((ray.steps_to(-ray.enter) - 0.5).ceil() as i64);
-                let end = if count > 0 { count + half + i64::from(RING) } else { first };
+                let end = if count > 0 { count + half + i64::from(scene.ring.samples()) } else { first };
                 let samples: Vec<Option<f64>> =
                     (first..end).map(|i| i as f64 + 0.5).map(|n| ray.sample(ray.offset(n), n)).collect();
                 let within = |place: f64| (0.0..=ray.path()).contains(&ray.offset(place + 0.5));
@@ -77,9 +85,9 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// Mean echo over the samples that the skin look wants, one step after the other behind the surface.
+/// Mean echo over the depth behind the surface that skin shading needs.
 fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {
     let count = scene.samples_behind();
-    let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step)).sum();
+    let sum: f64 = (1..=count).filter_map(|i| ray.echo(distance + f64::from(i) * scene.step_behind())).sum();
     sum / f64::from(count.max(1))
 }

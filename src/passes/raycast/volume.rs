@@ -37,7 +37,7 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let volume = &s.settings.volume;
         let (axis, near) = depth_axis(s);
-        ray::params(s, s.volume_view())
+        ray::params(s, s.volume_view(), s.step)
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
             .f32("hit_opacity", volume.hit)
@@ -72,7 +72,7 @@ pub const PASS: Pass = Pass {
         let size = writes.get("picture").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), x, y);
+                let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), scene.step, x, y);
                 if kind(scene) == Kind::Layer {
                     ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
                 }

@@ -223,6 +223,10 @@ pub struct Surface {
     pub detector: Detector,
     /// Adaptive and lasting detector: an edge counts at once if it exceeds this many standard deviations of the noise before it, 0..=10.
     pub noise: f64,
+    /// Length of an edge, mm: the difference is the mean echo over this length behind a place minus the mean echo over this length in front
+    /// of it, at any step of the rays. The detector takes at least 4 and at most 256 samples of this length. `samples`: 4 steps of the
+    /// rays, as in the thesis, so that the step decides which edges are found. Absent: 4 slice pixels.
+    pub edge: Option<Edge>,
     /// Detection threshold on the difference of the means of the newer and the older half of the ring of samples.
     pub threshold: f64,
     /// Threshold of the rough detector. Absent: that of the fine one.
@@ -244,6 +248,7 @@ impl Default for Surface {
             start_depth: None,
             detector: Detector::Threshold,
             noise: 2.5,
+            edge: None,
             threshold: 0.1,
             rough_threshold: None,
             rough: 2,
@@ -252,6 +257,23 @@ impl Default for Surface {
             number: 1,
         }
     }
+}
+
+/// Length of an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(untagged, expecting = "must be a length in mm, or \"samples\"")]
+pub enum Edge {
+    /// In mm.
+    Length(f64),
+    Named(EdgeName),
+}
+
+/// The named lengths of an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EdgeName {
+    /// Four steps of the rays (thesis).
+    Samples,
 }
 
 /// Detection rule of a surface.
@@ -284,9 +306,12 @@ pub enum Sign {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
-    /// The maximum of the difference within a ring's length, refined by a parabola. Independent of the edge's height.
+    /// The maximum of the difference, refined by a parabola. Independent of the edge's height. The difference is followed until it falls
+    /// below 0.7 of its maximum, over at most the edge's length times 1 or, if that is more, a quarter divided by the threshold.
     #[default]
     Peak,
+    /// The middle between the two places where the difference is 0.7 of its maximum: more accurate for low edges in samples of 8 bits.
+    Middle,
     /// The point where the difference first exceeds the threshold (thesis).
     FirstCrossing,
 }
