@@ -341,9 +341,9 @@ mod tests {
         let mut redactor = Redactor::new();
         redactor.add_recording(Path::new("/data/anna.mha"));
         for part in ["anna ", "/data/a: ", "a.mha ", "://a@", "'"] {
-            assert!(redactor.redact(&part.repeat(1 << 20)).len() < 100);
-            let redacted_text = redactor.redact(&(part.repeat(2000) + "\n").repeat(20));
-            assert_eq!((redacted_text.lines().count(), redacted_text.contains("anna")), (20, false));
+            assert!(redactor.redact(&part.repeat(1 << 17)).len() < 100);
+            let redacted_text = redactor.redact(&(part.repeat(2000) + "\n").repeat(4));
+            assert_eq!((redacted_text.lines().count(), redacted_text.contains("anna")), (4, false));
         }
     }
 

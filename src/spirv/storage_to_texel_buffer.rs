@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_malformed_module_is_an_error() {
-        let intact = words(embedded("raycast/volume.non_uniform").unwrap());
+        let intact = words(embedded("raycast/projection.non_uniform").unwrap());
         for cut in 1..intact.len() {
             let _ = storage_to_texel_buffer(&intact[..cut], |_| true);
         }
