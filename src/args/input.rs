@@ -167,10 +167,7 @@ impl SceneArgs {
             layers.file(file).map_err(input)?;
         }
         for assignment in chosen {
-            // A setting that is absent cannot be switched off.
-            if !assignment.ends_with("=none") || layers.has(assignment) {
-                layers.set_by(&format!("--budget, {assignment}"), assignment).map_err(input)?;
-            }
+            layers.set_by(&format!("--budget, {assignment}"), assignment).map_err(input)?;
         }
         for (flag, assignment) in self.assignments()? {
             layers.set_by(&flag, &assignment).map_err(input)?;

@@ -1,4 +1,5 @@
-//! Chooses settings from a report: the cheapest within an error bound, or the most accurate within a time bound, over all dials.
+//! Chooses settings from a report: the cheapest within an error bound, or the most accurate within a time bound, over all dials that
+//! trade error for time. A dial of another look is never turned.
 //!
 //! A report varies one dial at a time. The effect of several changes is predicted: squared errors add (as those of independent
 //! errors do), and each change multiplies the time by its own factor. Verify a choice by measuring it.
@@ -133,8 +134,8 @@ fn combinations(report: &Report, measure: Measure) -> Result<(Vec<Combination>, 
     if !report.dials.iter().flat_map(|d| &d.points).any(|p| p.time.is_some()) {
         return Err(format!("{}: no time was measured, this device has no time stamps", report.device));
     }
-    let (usable, unusable): (Vec<_>, Vec<_>) =
-        (0..report.dials.len()).partition(|d| default(&report.dials[*d]).is_some());
+    let of_errors = (0..report.dials.len()).filter(|d| !report.dials[*d].is_look());
+    let (usable, unusable): (Vec<_>, Vec<_>) = of_errors.partition(|d| default(&report.dials[*d]).is_some());
     let left_out = unusable.iter().map(|d| report.dials[*d].name.clone()).collect();
     // The default picture was timed once for each dial.
     let mut times: Vec<f64> = usable.iter().filter_map(|d| Some(default(&report.dials[*d])?.0.median)).collect();

@@ -1,6 +1,8 @@
-//! The dials of a scene: settings that trade error for time, each with the values to measure and the settings of its reference.
+//! The dials of a scene: settings with the values to measure. Most trade error for time: their values compute the same picture more or less
+//! accurately, and the dial has the settings of a reference. Others choose another look, such as another filter: their pictures differ from
+//! the scene as it is, and none of them is the right one.
 
-use crate::scene::{Edge, Mode, Sampling, Scene, Scheme, VolumeFormat};
+use crate::scene::{Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, VolumeFormat};
 
 /// One setting of a dial.
 #[derive(Clone, Debug)]
@@ -13,14 +15,16 @@ pub struct Place {
     pub value: f64,
 }
 
-/// A setting that trades error for time.
+/// A setting that trades error for time, or chooses a look.
 #[derive(Clone, Debug)]
 pub struct Dial {
     pub name: &'static str,
     pub unit: &'static str,
     /// The settings to measure. The first is the scene itself.
     pub places: Vec<Place>,
-    /// Assignments that give the reference.
+    /// True if the settings differ in look: what is measured is then no error, but the difference from the scene as it is.
+    pub is_look: bool,
+    /// Assignments that give the reference. Empty for a look.
     pub best: Vec<String>,
     /// Assignments of the next coarser setting. Its difference from the reference estimates the error of the reference if the device
     /// renders it.
@@ -59,8 +63,13 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         name,
         unit,
         places: std::iter::once(default).chain(others).collect(),
+        is_look: false,
         best: best.to_vec(),
         nearly: nearly.to_vec(),
+    };
+    let look = |name, unit, others: Vec<Place>| {
+        let as_it_is = Place { label: "as it is".into(), set: Vec::new(), value: 0.0 };
+        Dial { is_look: true, ..made(name, unit, as_it_is, others, &[], &[]) }
     };
     let is = |label: String, value: f64| Place { label, set: Vec::new(), value };
     let at = |label: String, set: &[String], value: f64| Place { label, set: set.to_vec(), value };
@@ -123,7 +132,6 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "filter3d" => {
             need(marches, "casts no ray")?;
-            // The reference is the separable filter in stage 1: it and the sliding filter along the ray should agree.
             let ahead = |n: u32| ["slices.smooth=none".to_string(), format!("slices.smooth={{kernel={n}}}")];
             let sliding = |n: u32| ["slices.smooth=none".to_string(), format!("ray.sliding={n}")];
             let others = vec![
@@ -133,7 +141,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 at("sliding 3".into(), &sliding(3), 3.0),
                 at("sliding 5".into(), &sliding(5), 5.0),
             ];
-            made("filter3d", "samples", is("as it is".into(), 0.0), others, &ahead(3), &ahead(3))
+            look("filter3d", "samples", others)
         }
         "termination" => {
             need(composites, "composites nothing")?;
@@ -180,25 +188,39 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
                 grown(5, 19),
                 grown(7, 19),
             ];
-            let best =
-                ["slices.sigma=none".to_string(), "slices.enhanced_sigma={window=9,largest=21,sigma=0.1}".into()];
-            let nearly =
-                ["slices.sigma=none".to_string(), "slices.enhanced_sigma={window=7,largest=19,sigma=0.1}".into()];
-            made("sigma", "pixels", is("as it is".into(), 0.0), others, &best, &nearly)
+            look("sigma", "pixels", others)
         }
         "perona-malik" => {
-            // The same diffusion time, T = 2, in different numbers of steps.
+            // The same equation and diffusion time in different numbers of steps: those of the scene, or T = 2 if it has no diffusion. That is
+            // another look then.
+            let now = s.slices.perona_malik;
+            let p = now.unwrap_or(PeronaMalik { edge: 0.1, step: 0.25, repeat: 8, ..PeronaMalik::default() });
+            let time = p.step * f64::from(p.repeat);
             let diffused = |scheme: Scheme, n: u32| {
-                let (word, step) = (serde_word(&scheme), 2.0 / f64::from(n));
-                vec![format!("slices.perona_malik={{scheme='{word}',edge=0.1,step={step},repeat={n}}}")]
+                let (scheme, conductance, step) =
+                    (serde_word(&scheme), serde_word(&p.conductance), time / f64::from(n));
+                let edge = p.edge;
+                vec![format!(
+                    "slices.perona_malik={{scheme='{scheme}',edge={edge:?},conductance='{conductance}',step={step:?},repeat={n}}}"
+                )]
             };
             let place = |scheme: Scheme, n: u32| {
-                at(format!("{} {n}", serde_word(&scheme)), &diffused(scheme, n), 2.0 / f64::from(n))
+                at(format!("{} {n}", serde_word(&scheme)), &diffused(scheme, n), time / f64::from(n))
             };
-            let mut others: Vec<Place> = [8, 10, 20, 40].into_iter().map(|n| place(Scheme::Explicit, n)).collect();
+            // The explicit scheme is stable up to steps of 1/4.
+            let least = (4.0 * time).ceil().clamp(1.0, 100.0) as u32;
+            let others = [1.0, 1.25, 2.5, 5.0].map(|f| place(Scheme::Explicit, (f64::from(least) * f).ceil() as u32));
+            let mut others = Vec::from(others);
             others.extend([1, 2, 4, 8, 16].into_iter().map(|n| place(Scheme::Aos, n)));
-            let (best, nearly) = (diffused(Scheme::Explicit, 80), diffused(Scheme::Explicit, 40));
-            made("perona-malik", "step", is("as it is".into(), 0.0), others, &best, &nearly)
+            match now {
+                None => look("perona-malik", "step", others),
+                Some(_) => {
+                    let label = format!("{} {}", serde_word(&p.scheme), p.repeat);
+                    others.retain(|other| other.label != label);
+                    let fine = |f: u32| diffused(Scheme::Explicit, least * f);
+                    made("perona-malik", "step", is(label, p.step), others, &fine(10), &fine(5))
+                }
+            }
         }
         "adaptive" => {
             need(marches, "casts no ray")?;

@@ -29,6 +29,7 @@ pub fn csv(report: &Report) -> String {
             row.extend([ms(|t| t.median), ms(|t| t.low), ms(|t| t.high), front.contains(&(d, p)).to_string()]);
             row.extend(match &dial.reference {
                 Reference::F64 => ["f64".into(), String::new()],
+                Reference::AsItIs => ["the scene as it is: another look, no error".into(), String::new()],
                 Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
             });
             row.extend([&report.device, &report.driver, &report.date].map(String::clone));
@@ -60,13 +61,14 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
     );
     for dial in &report.dials {
         let held = match &dial.reference {
-            Reference::F64 => "the f64 reference".to_string(),
+            Reference::F64 => "against the f64 reference".to_string(),
+            Reference::AsItIs => "difference from the scene as it is; another look is no error".to_string(),
             Reference::Converged { set, rmse } => {
-                format!("the device's own at {}, itself off by about {rmse:.1e}", set.join(" "))
+                format!("against the device's own at {}, itself off by about {rmse:.1e}", set.join(" "))
             }
         };
         let unit = if dial.unit.is_empty() { String::new() } else { format!(", {}", dial.unit) };
-        let _ = writeln!(text, "\n{}{unit}: against {held}", dial.name);
+        let _ = writeln!(text, "\n{}{unit}: {held}", dial.name);
         let _ = writeln!(
             text,
             "  {:<16} {:>10} {:>10} {:>7} {:>8} {:>9} {:>9}   {:>9} {:>19} {:>6}",

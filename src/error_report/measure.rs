@@ -94,6 +94,7 @@ impl ErrorMeasurement<'_> {
             ReferenceChoice::Auto => cost(&best) <= MAX_F64_SAMPLES,
         };
         let (expected, reference) = match exact {
+            _ if dial.is_look => (self.rendered(&best, 0)?, Reference::AsItIs),
             true => (self.in_f64(&best), Reference::F64),
             false => {
                 let rendering = self.rendered(&best, 0)?;
@@ -128,13 +129,7 @@ impl ErrorMeasurement<'_> {
         let fault = |fault: String| MeasureError::Place { dial: dial.name, set: set.join(" "), fault };
         let layered = || -> Result<_, LoadError> {
             let mut layers = self.layers.clone();
-            // `none` is refused for a setting that is already off.
-            set.iter()
-                .filter(|s| !s.ends_with("=none") || layers.has(s))
-                .cloned()
-                .collect::<Vec<_>>()
-                .iter()
-                .try_for_each(|assignment| layers.set(assignment))?;
+            set.iter().try_for_each(|assignment| layers.set(assignment))?;
             layers.finish()
         };
         let settings = layered().map_err(|e| fault(e.to_string()))?;

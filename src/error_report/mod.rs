@@ -68,6 +68,8 @@ pub struct Dial {
 pub enum Reference {
     /// The four stages in f64 on the CPU.
     F64,
+    /// The device's picture of the scene as it is: the settings differ in look, and what is measured is no error.
+    AsItIs,
     /// A picture by the device itself, converged as far as possible.
     Converged {
         /// The assignments that give it.
@@ -176,6 +178,13 @@ impl Measure {
     }
 }
 
+impl Dial {
+    /// True if its settings differ in look, so that its differences are no errors.
+    pub fn is_look(&self) -> bool {
+        self.reference == Reference::AsItIs
+    }
+}
+
 impl Report {
     /// The report as JSON.
     ///
@@ -213,7 +222,7 @@ impl Report {
     fn check(&self) -> Result<(), String> {
         for dial in &self.dials {
             let reference_rmse = match &dial.reference {
-                Reference::F64 => 0.0,
+                Reference::F64 | Reference::AsItIs => 0.0,
                 Reference::Converged { rmse, .. } => *rmse,
             };
             if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
@@ -240,11 +249,11 @@ impl Report {
     }
 
     /// The Pareto front over all dials: indices of dial and point, from the fastest to the most accurate. Points without a time or
-    /// without this error are not on it.
+    /// without this error are not on it, nor are those of another look.
     pub fn pareto_front(&self, measure: Measure) -> Vec<(usize, usize)> {
         let mut indices = Vec::new();
         let mut pairs = Vec::new();
-        for (d, dial) in self.dials.iter().enumerate() {
+        for (d, dial) in self.dials.iter().enumerate().filter(|(_, dial)| !dial.is_look()) {
             for (p, point) in dial.points.iter().enumerate() {
                 if let (Some(time), Some(error)) = (point.time, measure.of(&point.errors)) {
                     indices.push((d, p));

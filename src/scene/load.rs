@@ -60,21 +60,6 @@ impl Layers {
         self.set_by(&format!("--set {assignment}"), assignment)
     }
 
-    /// True if an earlier layer sets the key of this assignment.
-    pub fn has(&self, assignment: &str) -> bool {
-        let path = assignment.split_once('=').map_or(assignment, |(path, _)| path);
-        let mut at = Some(&self.0);
-        let mut keys = path.trim().split('.').peekable();
-        while let Some(key) = keys.next() {
-            match (at.and_then(|t| t.get(key)), keys.peek()) {
-                (Some(_), None) => return true,
-                (Some(Value::Table(inner)), _) => at = Some(inner),
-                _ => return false,
-            }
-        }
-        false
-    }
-
     /// Like [`Layers::set`], for a flag that stands for a setting. Messages name the flag as it was typed.
     pub fn set_by(&mut self, flag: &str, assignment: &str) -> Result<(), LoadError> {
         let fault = |fault: &str| LoadError::Layer { layer: flag.into(), fault: fault.into() };
@@ -119,7 +104,7 @@ impl Layers {
                 volume.insert("transfer".into(), points);
             }
         }
-        merge(&mut self.0, table);
+        merge(&mut self.0, table, &mut Vec::new());
         self.settings().map(drop).map_err(|e| LoadError::Layer { layer: layer.into(), fault: one_line(&e, "") })
     }
 
@@ -156,15 +141,31 @@ fn points(path: &Path) -> Result<Value, LoadError> {
     Value::try_from(listed.points).map_err(|e| fault(&e))
 }
 
-/// Merges `over` into `table`. The word `none` in place of a table removes it.
-fn merge(under: &mut Table, over: Table) {
+/// Merges `over` into `under`, which is at `path` in the scene. The word `none` in place of a table removes it, or says that there is none.
+fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
     for (key, value) in over {
+        path.push(key.clone());
         match (under.get_mut(&key), value) {
-            (Some(Value::Table(_)), Value::String(word)) if word == "none" => drop(under.remove(&key)),
-            (Some(Value::Table(under)), Value::Table(over)) => merge(under, over),
+            (_, Value::String(word)) if word == "none" && is_table(path) => drop(under.remove(&key)),
+            (Some(Value::Table(under)), Value::Table(over)) => merge(under, over, path),
+            // So that a `none` within the table is seen.
+            (None, Value::Table(over)) => {
+                let mut inner = Table::new();
+                merge(&mut inner, over, path);
+                under.insert(key, Value::Table(inner));
+            }
             (_, value) => drop(under.insert(key, value)),
         }
+        path.pop();
     }
+}
+
+/// True if a scene has a table at this path, as `light.shadow`.
+fn is_table(path: &[String]) -> bool {
+    let nested =
+        path.iter().rev().fold(Table::new(), |inner, key| Table::from_iter([(key.clone(), Value::Table(inner))]));
+    // One with fields that must be given is a table too.
+    Settings::deserialize(nested).map_or_else(|e| e.message().starts_with("missing field"), |_| true)
 }
 
 fn one_line(error: &toml::de::Error, text: &str) -> String {
@@ -235,5 +236,36 @@ mod tests {
         assert!(Layers::default().set("nonsense").is_err());
         assert!(Layers::default().set("mode=sideways").is_err());
         assert!(Layers::default().preset("nothing").unwrap_err().to_string().contains("bone"));
+    }
+
+    /// Prevents a pasted assignment that works only over a preset which happens to set the same table.
+    #[test]
+    fn none_switches_off_what_an_earlier_layer_set_and_what_none_did() {
+        for path in [
+            "slices.smooth",
+            "slices.sigma",
+            "slices.enhanced_sigma",
+            "slices.perona_malik",
+            "distance.bilateral",
+            "post.sigma",
+            "light.shadow",
+            "light.occlusion",
+            "light.skin",
+        ] {
+            let mut layers = Layers::default();
+            layers.set(&format!("{path}=none")).expect(path);
+            let fields = if path == "distance.bilateral" { "{pixels=2,distance=3}" } else { "{}" };
+            layers.set(&format!("{path}={fields}")).expect(path);
+            assert_ne!(layers.settings().expect("settings"), Settings::default(), "{path} has an effect");
+            layers.set(&format!("{path}=none")).expect(path);
+            layers.set(&format!("{path}=none")).expect(path);
+            assert_eq!(layers.finish().expect("settings"), Settings::default(), "{path}");
+        }
+        // A word of its own, numbers, and keys that do not exist.
+        let mut layers = Layers::default();
+        layers.set("volume.shading=none").expect("a word");
+        for wrong in ["slices.smoooth=none", "camera.zoom=none", "light.shadow.softness=none", "none=none"] {
+            assert!(layers.set(wrong).is_err(), "{wrong}");
+        }
     }
 }

@@ -75,6 +75,22 @@ fn errors_of_a_surface_fall_with_the_step_too() {
     assert!(points[0].1 < 0.1 && points[0].1 > 5.0 * points[points.len() - 1].1, "{points:?}");
 }
 
+/// Prevents a filter that nobody asked for as the reference of the others: then the scene's own filter has the largest "error".
+#[test]
+fn filters_differ_from_the_scene_as_it_is() {
+    let _alone = alone();
+    let report =
+        report(&["slices.sigma={window=5,sigma=0.1}"], &["sigma", "filter3d", "perona-malik"], ReferenceChoice::Auto);
+    for dial in &report.dials {
+        assert_eq!(dial.reference, Reference::AsItIs, "{}", dial.name);
+        let (own, others): (Vec<_>, Vec<_>) = dial.points.iter().partition(|p| p.is_default);
+        assert!(own.len() == 1 && own[0].errors.rmse == 0.0, "{own:?}");
+        // One of them may be the scene's own filter.
+        assert!(others.iter().filter(|p| p.errors.rmse > 1e-4).count() + 1 >= others.len(), "{others:?}");
+    }
+    assert!(report.pareto_front(Measure::Rmse).is_empty());
+}
+
 /// Every sampling method against the f64 reference of the same scene.
 #[test]
 fn the_device_samples_as_f64_does_by_its_filter_by_eight_texels_and_by_quads() {

@@ -229,6 +229,30 @@ fn dials_of_one_setting_are_not_combined() {
     assert!((best.error - 0.04f64.hypot(0.01)).abs() < 1e-12, "{best:?}");
 }
 
+/// Prevents an advice that replaces a filter which somebody chose, because another one looks less like the reference or is faster.
+#[test]
+fn another_look_is_no_error_and_is_never_chosen() {
+    let mut looks = small();
+    let mut other = dial(
+        "sigma",
+        "pixels",
+        0,
+        vec![point("as it is", &[], 0.0, 0.0, 10.0), point("none", &["slices.sigma=none"], 1.0, 0.001, 0.001)],
+    );
+    other.reference = Reference::AsItIs;
+    looks.dials.push(other);
+    for (choice, without) in [
+        (cheapest_under(&looks, Measure::Rmse, 0.5, 0.0), cheapest_under(&small(), Measure::Rmse, 0.5, 0.0)),
+        (most_accurate_under(&looks, Measure::Rmse, 1e9, 0.0), most_accurate_under(&small(), Measure::Rmse, 1e9, 0.0)),
+    ] {
+        assert_eq!(choice, without);
+    }
+    assert_eq!(looks.pareto_front(Measure::Rmse), small().pareto_front(Measure::Rmse));
+    let said = export::summary_table(&looks, Measure::Rmse);
+    assert!(said.contains("sigma, pixels: difference from the scene as it is; another look is no error"), "{said}");
+    assert_eq!(Report::from_json(&looks.to_json().expect("finite")).expect("its own"), looks);
+}
+
 #[test]
 fn a_gain_within_the_spread_is_none_and_a_dial_without_default_is_left_out() {
     let noisy = vec![point("on", &[], 1.0, 0.01, 10.0), point("off", &["x=0"], 0.0, 0.02, 9.9)];

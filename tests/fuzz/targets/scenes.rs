@@ -58,7 +58,6 @@ pub fn assignments(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
     let (mut layers, mut outcome) = (Layers::default(), String::new());
     for line in text.lines().take(32) {
-        layers.has(line);
         let mut next = layers.clone();
         // The command line ends at the first wrong one; here the others are tried as well.
         match next.set(line) {
