@@ -83,7 +83,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     let apart = if settings.ray.half { 2.0 } else { 1.0 };
     if camera.field_of_view > 0.0 {
         let spread = 2.0 * (camera.field_of_view.to_radians() / 2.0).tan() / height;
-        let distance = pixel / spread + if camera.zoom >= 1.0 { along(forward) } else { 0.0 };
+        // The picture fits the near side of the box at zoom 1. As the zoom grows the camera comes nearer to that side, and never into the box.
+        let distance = pixel / spread + along(forward);
         Rays {
             origin: target - forward * distance,
             origin_dx: DVec3::ZERO,
@@ -148,6 +149,33 @@ mod tests {
             let target = DVec3::new(5.0, 30.0, -3.0);
             assert!((target - origin).cross(direction).length() < 1e-9);
             assert!((target - origin).dot(direction) > 0.0);
+        }
+    }
+
+    /// Prevents a camera that jumps where the zoom passes 1.
+    #[test]
+    fn the_size_of_the_target_grows_with_the_zoom_without_a_jump() {
+        for field_of_view in [0.0, 30.0, 120.0] {
+            let pixels_per_mm = |zoom: f64| {
+                let rays = view(|s| (s.camera.zoom, s.camera.field_of_view) = (zoom, field_of_view));
+                let target = DVec3::new(0.0, 35.0, 0.0);
+                let at = |x: f64| {
+                    let (origin, direction) = rays.at(x, 50.0);
+                    origin + direction * ((target - origin).dot(rays.forward) / direction.dot(rays.forward))
+                };
+                1.0 / (at(100.5) - at(99.5)).length()
+            };
+            let mut before = pixels_per_mm(0.2);
+            for n in 1..=1600 {
+                let here = pixels_per_mm(0.2 + f64::from(n) * 0.001);
+                let ratio = here / before;
+                assert!(
+                    (1.0..1.006).contains(&ratio),
+                    "{field_of_view} deg, zoom {}: {ratio}",
+                    0.2 + f64::from(n) * 0.001
+                );
+                before = here;
+            }
         }
     }
 

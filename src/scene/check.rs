@@ -230,16 +230,17 @@ pub(super) fn within(field: &'static str, value: f64, low: f64, high: f64) -> Re
     }
 }
 
-fn check_window(field: &'static str, window: u32) -> Result<(), SceneError> {
+/// `key`: the name of the window in that table, as the user wrote it.
+fn check_window(field: &'static str, key: &str, window: u32) -> Result<(), SceneError> {
     match window % 2 == 1 && (3..=MAX_WINDOW).contains(&window) {
         true => Ok(()),
-        false => refuse(field, format!("window is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
+        false => refuse(field, format!("{key} is {window}, must be odd and lie in 3..={MAX_WINDOW}")),
     }
 }
 
 fn check_sigma(field: &'static str, sigma: Option<Sigma>) -> Result<(), SceneError> {
     let Some(sigma) = sigma else { return Ok(()) };
-    check_window(field, sigma.window)?;
+    check_window(field, "window", sigma.window)?;
     // Infinity is allowed: the filter is then the box mean.
     match sigma.sigma >= 0.0 {
         true => Ok(()),
@@ -251,7 +252,7 @@ const NO_GROWTH: &str = "growth is counted on slices only: leave it out";
 
 fn check_distance(d: &Distance) -> Result<(), SceneError> {
     if d.median > 0 {
-        check_window("distance.median", d.median)?;
+        check_window("distance.median", "window", d.median)?;
     }
     if let Some(b) = d.bilateral {
         within("distance.bilateral.pixels", b.pixels, 0.1, 10.0)?;
@@ -286,7 +287,7 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
 fn check_enhanced(field: &'static str, enhanced: Option<EnhancedSigma>) -> Result<(), SceneError> {
     let Some(e) = enhanced else { return Ok(()) };
     check_sigma(field, Some(Sigma { window: e.window, sigma: e.sigma, noise: e.noise }))?;
-    check_window(field, e.largest)?;
+    check_window(field, "largest", e.largest)?;
     check_edge(field, e.edge)?;
     match e.largest < e.window {
         true => refuse(field, format!("largest is {}, less than window {}", e.largest, e.window)),
