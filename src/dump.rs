@@ -1,9 +1,12 @@
-//! Draws the contents of a slot as a picture, to inspect the stages.
+//! The contents of slots for inspection: as pictures, and as arrays with their units and axes for other programs.
 
-use crate::passes::slots::Initializer;
-use crate::passes::{Slot, Texels, is_hit};
+use crate::passes::slots::{Format, Initializer, Shape};
+use crate::passes::{MISS, Slot, Texels, is_hit};
 use crate::picture::Picture;
+use crate::probe::Geometry;
 use crate::scene::Scene;
+use glam::DVec3;
+use serde_json::{Value, json};
 
 /// Width and height of a drawn table, pixels.
 const GRAPH: [usize; 2] = [512, 256];
@@ -17,14 +20,7 @@ pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
             sheet(texels, &distances(texels))
         }
         (Some(texels), _) => sheet(texels, &stretched(texels)),
-        (None, Initializer::ByScene(make)) => {
-            let channels = match slot {
-                Slot::Transfer | Slot::Tiles | Slot::Block => 4,
-                Slot::SliceTable => 2,
-                _ => 1,
-            };
-            curves(&make(scene), channels)
-        }
+        (None, Initializer::ByScene(make)) => curves(&make(scene), channels(slot).len()),
         (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
     }
 }
@@ -91,4 +87,183 @@ fn curves(values: &[f32], channels: usize) -> Picture {
         }
     }
     Picture { width: width as u32, height: height as u32, rgba }
+}
+
+/// Names of the channels of a slot.
+fn channels(slot: Slot) -> &'static [&'static str] {
+    match slot {
+        Slot::ScanLut => &["sample", "line"],
+        Slot::TileRanges | Slot::BrickRanges => &["smallest", "largest"],
+        Slot::BrickTable => &["tiles_low", "tiles_high", "slices", "side"],
+        Slot::SliceTable => &["position", "advance"],
+        Slot::Transfer | Slot::PreIntegrated => &["red", "green", "blue", "absorption"],
+        Slot::Tiles | Slot::Block => &["x", "y", "z", "w"],
+        Slot::Surface => &["echo", "found", "echo_behind", "unused"],
+        Slot::PackedNeighbours => &["bits", "more_bits"],
+        Slot::VolumeLayer
+        | Slot::Rendered
+        | Slot::Planes
+        | Slot::Picture
+        | Slot::SmoothPicture
+        | Slot::SmoothPictureB
+        | Slot::PictureForward
+        | Slot::PictureRows
+        | Slot::Screen => &["red", "green", "blue", "alpha"],
+        _ => &["value"],
+    }
+}
+
+/// The unit of the values of a slot.
+fn unit(slot: Slot) -> &'static str {
+    match slot {
+        Slot::Distance | Slot::DistanceA | Slot::DistanceB => "mm along the ray of the pixel, from the ray's origin",
+        Slot::Frames | Slot::Conditioned => "share of the range of the recording's samples, 0..1",
+        Slot::SliceA
+        | Slot::SliceB
+        | Slot::SliceForward
+        | Slot::SliceRows
+        | Slot::SharpVolume
+        | Slot::Volume
+        | Slot::TileRanges
+        | Slot::BrickRanges => "share of the range of the recording's samples, 0..1, before the grey window",
+        Slot::Tgc => "factor of a sample",
+        Slot::ScanLut => "index from 0; -1 outside the sector",
+        Slot::Growth => "rings of pixels",
+        Slot::PackedNeighbours => "bits of a texel and of its neighbours one column on, one row on, and both",
+        Slot::BrickKinds
+        | Slot::BrickDistancesX
+        | Slot::BrickDistancesXy
+        | Slot::SurfaceBrickDistances
+        | Slot::VolumeBrickDistances => "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous",
+        Slot::BrickTable => "packed indices of tiles; side: 0 outside the sector, 1 across its border, 2 inside",
+        Slot::OpaqueBefore => "entries of the transfer function",
+        Slot::SweepLut | Slot::SliceTable => "slices",
+        Slot::LineLut => "share of the lines of a frame",
+        Slot::Transfer | Slot::PreIntegrated => "colour 0..1; absorption of one slice pixel",
+        Slot::Tiles | Slot::Block => "vectors in mm and pixels, as the shader takes them",
+        Slot::Surface => "echo 0..1 after the grey window; found: 0 or 1",
+        Slot::SliceShares
+        | Slot::PictureShares
+        | Slot::Shadow
+        | Slot::Occlusion
+        | Slot::VolumeLayer
+        | Slot::Rendered
+        | Slot::Planes
+        | Slot::Picture
+        | Slot::SmoothPicture
+        | Slot::SmoothPictureB
+        | Slot::PictureForward
+        | Slot::PictureRows
+        | Slot::Screen => "share, 0..1",
+    }
+}
+
+/// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
+/// [`draw`]. Values are f32 as the shaders read them, f64 where they are bits.
+pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
+    let (shape, values) = match (texels, slot.initializer()) {
+        (Some(t), _) => ([t.size[2], t.size[1], t.size[0], t.channels], t.values.clone()),
+        (None, Initializer::ByScene(make)) => {
+            let values: Vec<f64> = make(scene).into_iter().map(f64::from).collect();
+            let channels = channels(slot).len();
+            ([1, 1, values.len() / channels, channels], values)
+        }
+        (None, _) => ([1, 1, 0, 1], Vec::new()),
+    };
+    let axes = match slot.shape(scene) {
+        Shape::Layers(_) => ["layer", "line or row", "sample or column"],
+        Shape::Three(_) => ["slice", "row", "column"],
+        Shape::Two(_) => ["", "row", "column"],
+        Shape::Buffer(_) => ["", "", "entry"],
+    };
+    // Axes that a shape lacks, and a single channel, are left out.
+    let mut kept: Vec<(&str, usize)> = axes.into_iter().zip(shape).filter(|(axis, _)| !axis.is_empty()).collect();
+    if shape[3] > 1 {
+        kept.push(("channel", shape[3]));
+    }
+    let is_bits = matches!(slot.format(scene), Format::R32u | Format::Rg32u);
+    let bytes = npy(&kept.iter().map(|(_, n)| *n).collect::<Vec<_>>(), &values, is_bits);
+    let mut about = json!({
+        "slot": slot.name(),
+        "axes": kept.iter().map(|(axis, _)| *axis).collect::<Vec<_>>(),
+        "channels": channels(slot).iter().take(shape[3]).collect::<Vec<_>>(),
+        "unit": unit(slot),
+    });
+    if unit(slot).starts_with("mm along") {
+        about["no_surface"] = json!(MISS);
+    }
+    (bytes, about)
+}
+
+/// NPY, format 1.0: a magic number, a Python literal padded to 64 bytes, and the values.
+fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
+    let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let kind = if as_f64 { "<f8" } else { "<f4" };
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());
+    // Magic number, version and length take 10 bytes; the header ends with a line break.
+    let padded = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((padded as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = padded - 1).as_bytes());
+    for value in values {
+        match as_f64 {
+            true => bytes.extend(value.to_le_bytes()),
+            false => bytes.extend((*value as f32).to_le_bytes()),
+        }
+    }
+    bytes
+}
+
+/// What the arrays of a scene refer to, in mm in the space of the volume: x lateral, y depth, z elevation.
+pub fn scene_description(scene: &Scene) -> Value {
+    let at = |v: DVec3| json!([v.x, v.y, v.z]);
+    let rays = &scene.rays;
+    json!({
+        "format": "echolume dump 1",
+        "space": "mm; x lateral, y depth, z elevation; y is 0 at the apex of a curved array and at the face of a linear one",
+        "geometry": match &scene.geometry {
+            Geometry::Sweep(probe) => json!({"sweep": probe}),
+            Geometry::Cartesian(grid) => json!({"cartesian": grid}),
+        },
+        "slice_pixels": {"origin_mm": scene.grid.origin, "pitch_mm": scene.grid.pitch, "columns_rows": scene.grid.size},
+        "box": {"low_mm": at(scene.low), "high_mm": at(scene.high)},
+        "rays": {
+            "note": "of the pixel in column x and row y, from 0: origin + (x + 0.5) origin_dx + (y + 0.5) origin_dy, the direction likewise and then normalised",
+            "size": scene.ray_size(),
+            "origin": at(rays.origin), "origin_dx": at(rays.origin_dx), "origin_dy": at(rays.origin_dy),
+            "direction": at(rays.direction), "direction_dx": at(rays.direction_dx), "direction_dy": at(rays.direction_dy),
+        },
+        "step_mm": scene.step,
+        "detector": {"step_mm": scene.ring.step, "samples_of_an_edge": scene.ring.half},
+        "settings": scene.settings,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numpy's format, byte by byte: NEP 1.
+    #[test]
+    fn an_array_has_numpys_header_and_little_endian_values() {
+        for (shape, values, as_f64) in [(vec![2, 3], [1.0, -2.5, 0.0, 4.0, 5.0, 1e9], false), (vec![6], [0.5; 6], true)]
+        {
+            let bytes = npy(&shape, &values, as_f64);
+            assert_eq!(&bytes[..8], b"\x93NUMPY\x01\0");
+            let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+            assert_eq!((10 + length) % 64, 0);
+            let header = std::str::from_utf8(&bytes[10..10 + length]).expect("ASCII");
+            assert!(header.ends_with('\n') && header.contains("'fortran_order': False"), "{header}");
+            let expected = if shape.len() == 2 { "'shape': (2, 3,), " } else { "'shape': (6,), " };
+            assert!(header.contains(expected), "{header}");
+            let size = if as_f64 { 8 } else { 4 };
+            assert!(header.contains(&format!("'descr': '<f{size}'")) && bytes.len() == 10 + length + 6 * size);
+            let second = &bytes[10 + length + size..][..size];
+            let second = match as_f64 {
+                true => f64::from_le_bytes(second.try_into().expect("8 bytes")),
+                false => f64::from(f32::from_le_bytes(second.try_into().expect("4 bytes"))),
+            };
+            assert_eq!(second, values[1]);
+        }
+    }
 }

@@ -4,6 +4,7 @@ use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
 use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose};
+use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::plan::Plan;
@@ -33,6 +34,9 @@ pub struct Render {
     /// Write every slot (GPU resource) as a picture into this folder
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
+    /// With --dump: write every slot as an array for numpy (.npy) too, with its units and axes beside it (.json), and scene.json
+    #[arg(long, requires = "dump")]
+    raw: bool,
     /// Use the most accurate settings that take less time, such as 16ms, by an error report; flags and --set override
     #[arg(long, value_name = "TIME", requires = "report")]
     budget: Option<String>,
@@ -131,8 +135,22 @@ impl Render {
             let drawn = dump::draw(slot, texels.as_ref(), renderer.scene());
             let file = folder.join(format!("{}.png", slot.name()));
             drawn.save(&file).map_err(failed)?;
+            if self.raw {
+                let (array, about) = dump::array(slot, texels.as_ref(), renderer.scene());
+                write(folder, &format!("{}.npy", slot.name()), &array)?;
+                write(folder, &format!("{}.json", slot.name()), format!("{about:#}\n").as_bytes())?;
+            }
+        }
+        if self.raw {
+            let about = dump::scene_description(renderer.scene());
+            write(folder, "scene.json", format!("{about:#}\n").as_bytes())?;
         }
         say!("slots: {}", folder.display());
         Ok(())
     }
+}
+
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    let file = folder.join(name);
+    files::replace(&file, bytes).map_err(|e| failed(format!("{}: {e}", file.display())))
 }

@@ -201,6 +201,54 @@ fn no_slot_is_missing_from_the_dump_and_no_pass_from_the_times() {
     }
 }
 
+/// The dump is for other programs: it must hold every slot as numbers, and the distances must be those of the reference surface in mm.
+#[test]
+fn a_raw_dump_holds_every_slot_as_an_array_with_axes_and_units() {
+    let folder = Folder::new("raw");
+    let dump = Folder(folder.0.join("dump"));
+    let more = ["--preset", "bone", "--dump", &dump.path(""), "--raw"];
+    render(BONE, &folder.path("p.png"), &more);
+    let json = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&fs::read(dump.path(name)).expect("written")).expect("JSON")
+    };
+    let scene = json("scene.json");
+    assert_eq!(
+        (scene["rays"]["size"].clone(), scene["detector"]["step_mm"].clone()),
+        (serde_json::json!([64, 48]), 0.25.into())
+    );
+    let mut arrays = 0;
+    for name in dump.names().iter().filter_map(|n| n.strip_suffix(".npy")) {
+        let bytes = fs::read(dump.path(&format!("{name}.npy"))).expect("written");
+        let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        let text = std::str::from_utf8(&bytes[10..header]).expect("ASCII");
+        let shape = text.split(['(', ')']).nth(1).expect("a shape");
+        let shape: Vec<usize> = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+        let size = if text.contains("<f8") { 8 } else { 4 };
+        let count = shape.iter().product::<usize>();
+        let about = json(&format!("{name}.json"));
+        assert_eq!(about["axes"].as_array().map(Vec::len), Some(shape.len()), "{name}");
+        // Frames are kept for a moment only, and are not read back.
+        assert!(bytes.len() == header + size * count && (count > 0 || name == "frames"), "{name}: {text}");
+        let values: Vec<f64> =
+            bytes[header..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("4")).into()).collect();
+        match name {
+            "volume" => {
+                assert!(about["unit"].as_str().is_some_and(|u| u.contains("before the grey window")) && shape[0] == 33)
+            }
+            "distance_map" => {
+                assert_eq!((shape, about["unit"].as_str().map(|u| &u[..2])), (vec![48, 64], Some("mm")));
+                let none = about["no_surface"].as_f64().expect("a number");
+                let hits = values.iter().filter(|v| **v < none);
+                assert!(hits.clone().count() > 100 && hits.clone().all(|v| (1.0..200.0).contains(v)));
+            }
+            _ => {}
+        }
+        arrays += 1;
+    }
+    assert_eq!(arrays, dump.names().iter().filter(|n| n.ends_with(".png")).count(), "one for every slot");
+    assert_eq!(run(&["render", BONE, "--raw"]).0, Some(2), "--raw without --dump");
+}
+
 #[test]
 fn unwritable_outputs_are_reported_and_nothing_is_destroyed() {
     let folder = Folder::new("outputs");
