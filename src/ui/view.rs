@@ -148,11 +148,11 @@ pub(super) fn keep_scale(now: &Scene, mut settings: Settings) -> Option<Settings
     let zoom = settings.camera.zoom;
     let distance = |scene: &Scene| (scene.rays.target - scene.rays.origin).dot(scene.rays.forward);
     let kept_zoom = if now.rays.is_perspective {
-        // The distance is a / zoom + b, where b is half the box along the view for a zoom of at least 1, otherwise 0.
+        // The distance is a / zoom + half the box along the view.
         let half = fitted.rays.forward.abs().dot(fitted.high - fitted.rays.target);
-        let a = zoom * (distance(&fitted) - if zoom >= 1.0 { half } else { 0.0 });
-        let (close, far) = (a / (distance(now) - half), a / distance(now));
-        if close >= 1.0 { close } else { far }
+        let a = zoom * (distance(&fitted) - half);
+        // A box that has grown past the camera is seen from as near as the camera may be.
+        a / (distance(now) - half).max(1e-9)
     } else {
         zoom * Picker::of(&fitted).mm_per_pixel() / Picker::of(now).mm_per_pixel()
     };
