@@ -9,6 +9,7 @@ mod docs;
 mod filter;
 mod frames;
 mod inputs;
+mod oracle;
 mod outputs;
 mod service;
 mod shaders;

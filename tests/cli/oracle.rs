@@ -1,0 +1,43 @@
+//! A second implementation of stage 2, in numpy, agrees with what the program writes.
+
+use crate::common::files::repository;
+use crate::common::program::*;
+use std::fs;
+use std::process::Command;
+
+/// Whether the oracle agrees, and what it prints.
+fn oracle(dump: &Folder) -> (bool, String) {
+    let script = repository("tests/oracle/check.py");
+    let out = Command::new("python3").arg(script).arg(&dump.0).output().expect("python3: tools/test installs it");
+    let said = [&out.stdout, &out.stderr].map(|text| String::from_utf8_lossy(text).into_owned()).concat();
+    assert!(!said.contains("ModuleNotFoundError"), "numpy is missing, tools/test installs it: {said}");
+    (out.status.success(), said)
+}
+
+/// References that share the program's definitions agree with it where both are wrong. This one shares docs/numerics.md.
+#[test]
+fn numpy_casts_the_same_rays_through_the_same_volume() {
+    let folder = Folder::new("oracle");
+    for (name, input, more, change) in [
+        ("surface", BONE, &["--preset", "bone"][..], ["\"threshold\": 0.08", "\"threshold\": 0.1"]),
+        (
+            "mip",
+            SWEEP,
+            &["--mode", "mip", "--camera", "azimuth=20,elevation=-15,field_of_view=30"],
+            ["\"wobble_radius\": 27.25", "\"wobble_radius\": 27.0"],
+        ),
+        ("volume", BONE, &["--preset", "bone", "--mode", "vr"], ["\"opacity\": 0.4", "\"opacity\": 0.35"]),
+    ] {
+        let dump = Folder(folder.0.join(name));
+        render(input, &folder.path("p.png"), &[more, &["--dump", &dump.path(""), "--raw"]].concat());
+        let (agrees, said) = oracle(&dump);
+        println!("{said}");
+        assert!(agrees, "{name}: {said}");
+        // It notices a difference.
+        let scene = fs::read_to_string(dump.path("scene.json")).expect("written");
+        assert!(scene.contains(change[0]), "{name}: {scene}");
+        fs::write(dump.path("scene.json"), scene.replace(change[0], change[1])).expect("written");
+        let (agrees, said) = oracle(&dump);
+        assert!(!agrees, "{name} with {}: {said}", change[1]);
+    }
+}
