@@ -20,7 +20,7 @@ pub fn draw(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> Picture {
             sheet(texels, &distances(texels))
         }
         (Some(texels), _) => sheet(texels, &stretched(texels)),
-        (None, Initializer::ByScene(make)) => curves(&make(scene), channels(slot).len()),
+        (None, Initializer::ByScene(make)) => curves(&make(scene), meaning(slot).0.len()),
         (None, _) => Picture { width: 1, height: 1, rgba: vec![0, 0, 0, 255] },
     }
 }
@@ -89,17 +89,55 @@ fn curves(values: &[f32], channels: usize) -> Picture {
     Picture { width: width as u32, height: height as u32, rgba }
 }
 
-/// Names of the channels of a slot.
-fn channels(slot: Slot) -> &'static [&'static str] {
+/// Of distance maps.
+const DISTANCES: &str = "mm along the ray of the pixel, from the ray's origin";
+const GREY: &[&str] = &["value"];
+const COLOUR: &[&str] = &["red", "green", "blue", "alpha"];
+/// Of samples of the recording.
+const SHARE_OF_RANGE: &str = "share of the range of the recording's samples, 0..1, before the grey window";
+
+/// Names of the channels of a slot, and the unit of its values.
+fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
     match slot {
-        Slot::ScanLut => &["sample", "line"],
-        Slot::TileRanges | Slot::BrickRanges => &["smallest", "largest"],
-        Slot::BrickTable => &["tiles_low", "tiles_high", "slices", "side"],
-        Slot::SliceTable => &["position", "advance"],
-        Slot::Transfer | Slot::PreIntegrated => &["red", "green", "blue", "absorption"],
-        Slot::Tiles | Slot::Block => &["x", "y", "z", "w"],
-        Slot::Surface => &["echo", "found", "echo_behind", "unused"],
-        Slot::PackedNeighbours => &["bits", "more_bits"],
+        Slot::Distance | Slot::DistanceA | Slot::DistanceB => (GREY, DISTANCES),
+        Slot::Frames
+        | Slot::Conditioned
+        | Slot::SliceA
+        | Slot::SliceB
+        | Slot::SliceForward
+        | Slot::SliceRows
+        | Slot::SharpVolume
+        | Slot::Volume => (GREY, SHARE_OF_RANGE),
+        Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),
+        Slot::Tgc => (GREY, "gain of a sample: a factor, or an addend where samples are log-compressed"),
+        Slot::ScanLut => (&["sample", "line"], "index from 0; -1 outside the sector"),
+        Slot::Growth => (GREY, "rings of pixels"),
+        Slot::PackedNeighbours => {
+            (&["bits", "more_bits"], "bits of a texel and of its neighbours one column on, one row on, and both")
+        }
+        Slot::BrickKinds
+        | Slot::BrickDistancesX
+        | Slot::BrickDistancesXy
+        | Slot::SurfaceBrickDistances
+        | Slot::VolumeBrickDistances => {
+            (GREY, "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous")
+        }
+        Slot::BrickTable => (
+            &["tile_columns", "tile_rows", "slices", "side"],
+            "indices: 4096 first + last; side: 0 outside the sector, 1 across its border, 2 inside",
+        ),
+        Slot::OpaqueBefore => (GREY, "entries of the transfer function"),
+        Slot::SweepLut => (GREY, "mean distances of slices"),
+        Slot::SliceTable => (&["position", "advance"], "mean distances of slices"),
+        Slot::LineLut => (GREY, "share of the lines of a frame"),
+        Slot::Transfer | Slot::PreIntegrated => {
+            (&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel")
+        }
+        Slot::Tiles | Slot::Block => (&["x", "y", "z", "w"], "vectors as the shader takes them"),
+        Slot::Surface => {
+            (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")
+        }
+        Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
         Slot::VolumeLayer
         | Slot::Rendered
         | Slot::Planes
@@ -108,65 +146,19 @@ fn channels(slot: Slot) -> &'static [&'static str] {
         | Slot::SmoothPictureB
         | Slot::PictureForward
         | Slot::PictureRows
-        | Slot::Screen => &["red", "green", "blue", "alpha"],
-        _ => &["value"],
-    }
-}
-
-/// The unit of the values of a slot.
-fn unit(slot: Slot) -> &'static str {
-    match slot {
-        Slot::Distance | Slot::DistanceA | Slot::DistanceB => "mm along the ray of the pixel, from the ray's origin",
-        Slot::Frames | Slot::Conditioned => "share of the range of the recording's samples, 0..1",
-        Slot::SliceA
-        | Slot::SliceB
-        | Slot::SliceForward
-        | Slot::SliceRows
-        | Slot::SharpVolume
-        | Slot::Volume
-        | Slot::TileRanges
-        | Slot::BrickRanges => "share of the range of the recording's samples, 0..1, before the grey window",
-        Slot::Tgc => "factor of a sample",
-        Slot::ScanLut => "index from 0; -1 outside the sector",
-        Slot::Growth => "rings of pixels",
-        Slot::PackedNeighbours => "bits of a texel and of its neighbours one column on, one row on, and both",
-        Slot::BrickKinds
-        | Slot::BrickDistancesX
-        | Slot::BrickDistancesXy
-        | Slot::SurfaceBrickDistances
-        | Slot::VolumeBrickDistances => "(64 kind + distance in bricks) / 255; kinds: 0 active, 1 empty, 2 homogeneous",
-        Slot::BrickTable => "packed indices of tiles; side: 0 outside the sector, 1 across its border, 2 inside",
-        Slot::OpaqueBefore => "entries of the transfer function",
-        Slot::SweepLut | Slot::SliceTable => "slices",
-        Slot::LineLut => "share of the lines of a frame",
-        Slot::Transfer | Slot::PreIntegrated => "colour 0..1; absorption of one slice pixel",
-        Slot::Tiles | Slot::Block => "vectors in mm and pixels, as the shader takes them",
-        Slot::Surface => "echo 0..1 after the grey window; found: 0 or 1",
-        Slot::SliceShares
-        | Slot::PictureShares
-        | Slot::Shadow
-        | Slot::Occlusion
-        | Slot::VolumeLayer
-        | Slot::Rendered
-        | Slot::Planes
-        | Slot::Picture
-        | Slot::SmoothPicture
-        | Slot::SmoothPictureB
-        | Slot::PictureForward
-        | Slot::PictureRows
-        | Slot::Screen => "share, 0..1",
+        | Slot::Screen => (COLOUR, "share, 0..1"),
     }
 }
 
 /// A slot as an array that numpy reads (NPY 1.0, little endian, C order), and a description of its axes, channels and units. `texels` as in
 /// [`draw`]. Values are f32 as the shaders read them, f64 where they are bits.
 pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Value) {
+    let (channels, unit) = meaning(slot);
     let (shape, values) = match (texels, slot.initializer()) {
         (Some(t), _) => ([t.size[2], t.size[1], t.size[0], t.channels], t.values.clone()),
         (None, Initializer::ByScene(make)) => {
             let values: Vec<f64> = make(scene).into_iter().map(f64::from).collect();
-            let channels = channels(slot).len();
-            ([1, 1, values.len() / channels, channels], values)
+            ([1, 1, values.len() / channels.len(), channels.len()], values)
         }
         (None, _) => ([1, 1, 0, 1], Vec::new()),
     };
@@ -186,10 +178,10 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
     let mut about = json!({
         "slot": slot.name(),
         "axes": kept.iter().map(|(axis, _)| *axis).collect::<Vec<_>>(),
-        "channels": channels(slot).iter().take(shape[3]).collect::<Vec<_>>(),
-        "unit": unit(slot),
+        "channels": channels.iter().take(shape[3]).collect::<Vec<_>>(),
+        "unit": unit,
     });
-    if unit(slot).starts_with("mm along") {
+    if unit == DISTANCES {
         about["no_surface"] = json!(MISS);
     }
     (bytes, about)
