@@ -100,7 +100,7 @@ impl Plan {
         if self.slots.contains(&Slot::Volume) {
             let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
         }
-        let (bounds, [columns, rows, slices]) = (&scene.seen, scene.volume_size());
+        let (bounds, [columns, rows, slices]) = (&scene.visible_bounds, scene.volume_size());
         let span = |axis: usize| format!("{}..{}", bounds.low[axis], bounds.high[axis]);
         let _ = writeln!(
             text,
@@ -108,8 +108,8 @@ impl Plan {
             span(0),
             span(1),
             span(2),
-            100.0 * scene.share_seen(),
-            scene.frames_seen()
+            100.0 * scene.visible_share(),
+            scene.visible_frames()
         );
         let _ = writeln!(text, "slots");
         for slot in &self.slots {
@@ -135,10 +135,10 @@ impl Plan {
             return Rerun::Everything;
         }
         // A smaller visible region needs nothing new; a larger one needs frames.
-        if !old.seen.holds(&new.seen) {
+        if !old.visible_bounds.holds(&new.visible_bounds) {
             return Rerun::Frames;
         }
-        let old = &Scene { seen: new.seen, ..old.clone() };
+        let old = &Scene { visible_bounds: new.visible_bounds, ..old.clone() };
         let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| s.differs(old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();

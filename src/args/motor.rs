@@ -161,6 +161,6 @@ pub fn motor_table(file: Option<&PathBuf>) -> Result<Option<MotorTable>, Failure
 ///
 /// # Errors
 /// The file has none.
-pub fn required_motor_table(probe: &ProbeFile) -> Result<MotorTable, Failure> {
+fn required_motor_table(probe: &ProbeFile) -> Result<MotorTable, Failure> {
     probe.motor().cloned().ok_or_else(|| input(format!("{}: has no [motor] table", probe.path().display())))
 }

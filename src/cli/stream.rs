@@ -83,7 +83,7 @@ impl Stream {
         // A signal ends the stream normally, so that the recording gets its index. A second signal ends the process at once.
         let signals = Held::first();
         let began = Instant::now();
-        let (mut told, mut all, mut memory) = (began, Statistics::default(), None);
+        let (mut last_status, mut all, mut memory) = (began, Statistics::default(), None);
         let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
@@ -107,8 +107,8 @@ impl Stream {
                 Step::Progress => {}
                 Step::End(why) => break why,
             }
-            if told.elapsed() >= INTERVAL {
-                told = Instant::now();
+            if last_status.elapsed() >= INTERVAL {
+                last_status = Instant::now();
                 let since = stream.take_statistics().map_err(fault)?;
                 say!("{:>6.1} s  {}", began.elapsed().as_secs_f64(), since.line(stream.acquisition_time()));
                 all.add(&since);

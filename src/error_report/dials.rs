@@ -121,7 +121,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             made("format", "bits", is(serde_word(&now), bits(now)), others.collect(), &best, &nearly)
         }
         "sampling" => {
-            let all = [Sampling::Hardware, Sampling::Exact, Sampling::Quads];
+            let all = [Sampling::Hardware, Sampling::Exact, Sampling::PackedNeighbours];
             let others = all.iter().enumerate().filter(|(_, w)| **w != s.ray.sampling);
             let set = |w: &Sampling| [format!("ray.sampling={}", serde_word(w))];
             let others = others.map(|(n, w)| at(serde_word(w), &set(w), n as f64));

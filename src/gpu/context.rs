@@ -215,11 +215,6 @@ impl Context {
         Ok(context)
     }
 
-    /// True if the validation layer is enabled.
-    pub fn has_validation(&self) -> bool {
-        self.messenger.is_some()
-    }
-
     /// All validation messages so far. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()

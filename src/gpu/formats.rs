@@ -28,7 +28,7 @@ impl TexelAccess {
 
     /// The sampling that `auto` selects.
     pub fn sampling(self) -> Sampling {
-        if self == TexelAccess::Storage { Sampling::Quads } else { Sampling::Hardware }
+        if self == TexelAccess::Storage { Sampling::PackedNeighbours } else { Sampling::Hardware }
     }
 
     pub fn describe(self) -> &'static str {

@@ -5,7 +5,7 @@ use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, embedded};
 use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, Slots, shape_size};
+use super::resources::{Buffer, Purpose, SlotResources, shape_size};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::slots::{Initializer, Shape};
@@ -61,7 +61,7 @@ impl PassRunner {
         let scene = &formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
-        let mut slots = Slots::new(&self.context, args.image + 1);
+        let mut slots = SlotResources::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
         let mut recorder = Recorder::new(&self.context, 0, pass.name, false)?;
         let mut barriers = BarrierRecorder::default();
@@ -130,7 +130,7 @@ pub struct PassTimer {
     /// Every iteration of the pass.
     dispatches: Vec<(DispatchArgs, Arc<Pipeline>)>,
     _pipelines: Pipelines,
-    slots: Slots,
+    slots: SlotResources,
     timelines: Timelines,
     barriers: BarrierRecorder,
     context: Arc<Context>,
@@ -188,7 +188,7 @@ impl PassTimer {
             recorder: Recorder::new(context, 0, pass.name, false)?,
             dispatches,
             _pipelines: pipelines,
-            slots: Slots::new(context, 1),
+            slots: SlotResources::new(context, 1),
             timelines: Timelines::new(context, 1)?,
             barriers: BarrierRecorder::default(),
             context: context.clone(),

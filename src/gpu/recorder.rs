@@ -4,7 +4,7 @@ use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{DescriptorSets, Pipeline, descriptor_type};
-use super::resources::{Buffer, Image, Purpose, Resource, Slots, WHOLE};
+use super::resources::{Buffer, Image, Purpose, Resource, SlotResources, WHOLE};
 use super::timeline::Timelines;
 use super::timing::{Stamps, Timings};
 use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
@@ -27,7 +27,7 @@ const STAMPS: u32 = 128;
 /// A dispatch of a pass, and everything it runs on.
 #[derive(Clone, Copy)]
 pub struct Dispatch<'a> {
-    pub slots: &'a Slots,
+    pub slots: &'a SlotResources,
     pub pipeline: &'a Pipeline,
     pub scene: &'a Scene,
     pub pass: &'static Pass,
@@ -364,7 +364,7 @@ impl Recorder {
 impl Recorder {
     /// Moves new images from UNDEFINED to GENERAL and clears them to zero. Passes rely on this: they never write pixels outside the
     /// sector.
-    pub fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &Slots, new: &[(Slot, u32)]) {
+    pub fn clear_new(&mut self, barriers: &mut BarrierRecorder, slots: &SlotResources, new: &[(Slot, u32)]) {
         let images: Vec<(&Image, Slot, u32)> =
             new.iter().filter_map(|&(slot, n)| slots.image(slot, n).map(|image| (image, slot, n))).collect();
         let transitions: Vec<_> = images

@@ -297,16 +297,16 @@ pub enum Resource {
 }
 
 /// The allocated slots, by slot and number of the volume image.
-pub struct Slots {
+pub struct SlotResources {
     context: Arc<Context>,
     resources: BTreeMap<(Slot, u32), Resource>,
     /// Number of volume images.
     images: u32,
 }
 
-impl Slots {
-    pub fn new(context: &Arc<Context>, images: u32) -> Slots {
-        Slots { context: context.clone(), resources: BTreeMap::new(), images }
+impl SlotResources {
+    pub fn new(context: &Arc<Context>, images: u32) -> SlotResources {
+        SlotResources { context: context.clone(), resources: BTreeMap::new(), images }
     }
 
     /// Allocates the slots of the plan that are missing or have another shape, and frees those that it does not need. New images are

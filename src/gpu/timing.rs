@@ -36,7 +36,7 @@ pub fn elapsed(from: u64, to: u64, valid_bits: u32, period: f32) -> f64 {
 }
 
 /// Ticks from one stamp to another, which may be earlier: the shorter distance modulo the counter's range.
-pub fn signed_ticks(from: u64, to: u64, valid_bits: u32) -> i64 {
+fn signed_ticks(from: u64, to: u64, valid_bits: u32) -> i64 {
     let unused = 64 - valid_bits.clamp(1, 64);
     // Moves the counter's highest bit into the sign bit of the result.
     (to.wrapping_sub(from) << unused) as i64 >> unused

@@ -48,8 +48,8 @@ impl Views {
         let input = Input { stored: header.stored, range: header.range };
         let scene = |geometry: &Geometry| Scene::new(geometry.clone(), input, settings.clone());
         let (mut forward, mut backward) = (scene(&header.forward)?, scene(&header.backward)?);
-        forward.seen = forward.seen.with(backward.seen);
-        backward.seen = forward.seen;
+        forward.visible_bounds = forward.visible_bounds.with(backward.visible_bounds);
+        backward.visible_bounds = forward.visible_bounds;
         let is_directional = header.forward != header.backward;
         Ok(Views { forward, backward, is_directional, is_mixed: is_directional && update == Update::Rolling })
     }

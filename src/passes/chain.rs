@@ -32,7 +32,7 @@ impl Chain {
     }
 
     /// The filters that a scene asks for, in order.
-    fn asked(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter)> {
+    fn requested(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter)> {
         let filters = PASSES.iter().filter_map(|pass| match pass.link {
             Link::Filter(filter) => Some((pass, filter)),
             _ => None,
@@ -43,7 +43,7 @@ impl Chain {
     /// The filters that run, each with its number of links.
     fn filters(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter, u32)> {
         let is_copied = self == Chain::Slices && copied(scene).is_some();
-        let filters = self.asked(scene).filter(move |_| !is_copied);
+        let filters = self.requested(scene).filter(move |_| !is_copied);
         filters.map(|(pass, filter)| (pass, filter, (pass.repeat)(scene) / filter.dispatches))
     }
 
@@ -85,9 +85,9 @@ pub fn picture_end(scene: &Scene) -> Slot {
 /// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
 /// what it reads unchanged.
 pub fn copied(scene: &Scene) -> Option<Slot> {
-    let mut asked = Chain::Slices.asked(scene);
-    let (_, filter) = asked.next()?;
-    if asked.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
+    let mut requested = Chain::Slices.requested(scene);
+    let (_, filter) = requested.next()?;
+    if requested.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
 }
 
 /// Columns and rows of a slice that a pass makes.
@@ -177,7 +177,7 @@ impl Pass {
             _ => return None,
         }
         let cut = |axis: usize| {
-            let (low, high) = (scene.seen.low[axis], scene.seen.high[axis]);
+            let (low, high) = (scene.visible_bounds.low[axis], scene.visible_bounds.high[axis]);
             let first = low.saturating_sub(around[axis]) / WORKGROUP * WORKGROUP;
             let end = high.saturating_add(around[axis]).next_multiple_of(WORKGROUP).min(scene.grid.size[axis]);
             (first, end - first)

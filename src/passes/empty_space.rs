@@ -61,7 +61,7 @@ pub(in crate::passes) fn volume_skipping(scene: &Scene) -> Skipping {
     }
 }
 
-fn asked(scene: &Scene) -> Need {
+fn need(scene: &Scene) -> Need {
     match scene.skips() {
         true => Ok("rays skip bricks that cannot change the picture"),
         false => Err("no ray skips bricks: none is cast, or every sample is asked for"),
@@ -75,7 +75,7 @@ pub const TILE_RANGES: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::None,
     shader: |_, _| "empty_space/tile_ranges.plain",
-    needed: asked,
+    needed: need,
     // A slice changes with the frames that are smoothed into it.
     reads: |s, _| vec![Bind { part: Part::Around(s.smoothing_radius()[2]), ..whole("volume", Slot::Volume) }],
     writes: |_, _| vec![Bind { part: Part::Around(0), ..whole("tile_ranges", Slot::TileRanges) }],
@@ -117,7 +117,7 @@ pub const BRICK_RANGES: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::None,
     shader: |_, _| "empty_space/brick_ranges.plain",
-    needed: asked,
+    needed: need,
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
         vec![whole("brick_table", Slot::BrickTable), Bind { part, ..whole("tile_ranges", Slot::TileRanges) }]
@@ -168,7 +168,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::None,
     shader: |_, _| "empty_space/classify.plain",
-    needed: |s| match (s.detects_surface(), asked(s)) {
+    needed: |s| match (s.detects_surface(), need(s)) {
         (true, Ok(_)) => Ok("where no sample exceeds the threshold the detector cannot fire"),
         (true, not) => not,
         (false, _) => Err("no surface in this mode"),
@@ -199,7 +199,7 @@ pub const CLASSIFY_SURFACE: Pass = Pass {
 pub const CLASSIFY_VOLUME: Pass = Pass {
     name: "classify_bricks_volume",
     shader: |s, _| if s.composites() { "empty_space/classify.transparent" } else { "empty_space/classify.plain" },
-    needed: |s| match (s.composites(), s.settings.mode, asked(s)) {
+    needed: |s| match (s.composites(), s.settings.mode, need(s)) {
         (true, _, Ok(_)) => Ok("what is transparent or outside is left out"),
         (_, Mode::Mean, Ok(_)) => Ok("what is zero or outside is counted without looking"),
         (true, _, not) | (_, Mode::Mean, not) => not,

@@ -49,7 +49,7 @@ pub const TONE: Pass = Pass {
         for (x, y) in (0..picture.size[1]).flat_map(|y| (0..picture.size[0]).map(move |x| (x, y))) {
             let rgba = picture.get([x, y, 0]);
             let colour = (rgba[3] > 0.0).then_some([rgba[0], rgba[1], rgba[2]]);
-            screen.set([x, y, 0], &shown(scene, sheet.as_ref(), colour, x, y));
+            screen.set([x, y, 0], &reference_pixel(scene, sheet.as_ref(), colour, x, y));
         }
     },
 };
@@ -81,7 +81,7 @@ pub fn tone_constants(scene: &Scene, lines: bool) -> Vec<(&'static str, i32)> {
 }
 
 /// The colour on the screen, black where there is none; with the lines of the sheet, if it has any.
-pub fn shown(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
+pub fn reference_pixel(scene: &Scene, sheet: Option<&Sheet>, colour: Option<[f64; 3]>, x: usize, y: usize) -> [f64; 4] {
     let mut colour = colour.map_or([0.0; 3], |c| toned(scene, c));
     if let Some((sheet, tile)) = sheet.and_then(|s| s.tile_at(x, y).map(|tile| (s, tile))) {
         colour = with_lines(sheet, tile, colour, x, y);

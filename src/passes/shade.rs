@@ -76,7 +76,7 @@ pub const LIGHT: Pass = Pass {
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
                 let light = lit(scene, reads, x, y);
-                picture.set([x, y, 0], &shown(scene, reads, light, x, y));
+                picture.set([x, y, 0], &reference_pixel(scene, reads, light, x, y));
             }
         }
     },
@@ -100,7 +100,7 @@ fn lit_thing(scene: &Scene) -> Lit {
 }
 
 /// The colour of a pixel: its light (body and highlight), with the composited volume in front of it or lit by it.
-fn shown(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
+fn reference_pixel(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>, x: usize, y: usize) -> [f64; 4] {
     let layer = |share: f64| {
         let layer = reads.get("volume_layer").get([x, y, 0]);
         (DVec3::new(layer[0], layer[1], layer[2]) * share, layer[3] * share)

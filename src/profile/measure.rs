@@ -282,7 +282,7 @@ fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
     let frame = touched(&layer("frames", Slot::Frames), scene);
     match name {
         // One copy uploads several slices.
-        "upload" if chain::copied(scene).is_some() && runs > 0 => scene.frames_seen().len() as u64 * frame,
+        "upload" if chain::copied(scene).is_some() && runs > 0 => scene.visible_frames().len() as u64 * frame,
         "upload" => runs * frame,
         "readback" => runs * Slot::Screen.bytes(scene),
         _ => 0,

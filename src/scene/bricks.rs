@@ -113,18 +113,18 @@ impl Scene {
     pub fn reach(&self, bricks: &Bricks, cell: [u32; 3]) -> Reach {
         let margin = bricks.edge * MARGIN;
         let (low, high) = (bricks.place(cell) - margin, bricks.place(cell) + bricks.edge + margin);
-        let mut seen = Extent::of(self, low, high);
+        let mut extent = Extent::of(self, low, high);
         let taps = self.tap_reach();
         if taps > 0.0 {
             // The side of a sample follows from its position, its value from its taps.
-            seen.texels = Extent::of(self, low - taps, high + taps).texels;
+            extent.texels = Extent::of(self, low - taps, high + taps).texels;
         }
         let [columns, rows, slices] = std::array::from_fn(|axis| {
             let last = f64::from(self.volume_size()[axis] - 1);
-            let [from, to] = seen.texels[axis];
+            let [from, to] = extent.texels[axis];
             [from.floor().clamp(0.0, last) as u32, to.ceil().clamp(0.0, last) as u32]
         });
-        Reach { tiles: [columns, rows].map(|r| r.map(|n| n / TILE)), slices, side: seen.side }
+        Reach { tiles: [columns, rows].map(|r| r.map(|n| n / TILE)), slices, side: extent.side }
     }
 
     /// Reach of the sliding filter around a sample, mm: its taps along the ray, and the same distance to both sides.

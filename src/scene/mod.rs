@@ -132,7 +132,7 @@ pub struct Scene {
     /// Filters of the distance map, sizes in rays.
     pub distance: Distance,
     /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
-    pub seen: visible_bounds::VisibleBounds,
+    pub visible_bounds: visible_bounds::VisibleBounds,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -213,7 +213,7 @@ impl Scene {
             sampling,
             apron: 0.0,
             distance,
-            seen: VisibleBounds::default(),
+            visible_bounds: VisibleBounds::default(),
         };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()
@@ -226,7 +226,7 @@ impl Scene {
         }
         scene.apron = 2.0 + scene.filter_reach();
         check::check_planes_resolved(&scene)?;
-        scene.seen = visible_bounds::seen(&scene);
+        scene.visible_bounds = visible_bounds::of(&scene);
         Ok(scene)
     }
 
@@ -439,27 +439,27 @@ impl Scene {
     /// The scene with `auto` replaced by `fastest`, the fastest sampling of the device.
     pub fn sampled(mut self, fastest: Sampling) -> Scene {
         if self.settings.ray.sampling == Sampling::Auto {
-            let pays = fastest != Sampling::Quads || self.quads_pay();
+            let pays = fastest != Sampling::PackedNeighbours || self.packed_neighbours_pay();
             self.sampling = if pays { fastest } else { Sampling::Exact };
         }
         self
     }
 
     /// True if packed neighbours save more time than packing takes. Packing one texel takes as long as three to six samples save.
-    fn quads_pay(&self) -> bool {
+    fn packed_neighbours_pay(&self) -> bool {
         let texels: u64 = self.volume_size().iter().map(|n| u64::from(*n)).product();
         let rays: u64 = self.ray_size().iter().map(|n| u64::from(*n)).product();
         // A moving view uses the same sampling as a still one.
         let rays = if self.settings.ray.half { 4 * rays } else { rays };
         // Mean ray length: half the diagonal of the box, since some rays miss it and some end early.
         let samples = rays as f64 * 0.5 * (self.high - self.low).length() / self.step;
-        let made = texels as f64 * self.share_seen();
+        let made = texels as f64 * self.visible_share();
         texels <= MAX_PACKED_TEXELS && (self.settings.slices.still || samples >= SAMPLES_PER_PACKED_TEXEL * made)
     }
 
     /// The scene without packed neighbours, unless the setting requires them. For devices that lack the memory.
     pub fn without_quads(mut self) -> Scene {
-        if self.settings.ray.sampling == Sampling::Auto && self.sampling == Sampling::Quads {
+        if self.settings.ray.sampling == Sampling::Auto && self.sampling == Sampling::PackedNeighbours {
             self.sampling = Sampling::Exact;
         }
         self
@@ -473,7 +473,9 @@ impl Scene {
     /// True if rays sample packed neighbours: texels that hold four neighbours of a slice. Not for 32-bit floats, which would take 16 bytes.
     pub fn packs(&self) -> bool {
         let stored = self.settings.slices.format != VolumeFormat::R32f;
-        self.sampling == Sampling::Quads && stored && (self.composites() || self.detects_surface() || self.projects())
+        self.sampling == Sampling::PackedNeighbours
+            && stored
+            && (self.composites() || self.detects_surface() || self.projects())
     }
 }
 

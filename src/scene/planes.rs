@@ -62,7 +62,7 @@ pub fn colour(plane: PlaneName) -> [f64; 3] {
 }
 
 /// Colour between the tiles of tomography.
-pub const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
+const BETWEEN: [f64; 3] = [0.35, 0.35, 0.35];
 
 /// Number of pixels before the n-th of `count` cells along an axis. Cell sizes differ by at most one pixel; of two cells the last is the
 /// larger one, like the rendering in a 4-up picture.

@@ -60,26 +60,31 @@ impl Scene {
     /// The scene with another pixel grid of the slices.
     pub fn on_grid(mut self, grid: SliceGrid) -> Scene {
         self.grid = grid;
-        self.seen = seen(&self);
+        self.visible_bounds = of(&self);
         self
     }
 
     /// The frames that stage 1 needs: those of the visible slices, and the neighbours within reach of smoothing across slices.
-    pub fn frames_seen(&self) -> Range<u32> {
+    pub fn visible_frames(&self) -> Range<u32> {
         let reach = self.smoothing_radius()[2];
-        let Range { start, end } = self.seen.slices();
-        if self.seen.is_empty() { 0..0 } else { start.saturating_sub(reach)..(end + reach).min(self.slices()) }
+        let Range { start, end } = self.visible_bounds.slices();
+        if self.visible_bounds.is_empty() {
+            0..0
+        } else {
+            start.saturating_sub(reach)..(end + reach).min(self.slices())
+        }
     }
 
     /// Share of the volume's texels within the visible bounds.
-    pub fn share_seen(&self) -> f64 {
+    pub fn visible_share(&self) -> f64 {
         let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();
-        texels(std::array::from_fn(|a| self.seen.high[a] - self.seen.low[a])) / texels(self.volume_size())
+        texels(std::array::from_fn(|a| self.visible_bounds.high[a] - self.visible_bounds.low[a]))
+            / texels(self.volume_size())
     }
 }
 
 /// The visible bounds of a scene.
-pub(super) fn seen(scene: &Scene) -> VisibleBounds {
+pub(super) fn of(scene: &Scene) -> VisibleBounds {
     let counts_growth = scene.settings.slices.enhanced_sigma.is_some_and(|e| e.growth);
     if scene.settings.slices.everything || counts_growth {
         return VisibleBounds::all(scene.volume_size());
@@ -196,12 +201,12 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
     let size = scene.volume_size();
     let texel = |index: f64, axis: usize| index.floor().clamp(0.0, f64::from(size[axis] - 1)) as u32;
     let spans = [column, row, slice];
-    let seen = VisibleBounds {
+    let bounds = VisibleBounds {
         low: std::array::from_fn(|a| texel(spans[a].0 - SLACK, a)),
         high: std::array::from_fn(|a| texel(spans[a].1 + SLACK + 1.0, a) + 1),
     };
     // The bounds may intersect the sector's bounding box but not the sector.
-    Some(seen).filter(|seen| !seen.is_empty())
+    Some(bounds).filter(|bounds| !bounds.is_empty())
 }
 
 /// Bounds of in-plane x and y and of slice positions of a convex solid with these corners.

@@ -123,7 +123,7 @@ pub trait Source: Send {
 }
 
 /// The header of the frames of a source. If all volumes are swept in one direction, both geometries are the same.
-pub(super) fn header_of<S: Source + ?Sized>(source: &S) -> Header {
+fn header_of<S: Source + ?Sized>(source: &S) -> Header {
     let forward = source.geometry(0);
     let second = if source.volumes() > 1 { source.geometry(1) } else { forward.clone() };
     let (forward, backward) = if goes_back(&forward) { (second, forward) } else { (forward, second) };

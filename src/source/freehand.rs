@@ -13,7 +13,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Default limit of the voxels of a volume: 2^25, about 320 along each edge.
-pub const DEFAULT_MAX_VOXELS: usize = 1 << 25;
+const DEFAULT_MAX_VOXELS: usize = 1 << 25;
 /// Largest possible limit.
 const MAX_VOXELS: usize = 1 << 31;
 /// Largest weight of a voxel, in pixels at its centre. Above it, sum and weight are halved: with larger sums, rounding in f32 would

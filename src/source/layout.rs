@@ -84,7 +84,7 @@ pub(super) fn extent(file: &Path, field: &str, which: &str, value: u64) -> Resul
 }
 
 /// Largest ratio that deflate can reach: 258 bytes from two bits, so 1032 (zlib, "technical details").
-pub(super) const MAX_INFLATED: u64 = 1032;
+const MAX_INFLATED: u64 = 1032;
 
 /// The location of the samples: file and range of bytes.
 #[derive(Clone, Debug)]

@@ -30,9 +30,9 @@ pub enum Input {
 }
 
 /// Largest coordinate that is accepted, pixels. No window is this large; some drivers report such values.
-pub(super) const MAX_COORDINATE: f64 = 1e6;
+const MAX_COORDINATE: f64 = 1e6;
 /// Largest number of wheel notches in one event.
-pub(super) const MAX_NOTCHES: f64 = 20.0;
+const MAX_NOTCHES: f64 = 20.0;
 
 impl Input {
     /// The event with its numbers limited to what a window and a wheel can produce. None if the position is out of range or not a number.

@@ -7,7 +7,7 @@ use crate::scene::{Camera, Clip, MAX_CLIPS, Mode, PlaneName, Scene, Settings, in
 use glam::{DVec2, DVec3};
 
 /// Limits of the zoom for gestures and keys. A zoom beyond them that a scene file set stays reachable.
-pub(super) const ZOOM: [f64; 2] = [0.2, 20.0];
+const ZOOM: [f64; 2] = [0.2, 20.0];
 
 /// Converts a point in space to the coordinates of the settings, whose depth counts from the probe's face.
 pub(super) fn below_face(scene: &Scene, point: DVec3) -> DVec3 {

@@ -92,11 +92,11 @@ impl Verify {
         check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // Checks that were not requested are not missing.
-        earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.looks_at(o)));
+        earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.is_selected(o)));
         let mut dut = self.open(level)?;
         let (mut run, stopped) = match self.self_test {
-            true => (self.tested(&dut)?, None),
-            false => self.checked(&mut dut)?,
+            true => (self.run_self_test(&dut)?, None),
+            false => self.run_checks(&mut dut)?,
         };
         self.save_pictures(&mut run);
         let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
@@ -105,7 +105,7 @@ impl Verify {
     }
 
     /// Runs the checks on the device. Returns the outcomes, and the signal if one ended the run early.
-    fn checked(&self, dut: &mut DeviceUnderTest) -> Result<(Run, Option<&'static str>), Failure> {
+    fn run_checks(&self, dut: &mut DeviceUnderTest) -> Result<(Run, Option<&'static str>), Failure> {
         let held = Held::first();
         announce(dut);
         let checks = match &self.against {
@@ -120,7 +120,7 @@ impl Verify {
         let (mut ran, mut group) = (0, Vec::<Outcome>::new());
         let on_outcome = |outcome: &Outcome| {
             if group.first().is_some_and(|first| first.group != outcome.group) {
-                tell(&std::mem::take(&mut group));
+                print_group(&std::mem::take(&mut group));
             }
             // One line per group; a failure is printed at once.
             if outcome.verdict == Verdict::Failed {
@@ -129,8 +129,8 @@ impl Verify {
             group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
             ran += 1;
         };
-        let mut run = while_told(&held, || verify::run(dut, &checks, || held.signal(), on_outcome));
-        tell(&group);
+        let mut run = announcing_signals(&held, || verify::run(dut, &checks, || held.signal(), on_outcome));
+        print_group(&group);
         let stopped = held.signal().filter(|_| ran < checks.len());
         // Readers of the report files must see it, too.
         run.outcomes.extend(stopped.map(|signal| verify::stopped(signal, checks.len() - ran)));
@@ -138,7 +138,7 @@ impl Verify {
     }
 
     /// Runs the self-test: which check detects each injected fault.
-    fn tested(&self, dut: &DeviceUnderTest) -> Result<Run, Failure> {
+    fn run_self_test(&self, dut: &DeviceUnderTest) -> Result<Run, Failure> {
         announce(dut);
         let begun = Instant::now();
         let tell = |detection: &Detection| match &detection.by {
@@ -172,7 +172,7 @@ impl Verify {
     }
 
     /// True if this run includes a check of an earlier one.
-    fn looks_at(&self, earlier: &Outcome) -> bool {
+    fn is_selected(&self, earlier: &Outcome) -> bool {
         (earlier.group == "against") == self.against.is_some() && self.wants(&earlier.group, &earlier.name)
     }
 
@@ -249,7 +249,7 @@ fn announce(dut: &DeviceUnderTest) {
 }
 
 /// Reports a signal at once: the running check may take a minute.
-fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
+fn announcing_signals<T>(held: &Held, work: impl FnOnce() -> T) -> T {
     const OFTEN: Duration = Duration::from_millis(100);
     let (working, works) = mpsc::channel::<()>();
     std::thread::scope(|scope| {
@@ -265,7 +265,7 @@ fn while_told<T>(held: &Held, work: impl FnOnce() -> T) -> T {
     })
 }
 
-fn tell(group: &[Outcome]) {
+fn print_group(group: &[Outcome]) {
     if let Some(first) = group.first() {
         say!("{}", report::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
     }

@@ -160,7 +160,7 @@ pub fn digest(context: &Arc<Context>) -> Result<String, GpuError> {
 }
 
 /// The digest of rendered pictures.
-pub(super) fn digest_of(modes: &[Drawn]) -> String {
+fn digest_of(modes: &[Drawn]) -> String {
     modes.iter().fold(String::new(), |mut text, of| {
         let _ = writeln!(text, "{:016x} {}", crc64(&of.picture.rgba), of.name);
         text

@@ -48,7 +48,7 @@ fn scenes() -> Result<Vec<Scene>, String> {
 /// The scene in which a pass is timed.
 fn scene_of<'a>(scenes: &'a [Scene], pass: &Pass) -> Option<&'a Scene> {
     scenes.iter().find(|scene| {
-        let quads = pass.name != "packed_neighbours" || scene.settings.ray.sampling == Sampling::Quads;
+        let quads = pass.name != "packed_neighbours" || scene.settings.ray.sampling == Sampling::PackedNeighbours;
         quads && pass.is_needed(scene)
     })
 }

@@ -30,7 +30,7 @@ fn a_ray_of_four_pixels_goes_through_their_common_corner() {
             let full = scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\npicture.size = {size}{more}"));
             let half = moving(&full);
             let rays = f64::from(full.settings.ray.rays);
-            assert_eq!((half.settings.ray.rays, half.seen), (1, full.seen));
+            assert_eq!((half.settings.ray.rays, half.visible_bounds), (1, full.visible_bounds));
             for (x, y) in [(0.5, 0.5), (20.5, 3.5), (31.5, 23.5)] {
                 let (a, along_a) = half.rays.at(x, y);
                 let (b, along_b) = full.rays.at(2.0 * rays * x, 2.0 * rays * y);

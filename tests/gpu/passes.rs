@@ -82,8 +82,8 @@ fn automatic_sampling_is_what_the_device_takes_fastest_and_what_was_asked_for_st
     };
     let (textures, storage) = (Some(TexelAccess::Textures), Some(TexelAccess::Storage));
     assert_eq!(of(textures, "auto", 64, true), Sampling::Hardware);
-    assert_eq!(of(storage, "auto", 64, false), Sampling::Quads);
-    assert_eq!(of(storage, "auto", 4, true), Sampling::Quads, "many pictures of one volume");
+    assert_eq!(of(storage, "auto", 64, false), Sampling::PackedNeighbours);
+    assert_eq!(of(storage, "auto", 4, true), Sampling::PackedNeighbours, "many pictures of one volume");
     assert_eq!(of(storage, "auto", 4, false), Sampling::Exact, "fewer samples than pay for quads");
     assert_eq!(of(storage, "hardware", 64, true), Sampling::Hardware);
     assert_eq!(of(textures, "exact", 64, true), Sampling::Exact);

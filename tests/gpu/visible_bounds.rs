@@ -124,7 +124,12 @@ fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
             for _ in 0..4000 {
                 let Some(at) = sampled(&scene, &mut noise).and_then(|place| texel(&scene, place)) else { continue };
                 let mixed = mixed(&scene, at);
-                assert!(scene.seen.holds(&mixed), "{name}: {at:?} is not of {:?}\n{:?}", scene.seen, scene.settings);
+                assert!(
+                    scene.visible_bounds.holds(&mixed),
+                    "{name}: {at:?} is not of {:?}\n{:?}",
+                    scene.visible_bounds,
+                    scene.settings
+                );
                 let old = found.unwrap_or(mixed);
                 found = Some(VisibleBounds {
                     low: std::array::from_fn(|a| old.low[a].min(mixed.low[a])),
@@ -140,7 +145,7 @@ fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
                 found.low.map(|n| n.saturating_sub(2)),
                 std::array::from_fn(|a| (found.high[a] + 2).min(size[a])),
             );
-            shares += count(scene.seen.low, scene.seen.high) / least;
+            shares += count(scene.visible_bounds.low, scene.visible_bounds.high) / least;
             cases += 1;
         }
         println!("{name}: {:.2} of the least box on average over {cases} scenes", shares / f64::from(cases));
@@ -153,10 +158,10 @@ fn samples_stay_within_the_visible_bounds_and_the_bounds_are_tight() {
 fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
     let all =
         |toml: &str| scene(Geometry::Sweep(wobbler()), BYTES, &format!("mode = 'vr'\nslices.pixels = 200\n{toml}"));
-    let whole = all("").seen;
+    let whole = all("").visible_bounds;
     assert_eq!(whole, VisibleBounds::all(all("").volume_size()));
     let cuts = |toml: &str| {
-        let seen = all(toml).seen;
+        let seen = all(toml).visible_bounds;
         let sides = (0..3).flat_map(|a| [seen.low[a] > whole.low[a] + 1, seen.high[a] + 1 < whole.high[a]]);
         sides.enumerate().filter(|(_, cut)| *cut).map(|(i, _)| i).collect::<Vec<_>>()
     };
@@ -169,7 +174,7 @@ fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
     assert_eq!(cuts("volume.start_depth = 30"), cuts("region.depth = [30, 90]"));
     assert_eq!(cuts("clip = [{ at = [5, 0, 0], normal = [2, 0, 0] }]"), [1]);
     assert_eq!(
-        all("clip = [{ at = [500, 0, 0], normal = [-1, 0, 0] }]").seen,
+        all("clip = [{ at = [500, 0, 0], normal = [-1, 0, 0] }]").visible_bounds,
         VisibleBounds::default(),
         "all is cut away"
     );
@@ -233,7 +238,7 @@ fn the_picture_equals_that_of_the_completely_filtered_volume() {
                 let picture = renderer.picture().expect("picture");
                 let distance = renderer.read(Slot::Distance).expect("read");
                 let drawn = renderer.read(Slot::Picture).expect("read").expect("there");
-                (renderer.scene().share_seen(), picture, distance, drawn)
+                (renderer.scene().visible_share(), picture, distance, drawn)
             };
             // The visible part first, so that nothing of the complete volume exists yet.
             let mut renderer = rendered(&device, made(false), &frames);
@@ -263,8 +268,12 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
     let device = Device::new();
     let smooth = ", median = true, smooth = { lateral = 1.0, elevation = 0.3 }";
     let scene = with("region = { lateral = [-4, 6], depth = [20, 30], elevation = [4, 9] }", smooth);
-    let frames = scene.frames_seen();
-    assert!(frames.len() < 8 && frames.len() > scene.seen.slices().len(), "{frames:?} of 9, {:?}", scene.seen);
+    let frames = scene.visible_frames();
+    assert!(
+        frames.len() < 8 && frames.len() > scene.visible_bounds.slices().len(),
+        "{frames:?} of 9, {:?}",
+        scene.visible_bounds
+    );
     let bright = speckle(&scene);
     let mut renderer = Renderer::new(&device, scene.clone(), &RendererOptions::default()).expect("renderer");
     let recorded = renderer
@@ -284,13 +293,14 @@ fn nothing_outside_the_visible_bounds_is_dispatched_uploaded_or_written() {
         };
         let each = extents.iter().all(|[x, y, _]| [x * run(0), y * run(1)] == made.size);
         assert!(each && made.size[0] < scene.grid.size[0] / 2, "{name}: {extents:?}, {made:?}");
-        let slices = if name == "gaussian_elevation" { scene.seen.slices().len() } else { frames.len() };
+        let slices = if name == "gaussian_elevation" { scene.visible_bounds.slices().len() } else { frames.len() };
         let run = if name == "gaussian_elevation" { 4 } else { 1 };
         assert_eq!(extents.iter().map(|e| e[2]).sum::<u32>(), (slices as u32).div_ceil(run), "{name}");
     }
-    for (slot, pass, slices) in
-        [(Slot::SharpVolume, "gaussian_lateral", frames), (Slot::Volume, "gaussian_elevation", scene.seen.slices())]
-    {
+    for (slot, pass, slices) in [
+        (Slot::SharpVolume, "gaussian_lateral", frames),
+        (Slot::Volume, "gaussian_elevation", scene.visible_bounds.slices()),
+    ] {
         let made =
             by_name(pass).expect("pass").rectangle(&scene, &DispatchArgs::default()).expect("a pass over slices");
         let volume = renderer.read(slot).expect("read").expect("there");

@@ -131,7 +131,11 @@ fn a_moving_view_keeps_its_packed_neighbours() {
         let still = scene(Geometry::Sweep(wobbler()), BYTES, &set);
         let moving = Scene::new(still.geometry.clone(), still.input, still.settings.moving()).expect("scene");
         assert!(moving.settings.ray.half);
-        assert_eq!(still.sampled(Sampling::Quads).sampling, moving.sampled(Sampling::Quads).sampling, "{size}");
+        assert_eq!(
+            still.sampled(Sampling::PackedNeighbours).sampling,
+            moving.sampled(Sampling::PackedNeighbours).sampling,
+            "{size}"
+        );
     }
 }
 

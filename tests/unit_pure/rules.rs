@@ -10,7 +10,7 @@ use echolume::scene::Scene;
 use echolume::shader_source;
 use echolume::spirv;
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Split, because this file is searched too.
@@ -293,4 +293,41 @@ fn pass_names_are_unique_and_stages_in_order() {
     names.sort();
     names.dedup();
     assert_eq!(names.len(), PASSES.len());
+}
+
+/// Identifiers in a text.
+fn identifiers(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty())
+}
+
+/// Names of the functions and constants that a file declares more visible than its own module, tests left out.
+fn exported(text: &str) -> Vec<&str> {
+    let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or(text);
+    let declared = |line: &'_ str| line.trim_start().starts_with("pub");
+    code.lines()
+        .filter(|line| declared(line))
+        .filter_map(|line| {
+            let mut words = identifiers(line).skip_while(|word| !["fn", "const", "static"].contains(word)).skip(1);
+            words.find(|word| !["fn", "unsafe", "async", "mut"].contains(word))
+        })
+        .collect()
+}
+
+#[test]
+fn nothing_is_public_that_no_other_file_uses() {
+    let folders = ["src", "tests", "benches", "tools/mutants/src", "tools/shaders/src", "tools/fuzz"];
+    let all: Vec<_> = folders.iter().filter(|f| repository(f).exists()).flat_map(|f| sources(f)).collect();
+    // Files that contain each identifier.
+    let mut users: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (name, text) in &all {
+        identifiers(text).for_each(|word| _ = users.entry(word).or_default().insert(name));
+    }
+    let unused: Vec<_> = all
+        .iter()
+        .filter(|(name, _)| name.starts_with("src/"))
+        .flat_map(|(name, text)| exported(text).into_iter().map(move |word| (name, word)))
+        .filter(|(name, word)| users[word].iter().all(|user| user == name))
+        .collect();
+    assert!(unused.is_empty(), "public, and used by no other file: {unused:?}");
+    assert_eq!(exported("pub const fn a() {}\n    pub(super) fn b()\nfn c()\npub static D: u8 = 0;"), ["a", "b", "D"]);
 }

@@ -111,14 +111,14 @@ impl Renderer {
             let (slots, pipeline, scene) = (&self.slots, &*self.steps[i], &self.scene);
             let runs: Vec<_> = match step.pass.frequency {
                 Frequency::Volume => {
-                    let (low, high) = (scene.seen.low[2], scene.seen.high[2]);
+                    let (low, high) = (scene.visible_bounds.low[2], scene.visible_bounds.high[2]);
                     let runs = affected(unprocessed, step.reach(scene)).into_iter();
                     runs.map(|run| run.start.max(low)..run.end.min(high)).filter(|run| !run.is_empty()).collect()
                 }
                 _ => std::iter::once(0..0).collect(),
             };
             if step.pass.frequency == Frequency::Volume && !runs.is_empty() {
-                self.filtered_bounds = scene.seen;
+                self.filtered_bounds = scene.visible_bounds;
             }
             for slices in runs {
                 let (slice, slices) = (slices.start, slices.end - slices.start);

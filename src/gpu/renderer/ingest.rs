@@ -23,7 +23,7 @@ impl InFlight {
         &mut self,
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
-        slots: &Slots,
+        slots: &SlotResources,
         place: SlotParts,
     ) -> Result<(), GpuError> {
         if let Some(target) = slots.image(place.slot, place.copy) {
@@ -69,7 +69,7 @@ impl Renderer {
         let at = first as usize * line;
         let follows = self.partial.as_ref().is_some_and(|a| (a.slice, a.image, a.received) == (slice, image, at));
         // No lines are kept of a frame that is not visible, so the order of its lines is not checked.
-        let is_visible = self.scene.frames_seen().contains(&slice);
+        let is_visible = self.scene.visible_frames().contains(&slice);
         if !bytes.len().is_multiple_of(line)
             || at + bytes.len() > frame_bytes
             || !(first == 0 || follows || !is_visible)
@@ -77,7 +77,7 @@ impl Renderer {
             let received = self.partial.as_ref().map_or(0, |a| a.received / line) as u32;
             return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), received });
         }
-        self.filtered_bounds = self.scene.seen;
+        self.filtered_bounds = self.scene.visible_bounds;
         if !is_visible {
             self.skipped += u64::from(first == 0);
             return Ok(at + bytes.len() == frame_bytes);
@@ -232,7 +232,7 @@ impl InFlight {
         &mut self,
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
-        slots: &Slots,
+        slots: &SlotResources,
         place: SlotParts,
         timings: &mut Timings,
     ) -> Result<(), GpuError> {

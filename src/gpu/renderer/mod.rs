@@ -9,7 +9,7 @@ use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake, embedded};
 use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, Slots, shape_size};
+use super::resources::{Buffer, Purpose, SlotResources, shape_size};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::chain;
@@ -97,7 +97,7 @@ pub struct Renderer {
     picture: Recorder,
     /// `None` if pictures stay on the device.
     readback: Option<Buffer>,
-    slots: Slots,
+    slots: SlotResources,
     steps: Vec<Arc<Pipeline>>,
     /// Started at its first use.
     compiler: Option<AsyncPipelineCompiler>,
@@ -160,7 +160,7 @@ impl Renderer {
             ring: Vec::new(),
             picture: Recorder::new(context, 0, "picture", options.spans)?,
             readback: options.readback.then(|| readback(context, &scene)).transpose()?,
-            slots: Slots::new(context, options.volume_images.max(1)),
+            slots: SlotResources::new(context, options.volume_images.max(1)),
             steps,
             compiler: None,
             pipelines,
@@ -178,7 +178,7 @@ impl Renderer {
             uploads: Vec::new(),
             volume_images: options.volume_images.max(1),
             plan,
-            filtered_bounds: scene.seen,
+            filtered_bounds: scene.visible_bounds,
             skipped: 0,
             scene,
             ring_index: 0,
@@ -296,8 +296,8 @@ impl Renderer {
 impl Renderer {
     /// True if `scene` differs from the current one, ignoring fields that the device resolves.
     pub fn differs_from(&self, scene: &Scene) -> bool {
-        (&scene.geometry, &scene.settings, scene.input, scene.seen)
-            != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.seen)
+        (&scene.geometry, &scene.settings, scene.input, scene.visible_bounds)
+            != (&self.scene.geometry, &self.scene.settings, self.scene.input, self.scene.visible_bounds)
     }
 
     /// True if the last change of scene failed halfway: nothing can be drawn until another change succeeds.
@@ -331,7 +331,7 @@ impl Renderer {
         let scene = formats::adapt_scene(&self.context, self.texel_access, scene);
         let plan = Plan::new(&scene);
         // After the visible region shrank, the volume still holds the larger one.
-        let before = Scene { seen: self.filtered_bounds, ..self.scene.clone() };
+        let before = Scene { visible_bounds: self.filtered_bounds, ..self.scene.clone() };
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
         formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
@@ -349,7 +349,7 @@ impl Renderer {
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;
         if !matches!(rerun, Rerun::Steps { .. }) {
-            self.filtered_bounds = self.scene.seen;
+            self.filtered_bounds = self.scene.visible_bounds;
         }
         self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)

@@ -4,7 +4,7 @@
 //! row or a column: four dispatches a step.
 
 use super::estimator::storable_edge;
-use super::perona_malik::{asked, conductance, constant};
+use super::perona_malik::{conductance, constant, need};
 use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scheme};
 
@@ -30,7 +30,7 @@ pub const SLICE: Pass = Pass {
         _ if t.writes_volume() => "filter/aos_backward.slice",
         _ => "filter/aos_backward.plane",
     },
-    needed: |s| asked(s.settings.slices.perona_malik, Scheme::Aos),
+    needed: |s| need(s.settings.slices.perona_malik, Scheme::Aos),
     reads: |_, t| SLICE_SLOTS.reads(t.source(), t),
     writes: |_, t| SLICE_SLOTS.writes(slice("target", t.target()), t),
     extent: |s, t| lines(s.grid.size, t),
@@ -51,7 +51,7 @@ pub const PICTURE: Pass = Pass {
         (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
         _ => "filter/aos_backward.picture",
     },
-    needed: |s| asked(s.settings.post.perona_malik, Scheme::Aos),
+    needed: |s| need(s.settings.post.perona_malik, Scheme::Aos),
     reads: |_, t| PICTURE_SLOTS.reads(t.source(), t),
     writes: |_, t| PICTURE_SLOTS.writes(whole("target", t.target()), t),
     extent: |s, t| lines(s.picture_size(), t),

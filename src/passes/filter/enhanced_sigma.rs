@@ -18,7 +18,7 @@ pub const SLICE: Pass = Pass {
         true => "filter/enhanced_sigma.slice",
         false => "filter/enhanced_sigma.plane",
     },
-    needed: |s| asked(s.settings.slices.enhanced_sigma),
+    needed: |s| need(s.settings.slices.enhanced_sigma),
     reads: reads_source,
     writes: writes_target,
     extent: slice_extent,
@@ -39,7 +39,7 @@ pub const DISTANCE: Pass = Pass {
     link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/enhanced_sigma.distance",
     needed: |s| match s.has_distance() {
-        true => asked(s.distance.enhanced_sigma),
+        true => need(s.distance.enhanced_sigma),
         false => Err("no distance map in this mode"),
     },
     reads: reads_source,
@@ -62,7 +62,7 @@ pub const PICTURE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/enhanced_sigma.picture",
-    needed: |s| asked(s.settings.post.enhanced_sigma),
+    needed: |s| need(s.settings.post.enhanced_sigma),
     reads: reads_source,
     writes: writes_target,
     extent: picture_extent,
@@ -108,7 +108,7 @@ pub const GROWTH: Pass = Pass {
 };
 
 /// A sigma of 0 keeps every pixel: no pass.
-fn asked(enhanced: Option<EnhancedSigma>) -> Need {
+fn need(enhanced: Option<EnhancedSigma>) -> Need {
     match enhanced {
         Some(e) if e.sigma > 0.0 => Ok("asked for"),
         Some(_) => Err("a sigma of 0 changes nothing"),

@@ -15,7 +15,7 @@ pub const LATERAL: Pass = Pass {
     shader: |_, t| {
         if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
-    needed: |s| asked(s, 0),
+    needed: |s| need(s, 0),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 0),
@@ -32,7 +32,7 @@ pub const DEPTH: Pass = Pass {
     shader: |_, t| {
         if t.writes_volume() { "filter/gaussian.slice" } else { "filter/gaussian.plane" }
     },
-    needed: |s| asked(s, 1),
+    needed: |s| need(s, 1),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
@@ -48,7 +48,7 @@ pub const ELEVATION: Pass = Pass {
     frequency: Frequency::Volume,
     link: Link::AfterSlices,
     shader: |_, _| "filter/gaussian.volume",
-    needed: |s| asked(s, 2),
+    needed: |s| need(s, 2),
     reads: |s, _| {
         let part = Part::Around(s.smoothing_radius()[2]);
         vec![Bind { part, ..whole("source", Slot::SharpVolume) }]
@@ -62,7 +62,7 @@ pub const ELEVATION: Pass = Pass {
     reference: |s, t, reads, writes| reference(s, 2, t, reads, writes),
 };
 
-fn asked(scene: &Scene, axis: usize) -> Need {
+fn need(scene: &Scene, axis: usize) -> Need {
     if scene.smoothing()[axis] > 0.0 { Ok("asked for") } else { Err("not asked for") }
 }
 

@@ -16,7 +16,7 @@ pub const SLICE: Pass = Pass {
         true => "filter/perona_malik.slice",
         false => "filter/perona_malik.plane",
     },
-    needed: |s| asked(s.settings.slices.perona_malik, Scheme::Explicit),
+    needed: |s| need(s.settings.slices.perona_malik, Scheme::Explicit),
     reads: reads_source,
     writes: writes_target,
     extent: slice_extent,
@@ -34,7 +34,7 @@ pub const DISTANCE: Pass = Pass {
     link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/perona_malik.distance",
     needed: |s| match s.has_distance() {
-        true => asked(s.distance.perona_malik, Scheme::Explicit),
+        true => need(s.distance.perona_malik, Scheme::Explicit),
         false => Err("no distance map in this mode"),
     },
     reads: reads_source,
@@ -53,7 +53,7 @@ pub const PICTURE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/perona_malik.picture",
-    needed: |s| asked(s.settings.post.perona_malik, Scheme::Explicit),
+    needed: |s| need(s.settings.post.perona_malik, Scheme::Explicit),
     reads: reads_source,
     writes: writes_target,
     extent: picture_extent,
@@ -65,7 +65,7 @@ pub const PICTURE: Pass = Pass {
 };
 
 /// An edge of 0 keeps every pixel: no pass.
-pub(super) fn asked(settings: Option<PeronaMalik>, scheme: Scheme) -> Need {
+pub(super) fn need(settings: Option<PeronaMalik>, scheme: Scheme) -> Need {
     match settings {
         Some(p) if p.edge == 0.0 => Err("an edge of 0 changes nothing"),
         Some(p) if p.scheme == scheme => Ok("asked for"),

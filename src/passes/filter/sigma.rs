@@ -14,7 +14,7 @@ pub const SLICE: Pass = Pass {
     frequency: Frequency::Frame,
     link: Link::Filter(Filter::of_slices(|s| Some([radius(s.settings.slices.sigma); 2]))),
     shader: |_, t| if t.writes_volume() { "filter/sigma.slice" } else { "filter/sigma.plane" },
-    needed: |s| asked(s.settings.slices.sigma),
+    needed: |s| need(s.settings.slices.sigma),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(slice_extent(s, t), 1),
@@ -31,7 +31,7 @@ pub const DISTANCE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::Filter(Filter::of(Chain::Distances)),
     shader: |_, _| "filter/sigma.distance",
-    needed: |s| if s.has_distance() { asked(s.distance.sigma) } else { Err("no distance map in this mode") },
+    needed: |s| if s.has_distance() { need(s.distance.sigma) } else { Err("no distance map in this mode") },
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(ray_extent(s, t), 1),
@@ -48,7 +48,7 @@ pub const PICTURE: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::Filter(Filter::of(Chain::Pictures)),
     shader: |_, _| "filter/sigma.picture",
-    needed: |s| asked(s.settings.post.sigma),
+    needed: |s| need(s.settings.post.sigma),
     reads: reads_source,
     writes: writes_target,
     extent: |s, t| in_runs(picture_extent(s, t), 1),
@@ -60,7 +60,7 @@ pub const PICTURE: Pass = Pass {
 };
 
 /// A sigma of 0 keeps every pixel: no pass.
-fn asked(sigma: Option<scene::Sigma>) -> Need {
+fn need(sigma: Option<scene::Sigma>) -> Need {
     match sigma {
         Some(s) if s.sigma > 0.0 => Ok("asked for"),
         Some(_) => Err("a sigma of 0 changes nothing"),

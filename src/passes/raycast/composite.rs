@@ -67,7 +67,7 @@ impl March {
         let (mut n, mut from) = (0.0, 0.0);
         while from < self.path {
             let to = offset(n + 1.0).min(self.path);
-            if let Some([r, g, b, kappa]) = self.seen(medium, [from, to], n) {
+            if let Some([r, g, b, kappa]) = self.contribution(medium, [from, to], n) {
                 let y = kappa * (to - from) / self.reference_length;
                 let a = if self.rule == Rule::Riemann { y.min(1.0) } else { transfer::opacity(y) };
                 let emitted = if self.rule == Rule::PreIntegratedUnshaded { y } else { a };
@@ -88,7 +88,7 @@ impl March {
         ([light[0], light[1], light[2], opacity], hit)
     }
 
-    fn seen(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<[f64; 4]> {
+    fn contribution(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<[f64; 4]> {
         match self.rule {
             Rule::Riemann | Rule::Corrected => medium.at(Place { offset: (from + to) / 2.0, n: n + 0.5 }),
             Rule::CorrectedLeft => medium.at(Place { offset: from, n }),

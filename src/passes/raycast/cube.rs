@@ -58,7 +58,7 @@ pub const PASS: Pass = Pass {
         let block = scene.block();
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                picture.set([x, y, 0], &shown(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
+                picture.set([x, y, 0], &reference_pixel(scene, volume, &block, x as f64 + 0.5, y as f64 + 0.5));
             }
         }
     },
@@ -87,7 +87,7 @@ fn entry(block: &[HalfSpace], origin: DVec3, direction: DVec3) -> Option<(f64, f
     (leave > enter).then_some((enter, leave, face))
 }
 
-fn shown(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, y: f64) -> [f64; 4] {
+fn reference_pixel(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, y: f64) -> [f64; 4] {
     let (origin, direction) = scene.rays.at(x, y);
     let Some((enter, leave, face)) = entry(block, origin, direction) else { return [0.0; 4] };
     let steps = ((leave - enter) / stride(scene)).ceil().max(1.0);

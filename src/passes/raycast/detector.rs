@@ -40,11 +40,11 @@ pub(super) fn detect(scene: &Scene, samples: &[Option<f64>], first: i64) -> Opti
         bordered,
         ring: scene.ring,
     };
-    let mut state = State { noise: Noise::default(), weak: None, seen: 0 };
+    let mut state = State { noise: Noise::default(), weak: None, surfaces_passed: 0 };
     match ray.search(&mut state) {
         End::Surface(place, echo) => Some((place, echo)),
         End::Nothing => None,
-        End::Ray if state.seen + 1 == ray.settings.number => ray.second_look(&state.weak?),
+        End::Ray if state.surfaces_passed + 1 == ray.settings.number => ray.second_look(&state.weak?),
         End::Ray => None,
     }
 }
@@ -62,7 +62,7 @@ struct Weak {
 struct State {
     noise: Noise,
     weak: Option<Weak>,
-    seen: u32,
+    surfaces_passed: u32,
 }
 
 impl State {
@@ -234,12 +234,12 @@ impl Ray<'_> {
                 }
                 let noise = state.noise;
                 if self.crosses(at, from, fresh, |i| self.bar(self.settings.threshold, &noise, i, 1)) {
-                    let wanted = state.seen + 1 == self.settings.number;
+                    let wanted = state.surfaces_passed + 1 == self.settings.number;
                     let beyond = self.beyond(at, from, None);
                     match self.follow(at, from, wanted, None) {
                         Followed::Surface(place, echo) if wanted => return End::Surface(place, echo),
                         Followed::Surface(..) => {
-                            state.seen += 1;
+                            state.surfaces_passed += 1;
                             state.weak = None;
                             state.noise = Noise::default();
                             (i, since) = (beyond, beyond);
@@ -467,7 +467,7 @@ mod tests {
         let ring = Ring::new(Edge::Length(1.0), step, settings.threshold);
         let samples: Vec<_> = (0..40 * half).map(|i| Some(profile((f64::from(i) + 0.5) * step))).collect();
         let ray = Ray { settings, polarity: 1.0, samples: &samples, first: 0, bordered: true, ring };
-        match ray.search(&mut State { noise: Noise::default(), weak: None, seen: 0 }) {
+        match ray.search(&mut State { noise: Noise::default(), weak: None, surfaces_passed: 0 }) {
             End::Surface(place, _) => Some((place + 0.5) * step),
             _ => None,
         }

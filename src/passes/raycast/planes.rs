@@ -70,7 +70,7 @@ pub const TONED: Pass = Pass {
         let [width, height, _] = screen.size;
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let colour = value_at(scene, volume, &sheet, x, y).map(|v| [v; 3]);
-            screen.set([x, y, 0], &postprocess::shown(scene, Some(&sheet), colour, x, y));
+            screen.set([x, y, 0], &postprocess::reference_pixel(scene, Some(&sheet), colour, x, y));
         }
     },
     ..PASS

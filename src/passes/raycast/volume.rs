@@ -120,14 +120,14 @@ fn depth_axis(scene: &Scene) -> (DVec3, f64) {
 }
 
 /// The volume along a ray, through the transfer function and the tints by depth.
-struct Seen<'a> {
+struct RayMedium<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
     table: &'a Texels,
     depth_axis: (DVec3, f64),
 }
 
-impl Seen<'_> {
+impl RayMedium<'_> {
     fn tinted(&self, rgba: [f64; 4], offset: f64) -> [f64; 4] {
         let settings = &self.scene.settings.volume;
         if settings.shading != Shading::DepthCoded {
@@ -140,7 +140,7 @@ impl Seen<'_> {
     }
 }
 
-impl Medium for Seen<'_> {
+impl Medium for RayMedium<'_> {
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let value = self.ray.sample(place.offset, place.n)?;
         Some(self.tinted(looked_up(self.table, value), place.offset))
@@ -161,8 +161,8 @@ fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
         early_end: scene.settings.ray.early_end,
         hit: scene.settings.volume.hit,
     };
-    let seen = Seen { scene, ray, table, depth_axis: depth_axis(scene) };
-    let (colour, hit) = march.through(&seen, |n| ray.offset(n));
+    let medium = RayMedium { scene, ray, table, depth_axis: depth_axis(scene) };
+    let (colour, hit) = march.through(&medium, |n| ray.offset(n));
     (colour, hit.map_or(MISS, |offset| ray.enter + offset))
 }
 

@@ -26,7 +26,6 @@ pub mod command {
 pub mod axis {
     pub const TARGET: u8 = 0;
     pub const POSITION: u8 = 1;
-    pub const TARGET_SPEED: u8 = 2;
     pub const SPEED: u8 = 3;
     pub const MAX_SPEED: u8 = 4;
     pub const MAX_ACCELERATION: u8 = 5;

@@ -85,7 +85,8 @@ pub enum Sampling {
     Exact,
     /// Like `exact`, from two texels that hold four packed neighbours each. For volumes of 8 or 16 bits. Needs four times the volume's
     /// memory in addition, and one more pass over every new slice.
-    Quads,
+    #[serde(rename = "quads")]
+    PackedNeighbours,
 }
 
 impl Sampling {
@@ -95,7 +96,7 @@ impl Sampling {
             Sampling::Auto => "the fastest for the device",
             Sampling::Hardware => "by the device's trilinear filter",
             Sampling::Exact => "eight texels each, interpolated in f32",
-            Sampling::Quads => "two texels of four neighbours each, interpolated in f32",
+            Sampling::PackedNeighbours => "two texels of four neighbours each, interpolated in f32",
         }
     }
 }

@@ -176,7 +176,7 @@ pub(super) fn ellipsoid(p: Vec3, centre: Vec3, radii: Vec3) -> f32 {
 }
 
 /// A rod with round ends, its radius interpolated between two values.
-pub(super) fn rod(p: Vec3, from: Vec3, to: Vec3, radii: [f32; 2]) -> f32 {
+fn rod(p: Vec3, from: Vec3, to: Vec3, radii: [f32; 2]) -> f32 {
     let along = to - from;
     let share = ((p - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
     (p - from - along * share).length() - radii[0] - (radii[1] - radii[0]) * share
@@ -189,7 +189,7 @@ pub(super) fn join(a: f32, b: f32, width: f32) -> f32 {
 }
 
 /// `a` without `b`, its edge rounded over `width` mm.
-pub(super) fn carve(a: f32, b: f32, width: f32) -> f32 {
+fn carve(a: f32, b: f32, width: f32) -> f32 {
     -join(-a, b, width)
 }
 

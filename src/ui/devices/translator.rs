@@ -75,7 +75,7 @@ impl Device {
     }
 
     /// Sets the queried state. The keys that are held do not change.
-    pub(super) fn reset_to(&mut self, state: &State, area: &Area, out: &mut Vec<Input>) {
+    fn reset_to(&mut self, state: &State, area: &Area, out: &mut Vec<Input>) {
         (self.needs_resync, self.skips_report, self.pending) = (false, false, PendingReport::default());
         self.fingers.cancel_all(area, out);
         self.fingers.select_slot(if matches!(self.profile.pointing, Pointing::Fingers(_)) { state.slot } else { 0 });

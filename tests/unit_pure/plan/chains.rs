@@ -86,7 +86,7 @@ fn renderings_with_several_rays_or_planes_use_an_intermediate_slot() {
 /// A slice of 400 x 400 of which columns and rows from `low` up to `high` are visible.
 fn seen(filters: &str, low: u32, high: u32) -> Scene {
     let scene = scene(voxels([400, 400, 3]), &format!("mode = 'mip'\nslices = {{ {filters} }}"));
-    Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..scene }
+    Scene { visible_bounds: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..scene }
 }
 
 /// How many columns and rows around the visible bounds a pass writes, from where complete workgroups of 32 are added: to the left and right, above
@@ -94,7 +94,8 @@ fn seen(filters: &str, low: u32, high: u32) -> Scene {
 fn around(filters: &str, pass: &str, iteration: u32) -> [u32; 4] {
     let whole = seen(filters, 192, 224);
     let of = |low, high| {
-        let scene = Scene { seen: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..whole.clone() };
+        let scene =
+            Scene { visible_bounds: VisibleBounds { low: [low, low, 0], high: [high, high, 3] }, ..whole.clone() };
         self::pass(pass).rectangle(&scene, &args(iteration)).expect("a rectangle")
     };
     let before = |axis: usize| (192..224).filter(|low| of(*low, 230).first[axis] == 160).count() as u32;

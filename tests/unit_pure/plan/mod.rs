@@ -119,6 +119,9 @@ fn what_lies_beside_the_sector_is_an_empty_box_and_not_one_turned_inside_out() {
     for side in [[30.0, 38.0], [-38.0, -30.0]] {
         let settings = format!("mode = 'mip'\nregion = {{ lateral = {side:?}, depth = [2, 6] }}");
         let scene = scene(fan(Advance::None), &settings);
-        assert_eq!((scene.seen, scene.share_seen(), scene.frames_seen()), (VisibleBounds::default(), 0.0, 0..0));
+        assert_eq!(
+            (scene.visible_bounds, scene.visible_share(), scene.visible_frames()),
+            (VisibleBounds::default(), 0.0, 0..0)
+        );
     }
 }

@@ -111,7 +111,7 @@ fn slots_of_another_shape_format_or_meaning_are_created_again() {
 #[test]
 fn smaller_visible_bounds_keep_the_volume_and_larger_ones_need_frames() {
     let (all, less) = (with(""), with("region = { depth = [10, 20] }"));
-    assert!(all.seen.holds(&less.seen) && all.seen != less.seen);
+    assert!(all.visible_bounds.holds(&less.visible_bounds) && all.visible_bounds != less.visible_bounds);
     assert_eq!(passes(&all, &less), "raycast_surface median_distance bilateral_distance light tone");
     assert_eq!(rerun(&less, &all), Rerun::Frames);
 }
