@@ -2,11 +2,13 @@
 
 use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
+use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
+use crate::passes::PassTime;
 use crate::plan::Plan;
 use crate::profile::export::pass_time_table;
 use crate::scene::Scene;
@@ -83,8 +85,9 @@ impl Render {
         let picture = renderer.picture().map_err(failed)?;
         picture.save(&self.output).map_err(failed)?;
         say!("picture: {}", self.output.display());
+        let measured = renderer.take_times().map_err(failed)?;
+        self.judge_budget(&measured)?;
         if self.timings {
-            let measured = renderer.take_times().map_err(failed)?;
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }
         if let Some(folder) = &self.dump {
@@ -115,10 +118,24 @@ impl Render {
             return Err(input(fault));
         }
         let measure = Measure::Rmse;
-        let choice = choose::most_accurate_under(&report, measure, time, 0.1)
+        let chosen = choose::choose(&report, measure, Bound::Time(time), &[])
             .map_err(|e| failed(format!("--budget {budget}: {e}")))?;
-        say!("budget {budget}: {}, measured on {}", choice.describe(measure), report.device);
+        let choice = &report.choices[chosen];
+        let of = if report.is_of(&scene) { "this scene" } else { "another scene, whose error it is" };
+        say!("budget {budget}: {}, measured on {} with {of}", choice.describe(measure), report.device);
         self.input.open_with(&choice.set)
+    }
+
+    /// Says whether the picture kept the budget.
+    fn judge_budget(&self, times: &[PassTime]) -> Result<(), Failure> {
+        let Some(budget) = &self.budget else { return Ok(()) };
+        let (time, taken) = (parse_nanoseconds("--budget", budget)?, times.iter().map(|t| t.total).sum::<f64>());
+        let kept = if taken <= time { "within" } else { "over" };
+        match times.is_empty() {
+            true => say!("budget {budget}: this device has no time stamps"),
+            false => say!("budget {budget}: volume and picture took {:.3} ms, {kept} the budget", taken * 1e-6),
+        }
+        Ok(())
     }
 
     fn options(&self) -> Result<RendererOptions, Failure> {

@@ -1,231 +1,225 @@
-//! Chooses settings from a report: the cheapest within an error bound, or the most accurate within a time bound, over all dials that
-//! trade error for time. A dial of another look is never turned.
+//! Chooses settings: the fastest within an error bound, or the most accurate within a time bound. Only numerical settings are turned:
+//! a choice computes the same picture.
 //!
-//! A report varies one dial at a time. The effect of several changes is predicted: squared errors add (as those of independent
-//! errors do), and each change multiplies the time by its own factor. Verify a choice by measuring it.
+//! A dial is measured alone, and neither errors nor times of several changes follow from those of each. So the dials only propose
+//! combinations ([`proposals`]); [`measure`] renders each proposal, and a choice is made among the measured ones.
+//!
+//! [`measure`]: super::measure
 
-use super::{Dial, Measure, Report};
+use super::{Combination, Dial, Measure, Point, Report, Time, Times};
+use std::fmt::Write as _;
 
-/// Relative difference below which two times count as equal while dials are combined. It bounds the number of combinations, and may
-/// add the same relative error for every dial.
+/// Relative difference below which two predicted times count as equal. It bounds the number of proposals.
 const SAME_TIME: f64 = 1e-4;
+/// Share of the time bound that the 95th percentile of a choice leaves free: another run is slower.
+pub const TIME_MARGIN: f64 = 0.1;
 
-/// Chosen settings, with predicted error and time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// Changes from the default: name of the dial and label of the point.
-    pub changed: Vec<(String, String)>,
-    /// Their assignments, "key=value" as `--set` takes them.
-    pub set: Vec<String>,
-    /// Predicted error by the requested measure, without margin.
-    pub error: f64,
-    /// Predicted time, ns, without margin.
-    pub time: f64,
-    /// Dials that could not be combined: their default point is missing, or has no time or no such error.
-    pub left_out: Vec<String>,
+/// A bound that a choice keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    /// Largest error by the measure, in its unit.
+    Error(f64),
+    /// Longest time of a volume and its picture, ns.
+    Time(f64),
 }
 
-/// The fastest settings whose predicted error, made larger by the share `margin`, is at most `error`.
+/// The combination to take: with an error bound the fastest that keeps it, with a time bound the most accurate. Times whose ranges
+/// overlap are equal; of those the most accurate is taken. `refused`: combinations that are no choice, by index.
 ///
 /// # Errors
-/// One line: nothing was timed, or no combination is as accurate. It names the most accurate one.
-pub fn cheapest_under(report: &Report, measure: Measure, error: f64, margin: f64) -> Result<Choice, String> {
-    let (all, base) = combinations(report, measure)?;
-    let within = |c: &&Combination| c.square.sqrt() * (1.0 + margin) <= error;
-    // Sorted by time; errors decrease.
-    match (all.iter().find(within), all.last()) {
-        (Some(found), _) => Ok(base.choice(report, found)),
-        (None, Some(best)) => {
-            let best = base.choice(report, best);
-            Err(format!(
-                "no setting has {} or less{}: the most accurate {}",
-                measure.format(error),
-                with_margin(margin),
-                best.describe(measure)
-            ))
-        }
-        (None, None) => Err("error report: no setting was measured".into()),
-    }
-}
-
-/// The most accurate settings whose predicted time, made longer by the share `margin`, is at most `time` ns.
-///
-/// # Errors
-/// One line: nothing was timed, or no combination is as fast. It names the fastest one.
-pub fn most_accurate_under(report: &Report, measure: Measure, time: f64, margin: f64) -> Result<Choice, String> {
-    let (all, base) = combinations(report, measure)?;
-    let within = |c: &&Combination| base.time * c.log_time.exp() * (1.0 + margin) <= time;
-    match (all.iter().rev().find(within), all.first()) {
-        (Some(found), _) => Ok(base.choice(report, found)),
-        (None, Some(best)) => {
-            let (limit, best) = (time * 1e-6, base.choice(report, best));
-            Err(format!(
-                "no setting takes {limit:.3} ms or less{}: the fastest {}",
-                with_margin(margin),
-                best.describe(measure)
-            ))
-        }
-        (None, None) => Err("error report: no setting was measured".into()),
-    }
-}
-
-/// The Pareto front of all choices, from the fastest to the most accurate, and the time of all defaults, ns.
-///
-/// # Errors
-/// One line: nothing was timed.
-pub fn front(report: &Report, measure: Measure) -> Result<(Vec<Choice>, f64), String> {
-    let (all, base) = combinations(report, measure)?;
-    Ok((all.iter().map(|c| base.choice(report, c)).collect(), base.time))
-}
-
-fn with_margin(margin: f64) -> String {
-    if margin > 0.0 { format!(" with a margin of {:.0} %", margin * 100.0) } else { String::new() }
-}
-
-impl Choice {
-    /// "(ray.step=0.25) has RMSE 1.0e-3 and takes 12.000 ms".
-    pub fn describe(&self, measure: Measure) -> String {
-        let set = if self.set.is_empty() { "the default".to_string() } else { self.set.join(" ") };
-        format!("({set}) has {} and takes {:.3} ms", measure.format(self.error), self.time * 1e-6)
-    }
-}
-
-/// A candidate change within a group of dials of which at most one may change.
-struct Step {
-    /// Dial and point; None leaves all at their defaults.
-    point: Option<(usize, usize)>,
-    square: f64,
-    log_time: f64,
-}
-
-/// Settings of all dials combined so far.
-#[derive(Clone)]
-struct Combination {
-    points: Vec<(usize, usize)>,
-    square: f64,
-    log_time: f64,
-}
-
-struct Base {
-    time: f64,
-    left_out: Vec<String>,
-}
-
-impl Base {
-    fn choice(&self, report: &Report, found: &Combination) -> Choice {
-        let point = |(d, p): &(usize, usize)| (&report.dials[*d], &report.dials[*d].points[*p]);
-        Choice {
-            changed: found.points.iter().map(point).map(|(d, p)| (d.name.clone(), p.label.clone())).collect(),
-            set: found.points.iter().flat_map(|at| point(at).1.set.clone()).collect(),
-            error: found.square.sqrt(),
-            time: self.time * found.log_time.exp(),
-            left_out: self.left_out.clone(),
-        }
-    }
-}
-
-/// The Pareto front of all combinations, from the fastest to the most accurate. Both sums are additive over dials, so a combination
-/// that is dominated on the way stays dominated.
-fn combinations(report: &Report, measure: Measure) -> Result<(Vec<Combination>, Base), String> {
-    let default = |dial: &Dial| {
-        let point = dial.points.iter().find(|p| p.is_default)?;
-        Some((point.time.filter(|t| t.median > 0.0)?, measure.of(&point.errors)?))
-    };
-    if !report.dials.iter().flat_map(|d| &d.points).any(|p| p.time.is_some()) {
-        return Err(format!("{}: no time was measured, this device has no time stamps", report.device));
-    }
-    let of_errors = (0..report.dials.len()).filter(|d| !report.dials[*d].is_look());
-    let (usable, unusable): (Vec<_>, Vec<_>) = of_errors.partition(|d| default(&report.dials[*d]).is_some());
-    let left_out = unusable.iter().map(|d| report.dials[*d].name.clone()).collect();
-    // The default picture was timed once for each dial.
-    let mut times: Vec<f64> = usable.iter().filter_map(|d| Some(default(&report.dials[*d])?.0.median)).collect();
-    times.sort_by(f64::total_cmp);
-    let Some(time) = times.get(times.len() / 2) else {
-        return Err("error report: no dial has a default point with a time and this error to compare with".into());
-    };
-    let mut all = vec![Combination { points: vec![], square: 0.0, log_time: 0.0 }];
-    for group in groups(report, &usable) {
-        let steps = steps(report, measure, &group);
-        let combined = all.iter().flat_map(|c| {
-            steps.iter().map(|t| Combination {
-                points: c.points.iter().copied().chain(t.point).collect(),
-                square: c.square + t.square,
-                log_time: c.log_time + t.log_time,
-            })
+/// One line: nothing was timed, or no measured combination keeps the bound. It names the nearest.
+pub fn choose(report: &Report, measure: Measure, bound: Bound, refused: &[usize]) -> Result<usize, String> {
+    let all: Vec<Candidate> = candidates(report, measure).collect();
+    if all.is_empty() {
+        return Err(match report.choices.iter().any(|c| c.times.is_some()) {
+            true => format!("error report: no settings have an {}", measure.name()),
+            false => format!("{}: no time was measured, this device has no time stamps", report.device),
         });
-        all = thinned(combined.collect());
     }
-    Ok((all, Base { time: *time, left_out }))
-}
-
-/// The candidates of a group: all defaults, and each other point alone.
-fn steps(report: &Report, measure: Measure, group: &[usize]) -> Vec<Step> {
-    let mut steps = Vec::new();
-    for &d in group {
-        let dial = &report.dials[d];
-        let others: f64 = group.iter().filter(|o| **o != d).map(|o| default_square(&report.dials[*o], measure)).sum();
-        let Some(base) = dial.points.iter().find(|p| p.is_default).and_then(|p| p.time) else { continue };
-        for (p, point) in dial.points.iter().enumerate().filter(|(_, p)| !p.is_default) {
-            let (Some(time), Some(error)) = (point.time.filter(|t| t.median > 0.0), measure.of(&point.errors)) else {
-                continue;
+    let open = |c: &&Candidate| !refused.contains(&c.index);
+    let by_time = |a: &&Candidate, b: &&Candidate| a.times[1].total_cmp(&b.times[1]);
+    let by_error = |a: &&Candidate, b: &&Candidate| a.error.total_cmp(&b.error).then(a.times[1].total_cmp(&b.times[1]));
+    let describe = |c: &Candidate| report.choices[c.index].describe(measure);
+    match bound {
+        Bound::Error(error) => {
+            let kept = |c: &&Candidate| c.error <= error && open(c);
+            let Some(fastest) = all.iter().filter(kept).min_by(by_time) else {
+                let best = all.iter().min_by(by_error).map_or(String::new(), describe);
+                return Err(format!("no settings hold {}: the most accurate are {best}", measure.format(error)));
             };
-            // A gain within the spread of the repeats does not count; a loss counts in full.
-            let factor =
-                if time.high >= base.low { (time.median / base.median).max(1.0) } else { time.median / base.median };
-            steps.push(Step { point: Some((d, p)), square: others + error * error, log_time: factor.ln() });
+            let as_fast = |c: &&Candidate| kept(c) && c.times[0] <= fastest.times[2];
+            Ok(all.iter().filter(as_fast).min_by(by_error).unwrap_or(fastest).index)
+        }
+        Bound::Time(time) => {
+            let kept = |c: &&Candidate| c.p95 * (1.0 + TIME_MARGIN) <= time && open(c);
+            let found = all.iter().filter(kept).min_by(by_error).ok_or_else(|| {
+                let best = all.iter().min_by(by_time).map_or(String::new(), describe);
+                format!(
+                    "no settings take {:.3} ms or less with a margin of {:.0} %: the fastest are {best}",
+                    time * 1e-6,
+                    100.0 * TIME_MARGIN
+                )
+            })?;
+            Ok(found.index)
         }
     }
-    let square = group.iter().map(|d| default_square(&report.dials[*d], measure)).sum();
-    steps.push(Step { point: None, square, log_time: 0.0 });
-    steps
 }
 
-fn default_square(dial: &Dial, measure: Measure) -> f64 {
-    let error = dial.points.iter().find(|p| p.is_default).and_then(|p| measure.of(&p.errors));
-    error.map_or(0.0, |e| e * e)
+/// The Pareto front of the measured combinations, from the fastest to the most accurate: indices into the report's choices.
+pub fn front(report: &Report, measure: Measure) -> Vec<usize> {
+    let all: Vec<Candidate> = candidates(report, measure).collect();
+    let pairs: Vec<[f64; 2]> = all.iter().map(|c| [c.times[1], c.error]).collect();
+    super::pareto_front(&pairs).into_iter().map(|i| all[i].index).collect()
 }
 
-/// Groups of dials that assign the same setting, or one within the other: at most one dial of each group may change.
-fn groups(report: &Report, dials: &[usize]) -> Vec<Vec<usize>> {
-    let keys = |d: usize| {
-        let sets = report.dials[d].points.iter().filter(|p| !p.is_default).flat_map(|p| &p.set);
-        sets.map(|s| s.split('=').next().unwrap_or(s).trim()).collect::<Vec<_>>()
+struct Candidate {
+    index: usize,
+    /// The error, and that of its reference in addition: an upper limit.
+    error: f64,
+    /// Least, median and greatest, ns.
+    times: [f64; 3],
+    p95: f64,
+}
+
+fn candidates(report: &Report, measure: Measure) -> impl Iterator<Item = Candidate> {
+    report.choices.iter().enumerate().filter_map(move |(index, c)| {
+        let (error, time) = (c.error_limit(measure)?, c.times?.total);
+        Some(Candidate { index, error, times: [time.low, time.median, time.high], p95: time.p95 })
+    })
+}
+
+impl Combination {
+    /// The error, and that of its reference in addition: an upper limit by the triangle inequality. For distances and normals, whose
+    /// reference has no estimate, the error alone.
+    pub fn error_limit(&self, measure: Measure) -> Option<f64> {
+        let own = if measure == Measure::Rmse { self.reference_error } else { 0.0 };
+        measure.of(&self.errors).map(|error| error + own)
+    }
+
+    /// "(ray.step=0.25): RMSE 1.0e-3, 12.000 ms (95th percentile 13.100)".
+    pub fn describe(&self, measure: Measure) -> String {
+        let mut text =
+            format!("({})", if self.set.is_empty() { "the scene as it is".into() } else { self.set.join(" ") });
+        if let Some(error) = measure.of(&self.errors) {
+            let _ = write!(text, ": {}", measure.format(error));
+        }
+        if let Some(times) = &self.times {
+            let _ =
+                write!(text, ", {:.3} ms (95th percentile {:.3})", times.total.median * 1e-6, times.total.p95 * 1e-6);
+        }
+        text
+    }
+}
+
+/// Changes of several dials at once: index of the dial and of its point.
+pub type Changes = Vec<(usize, usize)>;
+
+/// Combinations that may lie on the Pareto front, at most `most`, evenly over the time that is predicted for them: squared errors add,
+/// as those of independent errors do, and each change multiplies the time by its own factor. The first is the scene as it is. With a
+/// bound, those near it come first.
+pub fn proposals(dials: &[Dial], bound: Option<Bound>, most: usize) -> Vec<Changes> {
+    let turned: Vec<usize> =
+        (0..dials.len()).filter(|d| dials[*d].is_numerical && default(&dials[*d]).is_some()).collect();
+    let mut all = vec![Proposal { changes: Vec::new(), square: 0.0, log_time: 0.0 }];
+    for group in groups(dials, &turned) {
+        let steps: Vec<Proposal> = group.iter().flat_map(|d| steps(*d, &dials[*d])).collect();
+        let longer = |a: &Proposal, b: &Proposal| Proposal {
+            changes: a.changes.iter().chain(&b.changes).copied().collect(),
+            square: a.square + b.square,
+            log_time: a.log_time + b.log_time,
+        };
+        let with = all.iter().flat_map(|a| steps.iter().map(move |b| longer(a, b))).collect::<Vec<_>>();
+        all.extend(with);
+        all = thinned(all);
+    }
+    // The dials' defaults differ from one another: each is against its own reference.
+    let defaults = turned.iter().filter_map(|d| default(&dials[*d]));
+    let (square, time) =
+        defaults.fold((0.0f64, 0.0f64), |(s, t), (error, times)| (s.max(error.powi(2)), t.max(times.total.median)));
+    let away = |p: &Proposal| match bound {
+        Some(Bound::Error(error)) => ((p.square + square).max(0.0).sqrt().max(1e-12) / error).ln().abs(),
+        Some(Bound::Time(limit)) => (p.log_time.exp() * time / limit).ln().abs(),
+        None => 0.0,
     };
-    let within = |a: &str, b: &str| b.strip_prefix(a).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    let clash = |a: usize, b: usize| {
-        let (a, b) = (keys(a), keys(b));
-        a.iter().any(|a| b.iter().any(|b| within(a, b) || within(b, a)))
+    let mut kept = vec![Vec::new()];
+    let rest: Vec<&Proposal> = all.iter().filter(|p| !p.changes.is_empty()).collect();
+    let count = rest.len().min(most.saturating_sub(1));
+    let mut near: Vec<&Proposal> = rest.clone();
+    near.sort_by(|a, b| away(a).total_cmp(&away(b)));
+    // Half of them near the bound, the others from end to end.
+    let nearest = if bound.is_some() { count / 2 } else { 0 };
+    let even = (0..count - nearest).map(|i| rest[i * (rest.len() - 1) / (count - nearest).max(2).saturating_sub(1)]);
+    for p in near.iter().take(nearest).copied().chain(even) {
+        if !kept.contains(&p.changes) {
+            kept.push(p.changes.clone());
+        }
+    }
+    kept
+}
+
+/// What is predicted for some changes, relative to the scene as it is.
+struct Proposal {
+    changes: Changes,
+    /// Change of the squared error; negative where the error falls.
+    square: f64,
+    log_time: f64,
+}
+
+/// RMSE and median times of the default point.
+fn default(dial: &Dial) -> Option<(f64, Times)> {
+    let point = dial.points.iter().find(|p| p.is_default)?;
+    Some((point.errors.rmse, point.times?)).filter(|(_, times)| times.total.median > 0.0)
+}
+
+fn steps(index: usize, dial: &Dial) -> Vec<Proposal> {
+    let Some((error, times)) = default(dial) else { return Vec::new() };
+    // A ratio whose interval holds 1 is none.
+    let beyond_noise = |r: Time| if r.low <= 1.0 && r.high >= 1.0 { 1.0 } else { r.median };
+    let step = |(p, point): (usize, &Point)| {
+        let (volume, picture) = (times.volume.median, times.picture.median);
+        let ratios = point.ratios?;
+        let changed = volume * beyond_noise(ratios.volume) + picture * beyond_noise(ratios.picture);
+        let log_time = (changed / (volume + picture)).max(1e-9).ln();
+        let square = point.errors.rmse.powi(2) - error.powi(2);
+        (!point.is_default).then(|| Proposal { changes: vec![(index, p)], square, log_time })
+    };
+    dial.points.iter().enumerate().filter_map(step).collect()
+}
+
+/// Dials that assign the same keys (or tables around them) exclude one another.
+fn groups(dials: &[Dial], turned: &[usize]) -> Vec<Vec<usize>> {
+    let keys = |d: usize| {
+        let sets = dials[d].points.iter().flat_map(|p| &p.set);
+        sets.filter_map(|s| s.split_once('=')).map(|(key, _)| key.trim().to_string()).collect::<Vec<_>>()
+    };
+    let clash = |a: &str, b: &str| {
+        let within = |a: &str, b: &str| b.strip_prefix(a).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        within(a, b) || within(b, a)
     };
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    for &d in dials {
-        let (touched, mut separate): (Vec<_>, Vec<_>) =
-            groups.into_iter().partition(|g| g.iter().any(|o| clash(*o, d)));
-        separate.push(touched.into_iter().flatten().chain([d]).collect());
-        groups = separate;
+    for d in turned {
+        let meets = |group: &Vec<usize>| {
+            group.iter().any(|other| keys(*d).iter().any(|a| keys(*other).iter().any(|b| clash(a, b))))
+        };
+        let (met, mut apart): (Vec<_>, Vec<_>) = groups.into_iter().partition(meets);
+        apart.push(met.into_iter().flatten().chain([*d]).collect());
+        groups = apart;
     }
     groups
 }
 
-/// The Pareto front, from the fastest. Of nearly equal times the most accurate stays, of equal ones that with the fewest changes.
-fn thinned(mut all: Vec<Combination>) -> Vec<Combination> {
-    let order = |a: &Combination, b: &Combination| {
-        a.log_time.total_cmp(&b.log_time).then(a.square.total_cmp(&b.square)).then(a.points.len().cmp(&b.points.len()))
-    };
-    all.sort_by(order);
-    let mut kept: Vec<Combination> = Vec::new();
-    let mut bin = f64::NEG_INFINITY;
-    for c in all {
+/// The predicted front, from the fastest to the most accurate. Both sums are additive, so what is dominated on the way stays dominated.
+fn thinned(mut all: Vec<Proposal>) -> Vec<Proposal> {
+    all.sort_by(|a, b| a.log_time.total_cmp(&b.log_time).then(a.square.total_cmp(&b.square)));
+    let mut kept: Vec<Proposal> = Vec::new();
+    for p in all {
         match kept.last() {
-            Some(last) if last.square <= c.square => {}
-            // The fastest of all always stays, otherwise an achievable time bound would be refused.
-            Some(_) if c.log_time - bin < SAME_TIME && kept.len() > 1 => {
+            Some(last) if last.square <= p.square => {}
+            Some(last) if p.log_time - last.log_time < SAME_TIME => {
                 kept.pop();
-                kept.push(c);
+                kept.push(p);
             }
-            _ => {
-                bin = c.log_time;
-                kept.push(c);
-            }
+            _ => kept.push(p),
         }
     }
     kept

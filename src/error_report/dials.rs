@@ -31,6 +31,14 @@ pub struct Dial {
     pub nearly: Vec<String>,
 }
 
+impl Dial {
+    /// True if all settings compute the same picture more or less accurately. The number of pixels and of rays in a pixel is another
+    /// picture.
+    pub fn is_numerical(&self) -> bool {
+        !self.is_look && !["resolution", "rays"].contains(&self.name)
+    }
+}
+
 /// Names of all dials.
 pub(crate) const NAMES: &[&str] = &[
     "step",

@@ -1,7 +1,7 @@
 //! An error report as text: CSV for other programs, a summary table for a terminal.
 
 use super::metrics::SurfaceError;
-use super::{Measure, Reference, Report, Time};
+use super::{Measure, Reference, Report, Time, Times, choose};
 use std::fmt::Write as _;
 
 /// The report as CSV (RFC 4180): a header, then one line per point. Fields that do not apply are empty; times are in ms. `on_front`:
@@ -10,7 +10,7 @@ pub fn csv(report: &Report) -> String {
     let front = report.pareto_front(Measure::Rmse);
     let mut text = String::from(
         "dial,unit,value,label,set,default,rmse,max,psnr_db,ssim,mm_rms,mm_median,mm_p95,mm_max,mm_false_hits,mm_missed_hits,\
-         deg_rms,deg_median,deg_p95,deg_max,deg_false_hits,deg_missed_hits,time_ms,time_low_ms,time_high_ms,on_front,\
+         deg_rms,deg_median,deg_p95,deg_max,deg_false_hits,deg_missed_hits,time_ms,time_low_ms,time_high_ms,volume_ms,picture_ms,ratio,ratio_low,ratio_high,on_front,\
          reference,reference_rmse,device,driver,date,repeats\r\n",
     );
     for (d, dial) in report.dials.iter().enumerate() {
@@ -25,8 +25,12 @@ pub fn csv(report: &Report) -> String {
                 row.extend([spread.map(|s| s.p95), spread.map(|s| s.max)].map(number));
                 row.extend([surface.map(|s| s.false_hits), surface.map(|s| s.missed_hits)].map(number));
             }
-            let ms = |of: fn(&Time) -> f64| number(point.time.as_ref().map(|t| of(t) * 1e-6));
-            row.extend([ms(|t| t.median), ms(|t| t.low), ms(|t| t.high), front.contains(&(d, p)).to_string()]);
+            let ms = |of: fn(&Times) -> f64| number(point.times.as_ref().map(|t| of(t) * 1e-6));
+            row.extend([ms(|t| t.total.median), ms(|t| t.total.low), ms(|t| t.total.high)]);
+            row.extend([ms(|t| t.volume.median), ms(|t| t.picture.median)]);
+            let ratio = |of: fn(&Time) -> f64| number(point.ratios.as_ref().map(|r| of(&r.total)));
+            row.extend([ratio(|r| r.median), ratio(|r| r.low), ratio(|r| r.high)]);
+            row.push(front.contains(&(d, p)).to_string());
             row.extend(match &dial.reference {
                 Reference::F64 => ["f64".into(), String::new()],
                 Reference::AsItIs => ["the scene as it is: another look, no error".into(), String::new()],
@@ -71,30 +75,29 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
         let _ = writeln!(text, "\n{}{unit}: {held}", dial.name);
         let _ = writeln!(
             text,
-            "  {:<16} {:>10} {:>10} {:>7} {:>8} {:>9} {:>9}   {:>9} {:>19} {:>6}",
+            "  {:<16} {:>10} {:>10} {:>7} {:>8} {:>9} {:>9}   {:>9} {:>9} {:>18}",
             "",
-            measure.name(),
+            measure.name().split(" of").next().unwrap_or_default(),
             "largest",
             "PSNR",
             "SSIM",
             "mm RMS",
             "deg RMS",
-            "ms",
-            "least..most",
+            "volume ms",
+            "picture",
             "ratio"
         );
-        let base = dial.points.iter().find(|p| p.is_default).and_then(|p| p.time);
         for point in &dial.points {
             let e = &point.errors;
             let or = |v: Option<f64>, digits: usize| v.map_or("-".into(), |v| format!("{v:.digits$}"));
             let rms = |s: &Option<SurfaceError>| s.as_ref().and_then(|s| s.error.as_ref()).map(|s| s.rms);
-            let time = match point.time {
-                Some(t) => {
-                    let ratio = base.filter(|b| b.median > 0.0).map(|b| t.median / b.median);
-                    let span = format!("{:.3}..{:.3}", t.low * 1e-6, t.high * 1e-6);
-                    format!("{:>9.3} {span:>19} {:>6}", t.median * 1e-6, or(ratio, 2))
+            let time = match (point.times, point.ratios.map(|r| r.total)) {
+                (Some(t), Some(r)) => {
+                    let (volume, picture) = (t.volume.median * 1e-6, t.picture.median * 1e-6);
+                    let ratio = format!("{:.2} ({:.2}..{:.2})", r.median, r.low, r.high);
+                    format!("{volume:>9.3} {picture:>9.3} {ratio:>18}")
                 }
-                None => format!("{:>9}", "no stamps"),
+                _ => format!("{:>9}", "no stamps"),
             };
             let _ = writeln!(
                 text,
@@ -120,6 +123,21 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
             let _ = writeln!(text, "  the device's own floor, its arithmetic and formats alone: RMSE {floor:.1e}");
         }
     }
-    text.push_str("\n* the scene as it is\n");
+    text.push_str(
+        "\n* the scene as it is; ratio: of volume and picture together to those of the scene as it is, run in turn\n",
+    );
+    let front = choose::front(report, measure);
+    if !front.is_empty() {
+        let own = report.choices.first().map_or(0.0, |c| c.reference_error);
+        let limit = if own > 0.0 { format!(", itself off by about {own:.1e}") } else { String::new() };
+        let _ = writeln!(
+            text,
+            "\ncombinations, {} rendered and measured against the scene's finest picture{limit}; the Pareto front:",
+            report.choices.len()
+        );
+        for choice in front.into_iter().map(|i| &report.choices[i]) {
+            let _ = writeln!(text, "  {}", choice.describe(measure));
+        }
+    }
     text
 }

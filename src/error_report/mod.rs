@@ -1,6 +1,6 @@
 //! Error against run time (work-precision). Every approximation is a dial; the points of a dial are its settings, each with its
-//! errors and its time on the device. [`measure`] fills a [`Report`], which is stored as JSON; [`export`] and [`plot`] write it as
-//! text and as a diagram, [`choose`] picks settings from it.
+//! errors and its times on the device. [`measure`] fills a [`Report`], which is stored as JSON, and renders combinations of several
+//! dials; [`export`] and [`plot`] write it as text and as a diagram, [`choose`] picks settings among the combinations.
 
 pub mod choose;
 pub(crate) mod command;
@@ -11,12 +11,13 @@ pub mod measure;
 pub mod metrics;
 pub mod plot;
 
+use crate::scene::Scene;
 use convergence::Fit;
 use metrics::{PictureError, SurfaceError};
 use serde::{Deserialize, Serialize};
 
 /// Format version of a stored report; other versions are refused.
-pub const FORMAT: &str = "echolume error report 1";
+pub const FORMAT: &str = "echolume error report 2";
 
 /// A measurement of one scene on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,24 @@ pub struct Report {
     /// Number of runs of which each time is the median.
     pub repeats: u32,
     pub dials: Vec<Dial>,
+    /// Settings of several dials at once, each rendered and measured. The first is the scene as it is.
+    pub choices: Vec<Combination>,
+}
+
+/// Settings of several dials at once, and what was measured with them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Combination {
+    /// Changes from the scene as it is: name of the dial and label of the point.
+    pub changed: Vec<(String, String)>,
+    /// Their assignments, "key=value" as `--set` takes them.
+    pub set: Vec<String>,
+    /// Against the scene's own picture with the finest numerical settings.
+    pub errors: Errors,
+    /// RMSE of that picture itself; 0 if it is a reference in f64.
+    pub reference_error: f64,
+    /// None without time stamps.
+    pub times: Option<Times>,
 }
 
 /// Sizes of what was rendered.
@@ -51,6 +70,8 @@ pub struct Sizes {
 #[serde(deny_unknown_fields)]
 pub struct Dial {
     pub name: String,
+    /// True if all of its settings compute the same picture more or less accurately, so that a choice may turn it.
+    pub is_numerical: bool,
     /// Unit of the values of the points; empty for counts and names.
     pub unit: String,
     pub reference: Reference,
@@ -90,8 +111,10 @@ pub struct Point {
     /// Value on the dial's axis, in the dial's unit; for names their index.
     pub value: f64,
     pub errors: Errors,
-    /// Time on the device; None without time stamps.
-    pub time: Option<Time>,
+    /// None without time stamps.
+    pub times: Option<Times>,
+    /// Times relative to the default, by runs of both in turn; None without time stamps.
+    pub ratios: Option<Times>,
     /// True for the setting of the scene itself, without assignments.
     pub is_default: bool,
 }
@@ -117,23 +140,57 @@ impl From<PictureError> for Errors {
     }
 }
 
-/// Time on the device over the repeats, ns: median, minimum, maximum.
+/// A time over several runs, ns, or the ratio of two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
     pub median: f64,
+    /// Confidence interval of the median: 95 % by order statistics; from the shortest to the longest of fewer than 6 runs.
     pub low: f64,
     pub high: f64,
+    /// 95th percentile by the nearest rank; the longest of fewer than 20 runs.
+    pub p95: f64,
 }
 
 impl Time {
-    /// The statistics of the runs, ns; None without runs.
+    /// The statistics of the runs; None without runs.
     pub fn of(runs: &[f64]) -> Option<Time> {
         let mut sorted = runs.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let (low, high) = (*sorted.first()?, *sorted.last()?);
+        sorted.first()?;
         let n = sorted.len();
-        Some(Time { median: (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0, low, high })
+        // The most runs that may be left out at either end: as many heads of n coins have a probability of at most 0.025.
+        let (mut out, mut below, mut heads) = (0, 0.0, 0.5f64.powi(n.min(1000) as i32));
+        while below + heads <= 0.025 && out < (n - 1) / 2 {
+            below += heads;
+            heads *= (n - out) as f64 / (out + 1) as f64;
+            out += 1;
+        }
+        let p95 = sorted[(n * 95).div_ceil(100).max(1) - 1];
+        let median = (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0;
+        // `out` runs at either end lie outside; the interval begins at the one after them, as the first is outside with `out` - 1.
+        let edge = out.saturating_sub(1);
+        Some(Time { median, low: sorted[edge], high: sorted[n - 1 - edge], p95 })
+    }
+}
+
+/// Times on the device, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Times {
+    /// Work of each frame and volume: upload and stage 1.
+    pub volume: Time,
+    /// Work of each picture: stages 2 to 4, and what rays skip by.
+    pub picture: Time,
+    /// Both.
+    pub total: Time,
+}
+
+impl Times {
+    /// The statistics of runs of [volume, picture], ns; None without runs.
+    pub fn of(runs: &[[f64; 2]]) -> Option<Times> {
+        let of = |part: fn(&[f64; 2]) -> f64| Time::of(&runs.iter().map(part).collect::<Vec<_>>());
+        Some(Times { volume: of(|r| r[0])?, picture: of(|r| r[1])?, total: of(|r| r[0] + r[1])? })
     }
 }
 
@@ -186,6 +243,13 @@ impl Dial {
 }
 
 impl Report {
+    /// True if the report was measured with the settings of a scene, and volumes and pictures of its size.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        let settings = self.scene.split_once('\n').map_or("", |(_, settings)| settings);
+        let sizes = Sizes { volume: scene.volume_size(), picture: scene.picture_size() };
+        self.sizes == sizes && toml::to_string(&scene.settings).is_ok_and(|own| own == settings)
+    }
+
     /// The report as JSON.
     ///
     /// # Errors
@@ -229,20 +293,18 @@ impl Report {
                 return Err(format!("error report: dial '{}': its reference's RMSE is {reference_rmse}", dial.name));
             }
             for point in &dial.points {
-                let (e, bad) = (&point.errors, |v: f64| !v.is_finite() || v < 0.0);
-                let surfaces = [e.mm, e.degrees].into_iter().flatten().flat_map(|s| {
-                    let spread = s.error.map_or([0.0; 4], |e| [e.rms, e.median, e.p95, e.max]);
-                    spread.into_iter().chain([s.false_hits, s.missed_hits])
-                });
-                let times = point.time.map_or([0.0; 3], |t| [t.low, t.median, t.high]);
-                let wrong = [e.rmse, e.max].into_iter().chain(surfaces).chain(times).find(|v| bad(*v));
-                let unsigned = [Some(point.value), e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite());
-                if let Some(v) = wrong.or(unsigned) {
+                let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);
+                if let Some(v) = wrong.or(Some(point.value).filter(|v| !v.is_finite())) {
                     return Err(format!(
                         "error report: dial '{}', point '{}': {v} is no result",
                         dial.name, point.label
                     ));
                 }
+            }
+        }
+        for choice in &self.choices {
+            if let Some(v) = wrong_result(&choice.errors, &[choice.times], choice.reference_error) {
+                return Err(format!("error report: choice '{}': {v} is no result", choice.set.join(" ")));
             }
         }
         Ok(())
@@ -255,14 +317,27 @@ impl Report {
         let mut pairs = Vec::new();
         for (d, dial) in self.dials.iter().enumerate().filter(|(_, dial)| !dial.is_look()) {
             for (p, point) in dial.points.iter().enumerate() {
-                if let (Some(time), Some(error)) = (point.time, measure.of(&point.errors)) {
+                if let (Some(times), Some(error)) = (point.times, measure.of(&point.errors)) {
                     indices.push((d, p));
-                    pairs.push([time.median, error]);
+                    pairs.push([times.total.median, error]);
                 }
             }
         }
         pareto_front(&pairs).into_iter().map(|i| indices[i]).collect()
     }
+}
+
+/// A number that no measurement gives: one that is not finite, or an error or time below 0.
+fn wrong_result(e: &Errors, times: &[Option<Times>], other: f64) -> Option<f64> {
+    let surfaces = [e.mm, e.degrees].into_iter().flatten().flat_map(|s| {
+        let spread = s.error.map_or([0.0; 4], |e| [e.rms, e.median, e.p95, e.max]);
+        spread.into_iter().chain([s.false_hits, s.missed_hits])
+    });
+    let times = times.iter().flatten().flat_map(|t| [t.volume, t.picture, t.total]);
+    let times = times.flat_map(|t| [t.low, t.median, t.high, t.p95]);
+    let mut unsigned = [e.rmse, e.max].into_iter().chain(surfaces).chain(times).chain([other]);
+    let wrong = unsigned.find(|v| !v.is_finite() || *v < 0.0);
+    wrong.or_else(|| [e.psnr, e.ssim].into_iter().flatten().find(|v| !v.is_finite()))
 }
 
 /// The Pareto front: indices of the pairs that no other pair dominates (at most as large in both values and smaller in one), in order

@@ -1,6 +1,7 @@
-//! The work-precision diagram as SVG or PNG: error over time on the device, both axes logarithmic, one line per dial.
+//! The work-precision diagram as SVG or PNG: small multiples, one panel per dial and one for the combinations. A panel shows error over
+//! the time that its dial changes, of the picture or of the volume, both logarithmic; every point is named.
 
-use super::{Dial, Measure, Reference, Report, Sizes};
+use super::{Dial, Measure, Reference, Report, Sizes, Time, Times, choose};
 use crate::picture::Picture;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -18,9 +19,11 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(230, 159, 0),
     RGBColor(0, 0, 0),
 ];
-const FRONT: RGBColor = RGBColor(255, 214, 120);
-/// Width of the legend, pixels.
-const LEGEND: f64 = 250.0;
+/// Height of the text above the panels, pixels.
+const HEAD: f64 = 92.0;
+/// Columns of panels, and the size of a panel in [`size`], pixels.
+const COLUMNS: usize = 3;
+const PANEL: [u32; 2] = [400, 300];
 /// Minimum width and height, pixels.
 const MIN_SIZE: [u32; 2] = [640, 400];
 /// Maximum width and height, pixels.
@@ -83,134 +86,191 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
     Ok(())
 }
 
-/// A point of the diagram.
+/// The size at which every panel has room for its names, pixels.
+pub fn size(report: &Report) -> [u32; 2] {
+    let rows = (report.dials.len() + 1).div_ceil(COLUMNS).clamp(1, 12) as u32;
+    [PANEL[0] * COLUMNS as u32, (HEAD as u32 + PANEL[1] * rows).max(MIN_SIZE[1])]
+}
+
+/// A point of a panel.
 struct PlottedPoint {
-    dial: usize,
-    point: usize,
+    name: String,
     /// Minimum, median, maximum, ms.
     time: [f64; 3],
     error: f64,
+    is_default: bool,
+    on_front: bool,
 }
 
-fn plotted_points(report: &Report, measure: Measure) -> Vec<PlottedPoint> {
-    let mut all = Vec::new();
-    for (d, dial) in report.dials.iter().enumerate() {
-        for (p, point) in dial.points.iter().enumerate() {
-            if let (Some(time), Some(error)) = (point.time.filter(|t| t.low > 0.0), measure.of(&point.errors)) {
-                let time = [time.low, time.median, time.high].map(|t| t * 1e-6);
-                all.push(PlottedPoint { dial: d, point: p, time, error });
-            }
-        }
-    }
+/// What is drawn in one frame.
+struct Panel {
+    title: String,
+    notes: Vec<String>,
+    time_axis: &'static str,
+    colour: usize,
+    /// In the order of the line that joins them.
+    points: Vec<PlottedPoint>,
+}
+
+fn panels(report: &Report, measure: Measure) -> Vec<Panel> {
+    let mut all = vec![combinations(report, measure)];
+    all.extend(report.dials.iter().enumerate().map(|(d, dial)| of_dial(d, dial, measure)));
+    all.retain(|panel| !panel.points.is_empty());
     all
 }
 
+fn combinations(report: &Report, measure: Measure) -> Panel {
+    let front = choose::front(report, measure);
+    let points = report.choices.iter().enumerate().filter_map(|(i, choice)| {
+        let name = match choice.changed.is_empty() {
+            true => "as it is".to_string(),
+            false => {
+                choice.changed.iter().map(|(dial, label)| format!("{dial} {label}")).collect::<Vec<_>>().join(", ")
+            }
+        };
+        let on_front = front.contains(&i);
+        // Only the front is named: what others change says nothing.
+        let name = if on_front || choice.changed.is_empty() { name } else { String::new() };
+        let (error, time) = (measure.of(&choice.errors)?, of_total(&choice.times?));
+        Some(PlottedPoint { name, time, error, is_default: choice.changed.is_empty(), on_front })
+    });
+    let mut points: Vec<_> = points.filter(|p| p.time[0] > 0.0).collect();
+    points.sort_by(|a, b| a.time[1].total_cmp(&b.time[1]));
+    Panel {
+        title: "combinations".into(),
+        notes: vec!["rings: Pareto front".into()],
+        time_axis: "volume and picture (ms)",
+        colour: 6,
+        points,
+    }
+}
+
+fn of_total(times: &Times) -> [f64; 3] {
+    milliseconds(&times.total)
+}
+
+fn milliseconds(time: &Time) -> [f64; 3] {
+    [time.low, time.median, time.high].map(|t| t * 1e-6)
+}
+
+/// The points of a dial over the time that it changes more, by their ratio.
+fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
+    let mut points: Vec<_> = dial.points.iter().collect();
+    points.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let spread = |of: fn(&Times) -> f64| {
+        let times = dial.points.iter().filter_map(|p| p.times.as_ref()).map(of);
+        let (low, high) = times.fold((f64::MAX, 0.0f64), |(l, h), t| (l.min(t), h.max(t)));
+        high / low
+    };
+    let of_picture = spread(|t| t.picture.median) >= spread(|t| t.volume.median);
+    let plotted = points.into_iter().filter_map(|point| {
+        let (times, error) = (point.times?, measure.of(&point.errors)?);
+        let time = milliseconds(if of_picture { &times.picture } else { &times.volume });
+        let (name, is_default) = (point.label.clone(), point.is_default);
+        Some(PlottedPoint { name, time, error, is_default, on_front: false }).filter(|p| p.time[0] > 0.0)
+    });
+    let points: Vec<_> = plotted.collect();
+    let other = dial.points.iter().find(|p| p.is_default).and_then(|p| p.times);
+    let other = other.map(|t| match of_picture {
+        true => format!("volume {} ms", rounded(t.volume.median * 1e-6)),
+        false => format!("picture {} ms", rounded(t.picture.median * 1e-6)),
+    });
+    Panel {
+        title: title(dial),
+        notes: notes(dial).into_iter().chain(other).collect(),
+        time_axis: if of_picture { "picture (ms)" } else { "volume (ms)" },
+        colour: index,
+        points,
+    }
+}
+
 fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report: &Report, measure: Measure) -> Drawn {
-    let mut all = plotted_points(report, measure);
+    let all = panels(report, measure);
     if all.is_empty() {
         return Err(format!("plot: no setting has a time and an {}", measure.name()));
     }
-    // A logarithmic axis has no 0: exact agreement is drawn half a decade below all other points.
-    let positive = all.iter().map(|s| s.error).filter(|e| *e > 0.0).fold(f64::MAX, f64::min);
-    let exact = if positive == f64::MAX { 1e-9 } else { positive / 3.0 };
-    let zeros = all.iter().filter(|s| s.error == 0.0).count();
-    all.iter_mut().filter(|s| s.error == 0.0).for_each(|s| s.error = exact);
     let canvas = Canvas::new(area, medium)?;
     let [width, height] = canvas.size();
-    let frame = [96.0, 96.0, width - LEGEND - 20.0, height - 72.0];
-    let ends: Vec<[f64; 2]> = all.iter().flat_map(|s| s.time.map(|t| [t, s.error])).collect();
-    let axes = Axes::about(frame, &ends);
-    head(&canvas, report, width)?;
-    axes.draw(&canvas, "time on the device (ms)", measure.name())?;
-    if zeros > 0 {
-        let [_, y] = axes.place([axes.x[0], exact]);
-        canvas.line(&[[frame[0], y], [frame[2], y]], INK.mix(0.4))?;
-        canvas.text("0 (exact)", [frame[2] - 6.0, y + 4.0], 13, INK, [2, 0])?;
-    }
-
-    let fronts = report.pareto_front(measure);
-    let place = |s: &PlottedPoint| axes.place([s.time[1], s.error]);
-    let on_front = |s: &PlottedPoint| fronts.contains(&(s.dial, s.point));
-    let mut labels = Labels::default();
-    let steps = staircase(
-        &fronts.iter().filter_map(|at| all.iter().find(|s| (s.dial, s.point) == *at)).map(place).collect::<Vec<_>>(),
-    );
-    canvas.line(&steps, FRONT.stroke_width(6))?;
-    labels.keep_off_line(&steps);
-    for (d, dial) in report.dials.iter().enumerate() {
-        let mut of_dial: Vec<&PlottedPoint> = all.iter().filter(|s| s.dial == d).collect();
-        of_dial.sort_by(|a, b| dial.points[a.point].value.total_cmp(&dial.points[b.point].value));
-        let line: Vec<[f64; 2]> = of_dial.iter().map(|s| place(s)).collect();
-        canvas.line(&line, colour(d).mix(0.5).stroke_width(1))?;
-        labels.keep_off_line(&line);
-        for s in &of_dial {
-            let [low, _, high] = s.time.map(|t| axes.place([t, s.error]));
-            canvas.line(&[low, high], colour(d).stroke_width(2))?;
-            labels.keep_off(place(s), 8.5);
-        }
-    }
-    for s in &all {
-        if on_front(s) {
-            canvas.ring(place(s), 8, INK.stroke_width(1))?;
-        }
-        if report.dials[s.dial].points[s.point].is_default {
-            let [x, y] = place(s);
-            canvas.boxed([x - 8.0, y - 8.0, x + 8.0, y + 8.0], INK)?;
-        }
-        canvas.mark(place(s), s.dial, colour(s.dial))?;
-    }
-
-    // The most important points get their labels first.
-    let rank = |s: &PlottedPoint| (!on_front(s), !report.dials[s.dial].points[s.point].is_default);
-    let mut order: Vec<&PlottedPoint> = all.iter().collect();
-    order.sort_by_key(|s| rank(s));
-    let mut unnamed = 0;
-    for s in order {
-        let label = canvas.cut(&report.dials[s.dial].points[s.point].label, 13, 140.0)?;
-        match labels.place(place(s), canvas.measure(&label, 13)?, frame) {
-            Some(at) => canvas.text(&label, at, 13, darker(colour(s.dial)), [0, 0])?,
-            None => unnamed += 1,
-        }
-    }
-    legend(&canvas, report, frame[2] + 18.0, unnamed)
-}
-
-fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, width: f64) -> Drawn {
-    let Sizes { volume: [w, h, d], picture: [pw, ph] } = report.sizes;
-    let scene = format!("{}: volume {w}x{h}x{d}, picture {pw}x{ph}", report.scene.lines().next().unwrap_or_default());
-    let repeats = format!("median and range of {} runs", report.repeats);
-    let device = format!("{}, {}, {}; {repeats}", report.device, report.driver, report.date);
-    canvas.text("Error against run time", [24.0, 14.0], 24, INK, [0, 0])?;
-    canvas.text(&canvas.cut(&scene, 15, width - 48.0)?, [24.0, 44.0], 15, INK, [0, 0])?;
-    canvas.text(&canvas.cut(&device, 15, width - 48.0)?, [24.0, 64.0], 15, INK, [0, 0])
-}
-
-/// One row per dial: its unit, its order, and its reference unless that is f64.
-fn legend<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, left: f64, unnamed: usize) -> Drawn {
-    let mut y = 106.0;
-    let width = LEGEND - 30.0;
-    for (d, dial) in report.dials.iter().enumerate() {
-        canvas.mark([left + 6.0, y], d, colour(d))?;
-        canvas.text(&canvas.cut(&title(dial), 15, width)?, [left + 20.0, y], 15, INK, [0, 1])?;
-        y += 18.0;
-        for line in notes(dial) {
-            canvas.text(&canvas.cut(&line, 12, width)?, [left + 20.0, y], 12, INK, [0, 1])?;
-            y += 15.0;
-        }
-        y += 6.0;
-    }
-    y += 8.0;
-    canvas.line(&[[left - 2.0, y], [left + 14.0, y]], FRONT.stroke_width(6))?;
-    canvas.ring([left + 6.0, y], 8, INK.stroke_width(1))?;
-    canvas.text("Pareto front", [left + 24.0, y], 15, INK, [0, 1])?;
-    y += 26.0;
-    canvas.boxed([left - 2.0, y - 8.0, left + 14.0, y + 8.0], INK)?;
-    canvas.text("default", [left + 24.0, y], 15, INK, [0, 1])?;
-    if unnamed > 0 {
-        y += 26.0;
-        canvas.text(&format!("points without room for a name: {unnamed}"), [left, y], 12, INK, [0, 1])?;
+    head(&canvas, report, measure, width)?;
+    let columns = ((width / f64::from(PANEL[0])).floor() as usize).clamp(1, all.len());
+    let rows = all.len().div_ceil(columns);
+    let [across, down] = [width / columns as f64, (height - HEAD) / rows as f64];
+    for (i, panel) in all.iter().enumerate() {
+        let (left, top) = ((i % columns) as f64 * across, HEAD + (i / columns) as f64 * down);
+        panel.draw(&canvas, [left + 56.0, top + 40.0, left + across - 14.0, top + down - 44.0])?;
     }
     Ok(())
+}
+
+impl Panel {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, frame: Frame) -> Drawn {
+        // A logarithmic axis has no 0: exact agreement is drawn half a decade below all other points.
+        let positive = self.points.iter().map(|s| s.error).filter(|e| *e > 0.0).fold(f64::MAX, f64::min);
+        let exact = if positive == f64::MAX { 1e-9 } else { positive / 3.0 };
+        let error = |p: &PlottedPoint| if p.error == 0.0 { exact } else { p.error };
+        let ends: Vec<[f64; 2]> = self.points.iter().flat_map(|p| p.time.map(|t| [t, error(p)])).collect();
+        let axes = Axes::about(frame, &ends);
+        let [left, top, right, _] = frame;
+        canvas.text(&canvas.cut(&self.title, 15, right - left)?, [left, top - 36.0], 15, INK, [0, 0])?;
+        canvas.text(&canvas.cut(&self.notes.join("; "), 12, right - left)?, [left, top - 18.0], 12, INK, [0, 0])?;
+        axes.draw(canvas, self.time_axis)?;
+        if self.points.iter().any(|p| p.error == 0.0) {
+            let [_, y] = axes.place([axes.x[0], exact]);
+            canvas.line(&[[left, y], [right, y]], INK.mix(0.4))?;
+            canvas.text("0 (exact)", [right - 4.0, y + 3.0], 11, INK, [2, 0])?;
+        }
+        let place = |p: &PlottedPoint| axes.place([p.time[1], error(p)]);
+        let mut labels = Labels::default();
+        // Combinations have no order of their own: their line is the front.
+        let of_front = self.points.iter().any(|p| p.on_front);
+        let line: Vec<[f64; 2]> = self.points.iter().filter(|p| !of_front || p.on_front).map(place).collect();
+        let line = if of_front { staircase(&line) } else { line };
+        canvas.line(&line, colour(self.colour).mix(0.5).stroke_width(1))?;
+        labels.keep_off_line(&line);
+        for p in &self.points {
+            let [low, _, high] = p.time.map(|t| axes.place([t, error(p)]));
+            canvas.line(&[low, high], colour(self.colour).mix(0.6).stroke_width(2))?;
+            labels.keep_off(place(p), 6.0);
+            labels.keep_off_line(&[low, high]);
+        }
+        for p in &self.points {
+            let [x, y] = place(p);
+            if p.on_front {
+                canvas.ring([x, y], 8, INK.stroke_width(1))?;
+            }
+            if p.is_default {
+                canvas.boxed([x - 8.0, y - 8.0, x + 8.0, y + 8.0], INK)?;
+            }
+            canvas.mark([x, y], self.colour, colour(self.colour))?;
+        }
+        // The default's label first.
+        let mut order: Vec<&PlottedPoint> = self.points.iter().filter(|p| !p.name.is_empty()).collect();
+        order.sort_by_key(|p| !p.is_default);
+        for p in order {
+            let label = canvas.cut(&p.name, 11, 0.7 * (right - left))?;
+            let size = canvas.measure(&label, 11)?;
+            let at = labels.place(place(p), size, frame);
+            // A name far from its mark is joined to it.
+            let (from, to) = (place(p), [at[0] + size[0] / 2.0, at[1] + size[1] / 2.0]);
+            let nearest = [from[0].clamp(at[0], at[0] + size[0]), from[1].clamp(at[1], at[1] + size[1])];
+            if (nearest[0] - from[0]).hypot(nearest[1] - from[1]) > 16.0 {
+                canvas.line(&[from, if nearest == from { to } else { nearest }], colour(self.colour).mix(0.5))?;
+            }
+            canvas.text(&label, at, 11, darker(colour(self.colour)), [0, 0])?;
+        }
+        Ok(())
+    }
+}
+
+fn head<B: DrawingBackend>(canvas: &Canvas<B>, report: &Report, measure: Measure, width: f64) -> Drawn {
+    let Sizes { volume: [w, h, d], picture: [pw, ph] } = report.sizes;
+    let scene = format!("{}: volume {w}x{h}x{d}, picture {pw}x{ph}", report.scene.lines().next().unwrap_or_default());
+    let repeats = format!("median and range of {} runs; boxed: the scene as it is", report.repeats);
+    let device = format!("{}, {}, {}; {repeats}", report.device, report.driver, report.date);
+    let title = format!("Error against run time: {} over time on the device", measure.name());
+    canvas.text(&title, [24.0, 12.0], 22, INK, [0, 0])?;
+    canvas.text(&canvas.cut(&scene, 14, width - 48.0)?, [24.0, 40.0], 14, INK, [0, 0])?;
+    canvas.text(&canvas.cut(&device, 14, width - 48.0)?, [24.0, 58.0], 14, INK, [0, 0])
 }
 
 fn title(dial: &Dial) -> String {
@@ -346,13 +406,6 @@ impl<'a, B: DrawingBackend> Canvas<'a, B> {
         self.area.draw(&Text::new(text.to_string(), at, style)).map_err(|e| fault(&e))
     }
 
-    /// Vertical text, read upwards, centred.
-    pub(crate) fn upright(&self, text: &str, at: [f64; 2], size: u32) -> Drawn {
-        let font = (FONT, size * self.medium.scale).into_font().transform(FontTransform::Rotate270);
-        let style = font.color(&INK).pos(Pos::new(HPos::Center, VPos::Center));
-        self.area.draw(&Text::new(text.to_string(), self.pixel(at), style)).map_err(|e| fault(&e))
-    }
-
     /// Width and height of a text, pixels.
     pub fn measure(&self, text: &str, size: u32) -> Result<[f64; 2], String> {
         let style = (FONT, size * self.medium.scale).into_font().color(&INK);
@@ -394,7 +447,7 @@ impl Axes {
     pub fn about(frame: Frame, points: &[[f64; 2]]) -> Axes {
         let around = |axis: usize| {
             let (low, high) = points.iter().fold((f64::MAX, 0.0f64), |(l, h), p| (l.min(p[axis]), h.max(p[axis])));
-            let margin = (high / low).powf(0.06).max(1.3);
+            let margin = (high / low).powf(0.08).max(1.1);
             [low / margin, high * margin]
         };
         Axes { frame, x: around(0), y: around(1) }
@@ -406,40 +459,49 @@ impl Axes {
         [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
     }
 
-    /// Draws grid, ticks and axis titles.
-    pub fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, across: &str, up: &str) -> Drawn {
+    /// Draws grid, ticks and the title of the time axis.
+    pub fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>, across: &str) -> Drawn {
         let [left, top, right, bottom] = self.frame;
         for (value, named) in ticks(self.x) {
             let [x, _] = self.place([value, self.y[0]]);
             canvas.line(&[[x, top], [x, bottom]], if named { GRID[0] } else { GRID[1] })?;
             if named {
-                canvas.text(&number(value), [x, bottom + 8.0], 14, INK, [1, 0])?;
+                canvas.text(&number(value), [x, bottom + 5.0], 12, INK, [1, 0])?;
             }
         }
         for (value, named) in ticks(self.y) {
             let [_, y] = self.place([self.x[0], value]);
             canvas.line(&[[left, y], [right, y]], if named { GRID[0] } else { GRID[1] })?;
             if named {
-                canvas.text(&number(value), [left - 8.0, y], 14, INK, [2, 1])?;
+                canvas.text(&number(value), [left - 5.0, y], 12, INK, [2, 1])?;
             }
         }
         canvas.boxed(self.frame, INK)?;
-        canvas.text(across, [(left + right) / 2.0, bottom + 34.0], 16, INK, [1, 0])?;
-        canvas.upright(up, [left - 68.0, (top + bottom) / 2.0], 16)
+        canvas.text(across, [(left + right) / 2.0, bottom + 22.0], 12, INK, [1, 0])
     }
 }
 
-/// Tick values 1 to 9 of every decade within a range, and whether each has a label: more labels for fewer decades.
+/// Tick values within a range, and whether each has a label: 1 to 9 of every decade, with more labels for fewer decades; equidistant
+/// ones in a range of less than a factor of four.
 fn ticks([low, high]: [f64; 2]) -> Vec<(f64, bool)> {
+    if high < 4.0 * low {
+        let rough = (high - low) / 4.0;
+        let decade = 10f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|s| *s >= rough).unwrap_or(rough);
+        let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+        return (first..=last).map(|i| (i as f64 * step, true)).collect();
+    }
     let decades = (high / low).log10();
     let named: &[u32] = match decades {
-        d if d < 0.7 => &[1, 2, 3, 4, 5, 6, 7, 8, 9],
-        d if d < 2.5 => &[1, 2, 5],
+        d if d < 2.0 => &[1, 2, 5],
         _ => &[1],
     };
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let all = (first..=last).flat_map(|d| (1..=9).map(move |m| (f64::from(m) * 10f64.powi(d), m)));
-    all.filter(|(v, _)| *v >= low && *v <= high).map(|(v, m)| (v, named.contains(&m))).collect()
+    // Of many decades every second or third one.
+    let every = (decades / 5.0).ceil().max(1.0) as i32;
+    let named = |v: f64, m: u32| named.contains(&m) && (v.log10().round() as i32 % every == 0 || m > 1);
+    all.filter(|(v, _)| *v >= low && *v <= high).map(|(v, m)| (v, named(v, m))).collect()
 }
 
 /// A tick label: decimal from 0.001 to 9999, otherwise scientific.
@@ -448,6 +510,12 @@ fn number(value: f64) -> String {
         v if (0.000_99..9_999.0).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
         v => format!("{v:.0e}"),
     }
+}
+
+/// Three digits.
+fn rounded(value: f64) -> String {
+    let digits = (2 - value.max(1e-9).log10().floor() as i32).clamp(0, 6);
+    format!("{value:.*}", digits as usize)
 }
 
 /// Placement of labels next to their marks without overlap.
@@ -474,8 +542,8 @@ impl Labels {
         }
     }
 
-    /// Top left of a label of this size for a mark, within the frame; None if there is no free place.
-    pub fn place(&mut self, at: [f64; 2], [w, h]: [f64; 2], frame: Frame) -> Option<[f64; 2]> {
+    /// Top left of a label of this size for a mark, within the frame: beside it, or else where there is room, the nearest first.
+    pub fn place(&mut self, at: [f64; 2], [w, h]: [f64; 2], frame: Frame) -> [f64; 2] {
         let around = |gap: f64| {
             let (east, west) = (at[0] + gap, at[0] - gap - w);
             let (above, below, level) = (at[1] - gap - h, at[1] + gap, at[1] - h / 2.0);
@@ -485,16 +553,26 @@ impl Labels {
             let (se, sw) = ([at[0] + near, at[1] + near], [at[0] - near - w, at[1] + near]);
             [[east, level], ne, [middle, above], [middle, below], se, nw, [west, level], sw]
         };
-        let candidates: Vec<[f64; 2]> = [11.0, 15.0, 20.0].into_iter().flat_map(around).collect();
+        let candidates: Vec<[f64; 2]> = [9.0, 12.0, 16.0].into_iter().flat_map(around).collect();
         let boxed = |[x, y]: [f64; 2]| [x - 1.0, y - 1.0, x + w + 1.0, y + h + 1.0];
         let free = |b: Frame| {
             let inside = b[0] >= frame[0] && b[1] >= frame[1] && b[2] <= frame[2] && b[3] <= frame[3];
             inside && !self.taken.iter().any(|t| b[0] < t[2] && t[0] < b[2] && b[1] < t[3] && t[1] < b[3])
         };
         let clear = |b: Frame| !self.lines.iter().any(|p| p[0] > b[0] && p[0] < b[2] && p[1] > b[1] && p[1] < b[3]);
+        let [left, top, right, bottom] = frame;
+        let rows = (0..).map(|i| top + 2.0 + 4.0 * f64::from(i)).take_while(|y| y + h < bottom);
+        let columns = || (0..).map(|i| left + 2.0 + 6.0 * f64::from(i)).take_while(|x| x + w < right);
+        let mut anywhere: Vec<[f64; 2]> = rows.flat_map(|y| columns().map(move |x| [x, y])).collect();
+        let away = |c: &[f64; 2]| (c[0] + w / 2.0 - at[0]).hypot(c[1] + h / 2.0 - at[1]);
+        anywhere.sort_by(|a, b| away(a).total_cmp(&away(b)));
+        let all = || candidates.iter().chain(&anywhere);
         let found = candidates.iter().find(|c| free(boxed(**c)) && clear(boxed(**c)));
-        let found = *found.or_else(|| candidates.iter().find(|c| free(boxed(**c))))?;
+        let found = found.or_else(|| all().find(|c| free(boxed(**c)) && clear(boxed(**c))));
+        let found = found.or_else(|| all().find(|c| free(boxed(**c)))).copied();
+        // In a frame that is full it covers another.
+        let found = found.unwrap_or([at[0] + 9.0, at[1] - h / 2.0]);
         self.taken.push(boxed(found));
-        Some(found)
+        found
     }
 }

@@ -4,7 +4,7 @@
 //! The quality ladder of a moving view: changes of the settings from full quality down. They come from a measured error report, or are
 //! the built-in ones, which were found to cost the least error for the time that they save.
 
-use crate::error_report::{Measure, Report, choose};
+use crate::error_report::{Combination, Measure, Report, choose};
 use crate::scene::load::Layers;
 use crate::scene::{Settings, Transfer};
 use std::time::{Duration, Instant};
@@ -163,17 +163,21 @@ pub fn built_in_ladder() -> Vec<Rung> {
     ]
 }
 
-/// The ladder of an error report: the Pareto front of its combinations, from full quality to the fastest.
+/// The ladder of an error report: the Pareto front of its measured combinations, from full quality to the fastest. Times are those of
+/// the picture: stage 1 is the same on every rung.
 ///
 /// # Errors
 /// One line: the report has no times.
 pub fn measured_ladder(report: &Report) -> Result<Vec<Rung>, String> {
-    let (front, slowest) = choose::front(report, Measure::Rmse)?;
+    let picture_time = |c: &Combination| c.times.map(|t| t.picture.median).filter(|t| *t > 0.0);
+    let as_it_is = report.choices.iter().find(|c| c.set.is_empty());
+    let slowest = as_it_is.and_then(picture_time).ok_or("error report: the scene as it is has no time")?;
     let full = Rung { label: "full quality".into(), time_share: 1.0, change: Change::None };
     // A rung must save at least a quarter of the time of the one before.
     let mut rungs = vec![full];
-    for choice in front.iter().rev() {
-        let (time_share, before) = (choice.time / slowest, rungs.last().map_or(1.0, |r| r.time_share));
+    for choice in choose::front(report, Measure::Rmse).into_iter().rev().map(|i| &report.choices[i]) {
+        let Some(time) = picture_time(choice) else { continue };
+        let (time_share, before) = (time / slowest, rungs.last().map_or(1.0, |r| r.time_share));
         if time_share <= 0.75 * before {
             let label = choice.changed.iter().map(|(dial, point)| format!("{dial} {point}")).collect::<Vec<_>>();
             rungs.push(Rung { label: label.join(", "), time_share, change: Change::Measured(choice.set.clone()) });

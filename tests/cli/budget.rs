@@ -3,21 +3,28 @@
 use crate::common::program::*;
 use std::fs;
 
-/// An error report of the bone with one dial: 20 ms by default, 8 ms with longer steps.
+/// An error report of the bone with two combinations: 20 ms as it is, 8 ms with longer steps.
 pub fn error_report(volume: &str) -> String {
-    let point = |label: &str, set: &str, value: f64, rmse: f64, ms: f64, is_default: bool| {
-        let time = ms * 1e6;
+    let choice = |set: &str, rmse: f64, ms: f64| {
+        let changed = if set.is_empty() { "" } else { "[\"step\", \"1.25 mm\"]" };
+        let time = |ms: f64| {
+            let ns = ms * 1e6;
+            format!("{{\"median\": {ns}, \"low\": {ns}, \"high\": {ns}, \"p95\": {ns}}}")
+        };
         format!(
-            "{{\"label\": \"{label}\", \"set\": [{set}], \"value\": {value}, \"errors\": {{\"rmse\": {rmse}, \"max\": 0.1}}, \
-             \"time\": {{\"median\": {time}, \"low\": {time}, \"high\": {time}}}, \"is_default\": {is_default}}}"
+            "{{\"changed\": [{changed}], \"set\": [{set}], \"errors\": {{\"rmse\": {rmse}, \"max\": 0.1}}, \"reference_error\": 0, \
+             \"times\": {{\"volume\": {}, \"picture\": {}, \"total\": {}}}}}",
+            time(0.25 * ms),
+            time(0.75 * ms),
+            time(ms)
         )
     };
     format!(
-        "{{\"format\": \"echolume error report 1\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
-         \"scene\": \"bone\", \"sizes\": {{\"volume\": {volume}, \"picture\": [64, 48]}}, \"repeats\": 3, \"dials\": [{{\
-         \"name\": \"step\", \"unit\": \"mm\", \"reference\": {{\"kind\": \"f64\"}}, \"points\": [{}, {}]}}]}}",
-        point("0.5 mm", "", 0.5, 0.001, 20.0, true),
-        point("1.25 mm", "\"ray.step=1.25\"", 1.25, 0.004, 8.0, false)
+        "{{\"format\": \"echolume error report 2\", \"device\": \"a card\", \"driver\": \"1\", \"date\": \"2026-11-21\", \
+         \"scene\": \"bone\", \"sizes\": {{\"volume\": {volume}, \"picture\": [64, 48]}}, \"repeats\": 3, \"dials\": [], \
+         \"choices\": [{}, {}]}}",
+        choice("", 0.001, 20.0),
+        choice("\"ray.step=1.25\"", 0.004, 8.0)
     )
 }
 
@@ -35,12 +42,15 @@ fn a_time_budget_uses_the_report_and_overrides_no_setting_of_the_user() {
     assert_ne!(plain, coarse);
     let (said, chosen) = picture("chosen.png", &["--budget", "10ms", "--report", &report]);
     assert!(
-        said.contains("budget 10ms: (ray.step=1.25) has RMSE 4.000e-3 and takes 8.000 ms, measured on a card"),
+        said.contains(
+            "budget 10ms: (ray.step=1.25): RMSE 4.000e-3, 8.000 ms (95th percentile 8.000), measured on a card with another scene"
+        ),
         "{said}"
     );
+    assert!(said.contains("budget 10ms: volume and picture took "), "{said}");
     assert_eq!(chosen, coarse);
     let (said, ample) = picture("ample.png", &["--budget", "0.1s", "--report", &report]);
-    assert!(said.contains("(the default)"), "{said}");
+    assert!(said.contains("(the scene as it is)"), "{said}");
     assert_eq!(ample, picture("default.png", &[]).1);
     let (_, mine) = picture("mine.png", &["--budget", "10ms", "--report", &report, "--set", "ray.step=0.5"]);
     assert_eq!(mine, plain, "what the user sets is above it");
@@ -58,7 +68,7 @@ fn a_time_budget_uses_the_report_and_overrides_no_setting_of_the_user() {
         folder.refuses(&[BONE, "--budget", budget, "--report", file], &[named]);
     }
     let all = ["render", BONE, "--budget", "1ms", "--report", &report, "-o", &folder.path("never.png")];
-    refuses(&all, &run(&all), 1, &["--budget 1ms", "no setting takes", "8.000 ms"]);
+    refuses(&all, &run(&all), 1, &["--budget 1ms", "no settings take 1.000 ms or less", "8.000 ms"]);
     for alone in [["--budget", "10ms"], ["--report", &report]] {
         assert_eq!(run(&[&["render", BONE][..], &alone].concat()).0, Some(2), "{alone:?}");
     }

@@ -1,6 +1,7 @@
 //! Reports of earlier runs, and ordinary pictures.
 
 use super::{told, written};
+use echolume::error_report::choose::Bound;
 use echolume::error_report::{Measure, Report, choose, export as error_export};
 use echolume::picture::Grey;
 use echolume::profile::{Profile, compare, export};
@@ -18,8 +19,11 @@ pub fn error_report(bytes: &[u8]) -> String {
     let mut outcome = String::new();
     for measure in [Measure::Rmse, Measure::Mm, Measure::Degrees] {
         error_export::summary_table(&report, measure);
-        outcome += &choose::cheapest_under(&report, measure, 0.01, 0.1).map_or_else(|e| e, |c| c.describe(measure));
-        outcome += &choose::most_accurate_under(&report, measure, 1e7, 0.1).map_or_else(|e| e, |c| c.describe(measure));
+        for bound in [Bound::Error(0.01), Bound::Time(1e7)] {
+            let choice = choose::choose(&report, measure, bound, &[]);
+            outcome += &choice.map_or_else(|e| e, |c| report.choices[c].describe(measure));
+            outcome += &format!("{:?}", choose::proposals(&report.dials, Some(bound), 8));
+        }
     }
     #[cfg(not(feature = "view"))]
     let rungs = 0;
