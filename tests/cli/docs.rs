@@ -220,7 +220,8 @@ fn described_types() -> BTreeMap<String, Described> {
                     let rule = serde_arguments(&item.attrs);
                     let choices = item.variants.into_iter().map(|variant| {
                         let arguments = serde_arguments(&variant.attrs);
-                        let name = renamed(&variant.ident.to_string(), argument(&rule, "rename_all"));
+                        let by_rule = || renamed(&variant.ident.to_string(), argument(&rule, "rename_all"));
+                        let name = argument(&arguments, "rename").map_or_else(by_rule, str::to_string);
                         let aliases = arguments.into_iter().filter(|(key, alias)| key == "alias" && *alias != name);
                         Choice {
                             aliases: aliases.map(|(_, alias)| alias).collect(),

@@ -508,4 +508,42 @@ mod tests {
             assert!(edges > 1000, "{edges}");
         }
     }
+
+    /// Steps of the data put the largest difference anywhere on a flat top; the middle between the two crossings of a level is where
+    /// D is steep. The samples are those of trilinear interpolation between voxels of eight bits, four of them in the length of the edge, as by default.
+    #[test]
+    fn the_place_of_an_edge_in_data_of_eight_bits() {
+        let mut worst = [[0.0f64; 2]; 2];
+        for (way, place) in [Place::Peak, Place::Middle].into_iter().enumerate() {
+            for (low, (height, widest)) in [(1.0, 1.0), (0.2, 0.5)].into_iter().enumerate() {
+                let settings = Surface { threshold: 0.05, place, rough: 1, ..Surface::default() };
+                for half in [4, 8, 16, 64] {
+                    for (sd, offset) in
+                        [0.125, 0.25, 0.5, 0.75, 1.0].into_iter().flat_map(|sd| (0..16).map(move |offset| (sd, offset)))
+                    {
+                        if sd > widest {
+                            continue;
+                        }
+                        let edge = 15.0 + f64::from(offset) / 32.0;
+                        let voxel = |n: f64| {
+                            let value = 0.1 + 0.8 * height * 0.5 * (1.0 + erf((0.25 * n - edge) / (sd * 2f64.sqrt())));
+                            (255.0 * value).round() / 255.0
+                        };
+                        let field = |x: f64| {
+                            let (below, share) = ((4.0 * x).floor(), (4.0 * x).fract());
+                            voxel(below) * (1.0 - share) + voxel(below + 1.0) * share
+                        };
+                        let found = place_on(&settings, half, field).expect("an edge above the threshold");
+                        worst[way][low] = worst[way][low].max((found - edge).abs());
+                    }
+                }
+            }
+        }
+        println!(
+            "peak: {:.4} of the edge at full height, {:.4} at a fifth; middle: {:.4}, {:.4}",
+            worst[0][0], worst[0][1], worst[1][0], worst[1][1]
+        );
+        assert!(worst.iter().flatten().all(|off| *off <= 0.025), "{worst:?}");
+        assert!(worst[1][0] < worst[0][0] && worst[1][1] < worst[0][1], "the middle is the better one: {worst:?}");
+    }
 }
