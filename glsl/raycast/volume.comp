@@ -1,7 +1,8 @@
 // VR: emission and absorption, front to back (thesis 4-1, 4-2). Variants add to those of the sweep:
 //   LAYER  the ray ends at the surface; the result is a layer in front of it
+//   BEHIND the ray begins at the surface and ends at a depth behind it; the result is the surface's colour
 //   HIT    the position where the ray becomes opaque enough is stored, to be lit
-// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; layer_plain LAYER; layer_uniform LAYER SWEPT; layer_intra_frame_motion LAYER SWEPT INTRA_FRAME_MOTION; layer_non_uniform LAYER SWEPT NON_UNIFORM; layer_non_uniform_intra_frame_motion LAYER SWEPT NON_UNIFORM INTRA_FRAME_MOTION; hit_plain HIT; hit_uniform HIT SWEPT; hit_intra_frame_motion HIT SWEPT INTRA_FRAME_MOTION; hit_non_uniform HIT SWEPT NON_UNIFORM; hit_non_uniform_intra_frame_motion HIT SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; layer_plain LAYER; layer_uniform LAYER SWEPT; layer_intra_frame_motion LAYER SWEPT INTRA_FRAME_MOTION; layer_non_uniform LAYER SWEPT NON_UNIFORM; layer_non_uniform_intra_frame_motion LAYER SWEPT NON_UNIFORM INTRA_FRAME_MOTION; behind_plain BEHIND; behind_uniform BEHIND SWEPT; behind_intra_frame_motion BEHIND SWEPT INTRA_FRAME_MOTION; behind_non_uniform BEHIND SWEPT NON_UNIFORM; behind_non_uniform_intra_frame_motion BEHIND SWEPT NON_UNIFORM INTRA_FRAME_MOTION; hit_plain HIT; hit_uniform HIT SWEPT; hit_intra_frame_motion HIT SWEPT INTRA_FRAME_MOTION; hit_non_uniform HIT SWEPT NON_UNIFORM; hit_non_uniform_intra_frame_motion HIT SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EARLY_END = 1;
@@ -17,6 +18,9 @@ layout(scalar) uniform Params {
     vec3 far_tint;
     vec3 depth_axis; // depth along the view: dot(place, axis) - depth_near is 0 at the nearest, 1 at the farthest
     float depth_near;
+#ifdef BEHIND
+    float colour_depth; // behind the surface, mm
+#endif
 };
 #include "ray.glsl"
 #include "sliding.glsl"
@@ -24,7 +28,7 @@ layout(scalar) uniform Params {
 // Colour and absorption over the sample value; pre-integrated: their mean between two values, one row per front value.
 readonly buffer TransferTable { vec4 entry[]; } transfer;
 uniform writeonly image2D picture;
-#ifdef LAYER
+#if defined(LAYER) || defined(BEHIND)
 uniform texture2D distance_map;
 #endif
 #ifdef HIT
@@ -59,6 +63,12 @@ void main() {
     Ray ray = ray_of(pixel);
 #ifdef LAYER
     ray.leave = min(ray.leave, texelFetch(distance_map, pixel, 0).x);
+#endif
+#ifdef BEHIND
+    // A miss is farther away than any box.
+    float surface = texelFetch(distance_map, pixel, 0).x;
+    ray.enter = max(ray.enter, surface);
+    ray.leave = min(ray.leave, surface + colour_depth);
 #endif
     float path = ray.leave - ray.enter;
     vec3 colour = vec3(0.0);

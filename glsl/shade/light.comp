@@ -1,10 +1,17 @@
 // Blinn-Phong with normals from the distance map (thesis 4-4..4-7), shadow and occlusion where the scene has them, and skin.
-// Variants by what is lit: a surface; BEHIND_LAYER, a surface behind a composited volume; COMPOSITED, the volume itself.
-// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED; behind_layer_plain BEHIND_LAYER; behind_layer_shadowed BEHIND_LAYER SHADOWED; behind_layer_occluded BEHIND_LAYER OCCLUDED; behind_layer_shadowed_occluded BEHIND_LAYER SHADOWED OCCLUDED; composited_plain COMPOSITED; composited_shadowed COMPOSITED SHADOWED; composited_occluded COMPOSITED OCCLUDED; composited_shadowed_occluded COMPOSITED SHADOWED OCCLUDED
+// Variants by what is lit: a surface; BEHIND_LAYER, a surface behind a composited volume; COMPOSITED, the volume itself; COLOURED,
+// a surface with the colour that volume rendering gives its ray.
+// variants: plain; shadowed SHADOWED; occluded OCCLUDED; shadowed_occluded SHADOWED OCCLUDED; behind_layer_plain BEHIND_LAYER; behind_layer_shadowed BEHIND_LAYER SHADOWED; behind_layer_occluded BEHIND_LAYER OCCLUDED; behind_layer_shadowed_occluded BEHIND_LAYER SHADOWED OCCLUDED; composited_plain COMPOSITED; composited_shadowed COMPOSITED SHADOWED; composited_occluded COMPOSITED OCCLUDED; composited_shadowed_occluded COMPOSITED SHADOWED OCCLUDED; coloured_plain COLOURED; coloured_shadowed COLOURED SHADOWED; coloured_occluded COLOURED OCCLUDED; coloured_shadowed_occluded COLOURED SHADOWED OCCLUDED
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int POINT = 0; // 0: directional light, 1: point light
 layout(constant_id = 1) const int SKIN = 0;
+#ifdef SHADOWED
+layout(constant_id = 2) const int DIMS_PIXEL = 0; // 1: a shadow dims ambient light too
+#endif
+#ifdef COLOURED
+layout(constant_id = 3) const int AMBIENT_ONLY = 0; // 1: the volume's colour is that of ambient light alone (thesis 4-5)
+#endif
 layout(scalar) uniform Params {
 #include "camera_params.glsl"
     vec3 light_at; // unit direction to a directional light, or position of a point light in mm
@@ -24,7 +31,7 @@ layout(scalar) uniform Params {
 #ifndef COMPOSITED
 uniform texture2D surface; // echo, found, mean echo behind
 #endif
-#if defined(BEHIND_LAYER) || defined(COMPOSITED)
+#if defined(BEHIND_LAYER) || defined(COMPOSITED) || defined(COLOURED)
 uniform texture2D volume_layer; // colours times opacity, opacity
 #endif
 #ifdef SHADOWED
@@ -72,12 +79,23 @@ void main() {
     const vec3 colour = vec3(1.0);
 #else
     vec4 echo = texelFetch(surface, pixel, 0);
-    vec3 colour = surface_colour * mix(1.0, echo.x, texture_share * echo.y);
+    vec3 colour = vec3(mix(1.0, echo.x, texture_share * echo.y));
+#ifndef COLOURED
+    colour *= surface_colour;
+#endif
+#endif
+#ifdef COLOURED
+    vec3 ambient_colour = colour * texelFetch(volume_layer, pixel, 0).rgb;
+    if (AMBIENT_ONLY == 0) colour = ambient_colour;
 #endif
 
-    float lit = 1.0, open = 1.0;
+    float lit = 1.0, open = 1.0, dimmed = 1.0;
 #ifdef SHADOWED
     lit = 1.0 - shadow_strength * (1.0 - texelFetch(shadow, pixel, 0).x);
+    if (DIMS_PIXEL == 1) {
+        dimmed = lit;
+        lit = 1.0;
+    }
 #endif
 #ifdef OCCLUDED
     open = texelFetch(occlusion, pixel, 0).x;
@@ -92,8 +110,13 @@ void main() {
         float thin = echo.y * (1.0 - clamp(echo.z, 0.0, 1.0));
         glow = through * thin * (0.35 + 0.65 * max(-cosine, 0.0));
     }
-    vec3 sum = colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3)) + glow * open;
-    vec3 highlight = vec3(specular * shine * lit * (facing > 0.0 ? 1.0 : 0.0));
+#ifdef COLOURED
+    vec3 body = ambient_colour * ambient * open + colour * diffuse * diffused * mix(1.0, open, 0.3);
+#else
+    vec3 body = colour * (ambient * open + diffuse * diffused * mix(1.0, open, 0.3));
+#endif
+    vec3 sum = dimmed * (body + glow * open);
+    vec3 highlight = vec3(specular * shine * lit * dimmed * (facing > 0.0 ? 1.0 : 0.0));
 #ifdef COMPOSITED
     // Lighting is weighted by opacity.
     imageStore(picture, pixel, vec4(before.rgb * mix(vec3(1.0), light_colour * sum, before.a) + before.a * light_colour * highlight, before.a));

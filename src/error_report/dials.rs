@@ -88,7 +88,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let places = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
             // Steps with the same samples of the surface detector give the same picture.
             let ring_half = |f: f64| match (s.mode, s.surface.edge) {
-                (Mode::Surface, None | Some(Edge::Length(_))) => scene.ring.half_at(f * step),
+                (Mode::Surface, None | Some(Edge::Length(_))) if !composites => scene.ring.half_at(f * step),
                 _ => 0,
             };
             let mut halves = vec![ring_half(1.0)];

@@ -195,7 +195,7 @@ impl ErrorMeasurement<'_> {
     ///
     /// # Errors
     /// As [`ErrorMeasurement::report`].
-    pub fn measure_again(&self, finest: &Finest, choice: &Combination, runs: u32) -> Result<Combination, MeasureError> {
+    fn measure_again(&self, finest: &Finest, choice: &Combination, runs: u32) -> Result<Combination, MeasureError> {
         let (errors, times) = self.measure_set(finest, &choice.set, runs)?;
         Ok(Combination { errors, times, reference_error: finest.error, ..choice.clone() })
     }

@@ -2,7 +2,7 @@
 //! normals that its passes share.
 
 use crate::passes::pass::*;
-use crate::scene::{Mode, Scene, Skin};
+use crate::scene::{Dims, Mode, Scene, Skin, SurfaceColour};
 use glam::DVec3;
 
 /// Blinn-Phong (thesis 4-4..4-7) with a directional or point light, with shadow, occlusion and the look of skin where requested.
@@ -26,6 +26,10 @@ pub const LIGHT: Pass = Pass {
             (Lit::Composited, (true, false)) => "shade/light.composited_shadowed",
             (Lit::Composited, (false, true)) => "shade/light.composited_occluded",
             (Lit::Composited, (true, true)) => "shade/light.composited_shadowed_occluded",
+            (Lit::Coloured, (false, false)) => "shade/light.coloured_plain",
+            (Lit::Coloured, (true, false)) => "shade/light.coloured_shadowed",
+            (Lit::Coloured, (false, true)) => "shade/light.coloured_occluded",
+            (Lit::Coloured, (true, true)) => "shade/light.coloured_shadowed_occluded",
         }
     },
     needed: |s| match (s.has_distance(), s.lights_volume()) {
@@ -62,7 +66,13 @@ pub const LIGHT: Pass = Pass {
     },
     constants: |s, _| {
         let light = &s.settings.light;
-        vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)]
+        let dims_pixel = light.shadow.is_some_and(|shadow| shadow.dims == Dims::Pixel);
+        let mut constants = vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)];
+        constants.extend(casts_shadow(s).then_some(("DIMS_PIXEL", dims_pixel as i32)));
+        if lit_thing(s) == Lit::Coloured {
+            constants.push(("AMBIENT_ONLY", (s.settings.surface.colour == SurfaceColour::Rendered) as i32));
+        }
+        constants
     },
     tolerance: Tolerance {
         absolute: 6e-3,
@@ -89,12 +99,15 @@ enum Lit {
     BehindLayer,
     /// The volume itself, where rays hit it first.
     Composited,
+    /// A surface with the colour that volume rendering gives its ray.
+    Coloured,
 }
 
 fn lit_thing(scene: &Scene) -> Lit {
     match (scene.lights_volume(), scene.settings.mode) {
         (true, _) => Lit::Composited,
         (false, Mode::Mixed) => Lit::BehindLayer,
+        (false, _) if scene.colours_surface() => Lit::Coloured,
         (false, _) => Lit::Surface,
     }
 }
@@ -106,7 +119,9 @@ fn reference_pixel(scene: &Scene, reads: &Arrays, light: Option<(DVec3, DVec3)>,
         (DVec3::new(layer[0], layer[1], layer[2]) * share, layer[3] * share)
     };
     let (colour, opacity) = match (lit_thing(scene), light) {
-        (Lit::Surface, light) => light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0)),
+        (Lit::Surface | Lit::Coloured, light) => {
+            light.map_or((DVec3::ZERO, 0.0), |(body, highlight)| (body + highlight, 1.0))
+        }
         (Lit::BehindLayer, light) => {
             let (before, opacity) = layer(scene.settings.volume.veil);
             light.map_or((before, opacity), |(body, highlight)| (before + (1.0 - opacity) * (body + highlight), 1.0))
@@ -143,12 +158,19 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
     let facing = cosine.max(0.0);
     let halfway = (to_light - along).try_normalize().unwrap_or(DVec3::ZERO);
     let gloss = normal.dot(halfway).max(0.0).powf(light.shininess);
-    let (colour, found, behind) = match lit_thing(scene) {
-        Lit::Composited => (DVec3::ONE, 1.0, 1.0),
-        _ => {
+    // Colours of ambient and of diffuse light.
+    let (ambient_colour, colour, found, behind) = match lit_thing(scene) {
+        Lit::Composited => (DVec3::ONE, DVec3::ONE, 1.0, 1.0),
+        lit => {
             let surface = reads.get("surface").get([x, y, 0]);
             let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
-            (DVec3::from(light.surface_colour) * (1.0 + (echo - 1.0) * light.texture * found), found, behind)
+            let texture = 1.0 + (echo - 1.0) * light.texture * found;
+            let colour = match lit {
+                Lit::Coloured => DVec3::from_slice(&reads.get("volume_layer").get([x, y, 0])[..3]),
+                _ => DVec3::from(light.surface_colour),
+            };
+            let ambient_only = lit == Lit::Coloured && scene.settings.surface.colour == SurfaceColour::Rendered;
+            (colour * texture, if ambient_only { DVec3::splat(texture) } else { colour * texture }, found, behind)
         }
     };
 
@@ -156,6 +178,8 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
         true => 1.0 - s.strength * (1.0 - reads.get("shadow").one(x, y, 0)),
         false => 1.0,
     });
+    let dims_pixel = light.shadow.is_some_and(|s| s.dims == Dims::Pixel);
+    let (arrives, dimmed) = if dims_pixel { (1.0, arrives) } else { (arrives, 1.0) };
     let open = if is_occluded(scene) { reads.get("occlusion").one(x, y, 0) } else { 1.0 };
     let (diffused, glow) = match scene.skin() {
         None => (DVec3::splat(facing * arrives), DVec3::ZERO),
@@ -169,9 +193,9 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
         }
     };
     let shine = if facing > 0.0 { light.specular * gloss * arrives } else { 0.0 };
-    let body = colour * (light.ambient * open + light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0)));
+    let body = ambient_colour * light.ambient * open + colour * light.diffuse * diffused * (1.0 + 0.3 * (open - 1.0));
     let colour = DVec3::from(light.colour);
-    Some((colour * (body + glow * open), colour * shine))
+    Some((colour * (body + glow * open) * dimmed, colour * shine * dimmed))
 }
 
 /// Samples on the segment to the light.

@@ -115,6 +115,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.noise", f.noise, 0.0, 10.0)?;
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
     within("surface.number", f64::from(f.number), 1.0, 8.0)?;
+    within("surface.colour_depth", f.colour_depth, 0.01, 1000.0)?;
     check_light(&settings.light)?;
     within("post.brightness", settings.post.brightness, -1.0, 1.0)?;
     within("post.contrast", settings.post.contrast, 0.0, 10.0)?;

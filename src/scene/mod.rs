@@ -336,7 +336,12 @@ impl Scene {
 
     /// True if samples are composited through the transfer function.
     pub fn composites(&self) -> bool {
-        matches!(self.settings.mode, Mode::Volume | Mode::Mixed)
+        matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface()
+    }
+
+    /// True if the volume gives the surface its colour.
+    pub fn colours_surface(&self) -> bool {
+        self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
     }
 
     /// True if the mode is a projection: one value per ray.

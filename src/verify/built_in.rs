@@ -244,6 +244,9 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
     probe
 }
 
+/// A mode and its settings: a surface with the volume's colour behind it.
+const BEHIND: &str = "'sr'\nsurface = { colour = 'behind', colour_depth = 4 }";
+
 fn ray_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
@@ -251,7 +254,10 @@ fn ray_scenes() -> Vec<SceneSpec> {
             scenes.push(SceneSpec::new(name, geometry, input, toml.into()));
             return;
         }
-        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }"] {
+        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }", BEHIND] {
+            if mode == BEHIND && toml.contains("surface") {
+                continue; // has its own table
+            }
             let toml = format!("mode = {mode}\n{toml}");
             scenes.push(SceneSpec::new(&format!("{name}, {mode}"), geometry, input, toml));
         }
@@ -393,6 +399,19 @@ fn ray_scenes() -> Vec<SceneSpec> {
         ),
         ("clipped surface", "slices = { pixels = 30 }\nclip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]"),
         ("veil over a surface", "mode = 'mixed'\nvolume = { veil = 0.5 }\nlight = { occlusion = {} }\nslices = { pixels = 30 }"),
+        ("rendered colours", "mode = 'sr'\nsurface = { colour = 'rendered' }\nlight = { texture = 0.5 }\nslices = { pixels = 30 }"),
+        (
+            "rendered colours, shadow over the pixel",
+            "mode = 'sr'\nsurface = { colour = 'rendered' }\nvolume = { transfer = 'warm' }\nlight = { shadow = { dims = 'pixel' } }\nslices = { pixels = 30 }",
+        ),
+        (
+            "colours behind the surface",
+            "mode = 'sr'\nsurface = { colour = 'behind' }\nlight = { skin = {}, occlusion = {} }\nslices = { pixels = 30 }",
+        ),
+        (
+            "colours behind the surface, shadow and occlusion",
+            "mode = 'sr'\nsurface = { colour = 'behind' }\nlight = { shadow = {}, occlusion = {} }\nslices = { pixels = 30 }",
+        ),
         ("veil and shadow", "mode = 'mixed'\nlight = { shadow = {} }\nslices = { pixels = 30 }"),
         ("lit volume, shadow", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {}, skin = {} }\nslices = { pixels = 12 }"),
         ("lit volume, occlusion", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { occlusion = {} }\nslices = { pixels = 12 }"),

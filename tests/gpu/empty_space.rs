@@ -50,7 +50,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-const MODES: [&str; 24] = [
+const MODES: [&str; 26] = [
     "mode = 'sr'\nsurface = { threshold = 0.2 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 1 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 4, rough_threshold = 0.1, number = 2 }",
@@ -73,6 +73,8 @@ const MODES: [&str; 24] = [
     "mode = 'minip'\nregion = { depth = [20, 32], lateral = [-6, 8] }",
     "mode = 'mean'",
     "mode = 'mean'\nprojection = { window = [0.05, 0.8] }",
+    "mode = 'sr'\nsurface = { threshold = 0.2, colour = 'rendered' }\nvolume = { threshold = 0.3 }",
+    "mode = 'sr'\nsurface = { threshold = 0.2, colour = 'behind' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
     "mode = 'mixed'\nsurface = { threshold = 0.2 }\nvolume = { threshold = 0.3 }",
     "mode = 'mixed'\nsurface = { threshold = 0.2, sign = 'dark' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
 ];

@@ -2,6 +2,7 @@
 //! filters that invent no edges; and the choice among several surfaces.
 
 use crate::common::gpu::*;
+use crate::common::probes::wobbler;
 use echolume::gpu::pass_runner::PassRunner;
 use echolume::passes::{Arrays, DispatchArgs, MISS, Slot, Texels, by_name, is_hit};
 use echolume::probe::{Geometry, Grid};
@@ -206,4 +207,68 @@ fn the_requested_surface_of_several_is_taken() {
             }
         }
     }
+}
+
+/// Thesis 4-5 to 4-7: the rendered pixel is the colour of the ambient light alone, and a shadow dims the pixel or the light.
+#[test]
+fn a_surface_is_lit_by_the_rendered_pixel() {
+    let device = Device::new();
+    let lit = |toml: &str, light: &str| {
+        let scene = plate(&format!(
+            "surface = {{ {toml} }}\nlight = {{ direction = [0, 0, 1], ambient = 0.3, diffuse = 0.4, specular = 0, \
+             surface_colour = [1, 0.5, 0.25]{light} }}"
+        ));
+        let distances = map(&scene, |_, _| 40.0);
+        let pass = by_name("light").expect("pass");
+        let mut inputs = Arrays::default();
+        for bind in pass.reads(&scene, &DispatchArgs::default()) {
+            let value = |c: usize| match bind.slot {
+                Slot::VolumeLayer => [0.8, 0.6, 0.2, 0.9][c],
+                Slot::Shadow => 0.25,
+                _ => 1.0,
+            };
+            let channels = bind.slot.format(&scene).channels();
+            let texels = Texels::from_fn(distances.size, channels, |_, c| value(c));
+            inputs.insert(bind.name, if bind.slot == Slot::Distance { distances.clone() } else { texels });
+        }
+        let mut runner = PassRunner::new(&device).expect("single");
+        let outputs = runner.run(&scene, pass, &DispatchArgs::default(), &inputs, 0.5).expect("dispatch");
+        outputs.get("picture").get([120, 120, 0])[..3].to_vec()
+    };
+    let near = |a: &[f64], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-3);
+    let layer = [0.8, 0.6, 0.2];
+    let constant = lit("", "");
+    assert!(near(&constant, [1.0, 0.5, 0.25].map(|c| 0.7 * c)), "{constant:?}");
+    let rendered = lit("colour = 'rendered'", "");
+    assert!(near(&rendered, layer.map(|c| 0.3 * c + 0.4)), "{rendered:?}");
+    let behind = lit("colour = 'behind'", "");
+    assert!(near(&behind, layer.map(|c| 0.7 * c)), "{behind:?}");
+    // Of the light that a shadow of full strength removes, a quarter arrives.
+    let light = lit("colour = 'rendered'", ", shadow = { strength = 1 }");
+    assert!(near(&light, layer.map(|c| 0.3 * c + 0.1)), "{light:?}");
+    let pixel = lit("colour = 'rendered'", ", shadow = { strength = 1, dims = 'pixel' }");
+    assert!(near(&pixel, layer.map(|c| 0.25 * (0.3 * c + 0.4))), "{pixel:?}");
+}
+
+/// Prevents a surface whose picture does not depend on the transfer function.
+#[test]
+fn the_transfer_function_colours_a_surface_that_takes_its_colour() {
+    let device = Device::new();
+    let picture = |colour: &str, transfer: &str| {
+        let toml = format!(
+            "picture = {{ size = [48, 40] }}\nslices = {{ pixels = 40 }}\nmode = 'sr'\nsurface = {{ colour = '{colour}' }}\n\
+             volume = {{ transfer = '{transfer}' }}"
+        );
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, &toml);
+        // A wall in the middle of each line, brighter further behind.
+        let [samples, lines] = scene.frame_size().map(|n| n as usize);
+        let echo = |sample: usize| if sample < samples / 2 { 0.1 } else { 0.4 + 0.6 * sample as f64 / samples as f64 };
+        let frame = Texels::from_fn([samples, lines, 1], 1, |[sample, _, _], _| echo(sample));
+        let frames = vec![frame; scene.slices() as usize];
+        rendered(&device, scene, &frames).picture().expect("picture").rgba
+    };
+    for colour in ["rendered", "behind"] {
+        assert_ne!(picture(colour, "grey"), picture(colour, "bone"), "{colour}");
+    }
+    assert_eq!(picture("constant", "grey"), picture("constant", "bone"));
 }

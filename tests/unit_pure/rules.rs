@@ -208,6 +208,8 @@ fn scenes() -> Vec<Scene> {
                 "'vr'",
                 "'sr'",
                 "'mip'",
+                "'sr'\nsurface = { colour = 'rendered' }",
+                "'sr'\nsurface = { colour = 'behind' }",
                 "'mixed'",
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",

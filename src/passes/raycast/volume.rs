@@ -4,7 +4,7 @@ use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::empty_space;
 use crate::passes::pass::*;
-use crate::scene::{Compositing, Mode, Scene, Shading, transfer};
+use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour, transfer};
 use glam::DVec3;
 
 pub const PASS: Pass = Pass {
@@ -13,7 +13,8 @@ pub const PASS: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::None,
     shader: |s, _| match kind(s) {
-        Kind::Alone => ray::variant!(s, "raycast/volume", ""),
+        Kind::Alone | Kind::Colour => ray::variant!(s, "raycast/volume", ""),
+        Kind::Behind => ray::variant!(s, "raycast/volume", "behind_"),
         Kind::Layer => ray::variant!(s, "raycast/volume", "layer_"),
         Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
     },
@@ -24,12 +25,13 @@ pub const PASS: Pass = Pass {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
             _ => whole("transfer", Slot::Transfer),
         });
-        reads.extend((kind(s) == Kind::Layer).then_some(whole("distance_map", Slot::Distance)));
+        let needs_distance = matches!(kind(s), Kind::Layer | Kind::Behind);
+        reads.extend(needs_distance.then_some(whole("distance_map", Slot::Distance)));
         reads
     },
     writes: |s, _| match kind(s) {
         Kind::Alone => vec![whole("picture", rendered(s))],
-        Kind::Layer => vec![whole("picture", Slot::VolumeLayer)],
+        Kind::Layer | Kind::Colour | Kind::Behind => vec![whole("picture", Slot::VolumeLayer)],
         Kind::Hit => vec![whole("picture", Slot::VolumeLayer), whole("distance_map", Slot::Distance)],
     },
     extent: ray_extent,
@@ -37,14 +39,18 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let volume = &s.settings.volume;
         let (axis, near) = depth_axis(s);
-        ray::params(s, s.volume_view(), s.step)
+        let params = ray::params(s, s.volume_view(), s.step)
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
             .f32("hit_opacity", volume.hit)
             .vec3("near_tint", volume.near_tint)
             .vec3("far_tint", volume.far_tint)
             .vec3("depth_axis", axis)
-            .f32("depth_near", near)
+            .f32("depth_near", near);
+        match kind(s) {
+            Kind::Behind => params.f32("colour_depth", s.settings.surface.colour_depth),
+            _ => params,
+        }
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
@@ -73,8 +79,14 @@ pub const PASS: Pass = Pass {
         for y in 0..size[1] {
             for x in 0..size[0] {
                 let mut ray = ray::Ray::cast(scene, volume, scene.volume_view(), scene.step, x, y);
-                if kind(scene) == Kind::Layer {
-                    ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0));
+                match kind(scene) {
+                    Kind::Layer => ray.leave = ray.leave.min(reads.get("distance_map").one(x, y, 0)),
+                    Kind::Behind => {
+                        let distance = reads.get("distance_map").one(x, y, 0);
+                        ray.enter = ray.enter.max(distance);
+                        ray.leave = ray.leave.min(distance + scene.settings.surface.colour_depth);
+                    }
+                    Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
                 let (colour, hit) = composite(scene, &ray, table);
                 writes.get_mut("picture").set([x, y, 0], &colour);
@@ -94,11 +106,17 @@ enum Kind {
     Layer,
     /// Colours that stage 3 lights, and the distance of the first hit.
     Hit,
+    /// Colours of whole rays, for a surface that is found on them.
+    Colour,
+    /// Colours of what lies behind a surface, for that surface.
+    Behind,
 }
 
 fn kind(scene: &Scene) -> Kind {
     match (scene.settings.mode, scene.lights_volume()) {
         (Mode::Mixed, _) => Kind::Layer,
+        (Mode::Surface, _) if scene.settings.surface.colour == SurfaceColour::Behind => Kind::Behind,
+        (Mode::Surface, _) => Kind::Colour,
         (_, true) => Kind::Hit,
         (_, false) => Kind::Alone,
     }

@@ -240,6 +240,10 @@ pub struct Surface {
     pub place: Place,
     /// Which surface along the ray, 1..=8; 1 is the outermost.
     pub number: u32,
+    /// What is lit: a constant colour, or the volume through the transfer function.
+    pub colour: SurfaceColour,
+    /// Depth of the volume behind the surface that gives it its colour with `colour = "behind"`, 0.01..=1000 mm.
+    pub colour_depth: f64,
 }
 
 impl Default for Surface {
@@ -256,8 +260,24 @@ impl Default for Surface {
             sign: Sign::Bright,
             place: Place::Peak,
             number: 1,
+            colour: SurfaceColour::Constant,
+            colour_depth: 3.0,
         }
     }
+}
+
+/// The colour of a surface that is lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SurfaceColour {
+    /// `light.surface_colour`. The default.
+    #[default]
+    Constant,
+    /// The colour that volume rendering gives the whole ray. It takes the place of the ambient light's colour; diffuse and specular light
+    /// have the colour of the light (thesis 4-5 to 4-7).
+    Rendered,
+    /// The colour that volume rendering gives the ray over `surface.colour_depth` behind the surface. Ambient and diffuse light take it.
+    Behind,
 }
 
 /// Length of an edge.

@@ -114,7 +114,7 @@ impl Default for Light {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Shadow {
-    /// Shadow coefficient: the share of diffuse and specular light that a shadow removes, 0..1.
+    /// Shadow coefficient: the share of what it dims that a shadow removes, 0..1.
     pub strength: f64,
     /// Width of the shadow's edge per mm of distance to the obstacle; 0 is a hard edge.
     pub softness: f64,
@@ -124,11 +124,24 @@ pub struct Shadow {
     pub thickness: f64,
     /// Bias, mm: obstacles lower than this cast no shadow, so that noise of the distance map does not.
     pub bias: f64,
+    /// What a shadow dims.
+    pub dims: Dims,
+}
+
+/// What a shadow dims.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Dims {
+    /// Diffuse and specular light: ambient light still arrives. The default.
+    #[default]
+    Light,
+    /// The pixel, ambient light included (thesis Fig. 41).
+    Pixel,
 }
 
 impl Default for Shadow {
     fn default() -> Self {
-        Shadow { strength: 0.6, softness: 0.15, reach: 40.0, thickness: 25.0, bias: 0.6 }
+        Shadow { strength: 0.6, softness: 0.15, reach: 40.0, thickness: 25.0, bias: 0.6, dims: Dims::Light }
     }
 }
 
