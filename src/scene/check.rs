@@ -15,6 +15,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         return refuse("picture.size", format!("is {width}x{height}, each edge must lie in 1..={MAX_PICTURE}"));
     }
     within("ray.spread", settings.ray.spread, 0.0, 1.0)?;
+    within("ray.samples_per_voxel", f64::from(settings.ray.samples_per_voxel.unwrap_or(1)), 1.0, 16.0)?;
     if settings.ray.brick != 0 {
         within("ray.brick", f64::from(settings.ray.brick), 4.0, 64.0)?;
     }

@@ -90,7 +90,17 @@ impl Layers {
         let table = toml::from_str::<Table>(text).map_err(|e| fault(&e))?;
         // Check this layer alone first: only then can a message name its line.
         if transfer_file(&table).is_none() {
-            toml::from_str::<Settings>(text).map_err(|e| fault(&e))?;
+            let mut without_none = Table::new();
+            merge(&mut without_none, table.clone(), &mut Vec::new());
+            if Settings::deserialize(without_none).is_err() {
+                let refused =
+                    |e: &toml::de::Error| e.span().and_then(|span| text.get(span)).map(|t| t.trim_matches(['"', '\'']));
+                // A `none` that removes a setting is refused by the text alone. Then another one is at fault, and the check below names it.
+                toml::from_str::<Settings>(text).or_else(|e| match refused(&e) {
+                    Some("none") => Ok(Settings::default()),
+                    _ => Err(fault(&e)),
+                })?;
+            }
         }
         self.merge_checked(layer, table, folder)
     }
@@ -141,12 +151,12 @@ fn points(path: &Path) -> Result<Value, LoadError> {
     Value::try_from(listed.points).map_err(|e| fault(&e))
 }
 
-/// Merges `over` into `under`, which is at `path` in the scene. The word `none` in place of a table removes it, or says that there is none.
+/// Merges `over` into `under`, which is at `path` in the scene. The word `none` removes a setting that may be absent.
 fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
     for (key, value) in over {
         path.push(key.clone());
         match (under.get_mut(&key), value) {
-            (_, Value::String(word)) if word == "none" && is_table(path) => drop(under.remove(&key)),
+            (_, Value::String(word)) if word == "none" && may_be_absent(path) => drop(under.remove(&key)),
             (Some(Value::Table(under)), Value::Table(over)) => merge(under, over, path),
             // So that a `none` within the table is seen.
             (None, Value::Table(over)) => {
@@ -160,12 +170,26 @@ fn merge(under: &mut Table, over: Table, path: &mut Vec<String>) {
     }
 }
 
-/// True if a scene has a table at this path, as `light.shadow`.
-fn is_table(path: &[String]) -> bool {
+/// True if a scene may have no value at this path: a table, as `light.shadow`, or an optional value, as `ray.step`.
+fn may_be_absent(path: &[String]) -> bool {
     let nested =
         path.iter().rev().fold(Table::new(), |inner, key| Table::from_iter([(key.clone(), Value::Table(inner))]));
-    // One with fields that must be given is a table too.
-    Settings::deserialize(nested).map_or_else(|e| e.message().starts_with("missing field"), |_| true)
+    match Settings::deserialize(nested) {
+        Ok(_) => true,
+        // A table with fields that must be given is one too.
+        Err(e) if e.message().starts_with("missing field") => true,
+        Err(e) if e.message().starts_with("unknown field") => false,
+        // A value. Settings without a value are not written.
+        Err(_) => {
+            let written = Table::try_from(Settings::default()).unwrap_or_default();
+            let written = Value::Table(written);
+            let mut at = Some(&written);
+            for key in path {
+                at = at.and_then(|value| value.get(key));
+            }
+            at.is_none()
+        }
+    }
 }
 
 fn one_line(error: &toml::de::Error, text: &str) -> String {
@@ -203,6 +227,24 @@ mod tests {
         layers.set("light.shadow=none").unwrap();
         let settings = layers.finish().unwrap();
         assert!(settings.light.shadow.is_none() && settings.light.occlusion.is_some());
+    }
+
+    #[test]
+    fn none_works_in_a_file_and_for_any_setting_that_may_be_absent() {
+        let mut layers = Layers::default();
+        layers.preset("phantom").unwrap();
+        let text = "[ray]\nstep = 'none'\n[camera]\ntarget = 'none'\n[distance]\nbilateral = 'none'\n[slices]\nestimator = 'none'";
+        layers.add("scene.toml", text, None).unwrap();
+        let settings = layers.clone().finish().unwrap();
+        assert_eq!((settings.ray.step, settings.camera.target, settings.distance.bilateral), (None, None, None));
+        assert_eq!(settings.post.colour_map, super::super::ColourMap::None);
+        for wrong in ["ray.stp=none", "ray.brick=none", "mode=none", "light.shadow.depth=none"] {
+            assert!(layers.set(wrong).is_err(), "{wrong}");
+        }
+        for (text, line) in [("[ray]\nbrick = 'none'", ""), ("[ray]\nstep = 'none'\nbrick = 'x'", "line 3")] {
+            let said = layers.add("scene.toml", text, None).unwrap_err().to_string();
+            assert!(said.contains(line) && said.lines().count() == 1, "{said}");
+        }
     }
 
     #[test]

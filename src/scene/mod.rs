@@ -182,7 +182,12 @@ impl Scene {
         let framed = framed_low(&geometry, &settings, low, high)?;
         let rays = camera::rays(&settings, framed, high, depth_offset(&geometry), is_still(&geometry));
         let pixel = grid.pitch[0].min(grid.pitch[1]);
-        let step = settings.ray.step.unwrap_or(pixel);
+        let side = match &geometry {
+            Geometry::Cartesian(volume) => pixel.min(volume.spacing[2]),
+            Geometry::Sweep(_) => pixel,
+        };
+        let largest = settings.ray.samples_per_voxel.map_or(f64::INFINITY, |n| side / f64::from(n));
+        let step = settings.ray.step.unwrap_or(pixel).min(largest);
         let ring =
             Ring::new(settings.surface.edge.unwrap_or(Edge::Length(4.0 * pixel)), step, settings.surface.threshold);
         let longest = (high - low).length();

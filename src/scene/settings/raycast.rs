@@ -32,6 +32,9 @@ impl Default for Camera {
 pub struct Ray {
     /// Distance between samples, mm. Absent: one slice pixel.
     pub step: Option<f64>,
+    /// Samples along the smallest side of a voxel, 1..=16: the step is at most that side divided by this, whatever `step` says. The side
+    /// is that of a slice pixel, or the slice pitch of a Cartesian volume if it is smaller. Thesis 3.5.2.1 takes 2. Absent: `step` alone.
+    pub samples_per_voxel: Option<u32>,
     /// Early ray termination of VR: a ray ends when its transmittance falls below this. The error is at most this; 0 never ends early.
     pub early_end: f64,
     /// How a sample is interpolated.
@@ -59,6 +62,7 @@ impl Default for Ray {
     fn default() -> Self {
         Ray {
             step: None,
+            samples_per_voxel: None,
             early_end: 1.0 / 512.0,
             sampling: Sampling::Auto,
             spread: 0.0,
