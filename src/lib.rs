@@ -14,7 +14,7 @@
 //! - [`gpu`] is the only module that uses Vulkan and the only one with unsafe code.
 //! - [`live`] renders frames while they arrive. [`mod@ui`] shows the pictures and handles input. [`kiosk`] holds the configuration, the logs
 //!   and the support bundle of a kiosk display.
-//! - [`reference`](mod@reference) renders on the CPU in f64. [`profile`] measures GPU times, [`error_report`] error against run time,
+//! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples. [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures. [`cli`] is the command line.
 //!
@@ -175,6 +175,8 @@ pub mod cli;
 pub mod dump;
 #[forbid(unsafe_code)]
 pub mod error_report;
+#[forbid(unsafe_code)]
+pub mod exact_ray;
 #[forbid(unsafe_code)]
 pub mod files;
 #[allow(unsafe_code)]

@@ -5,11 +5,30 @@ use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, DispatchArgs, Frequency, Slot, Texels, chain};
 use crate::plan::{Plan, Step};
 use crate::scene::Scene;
+use crate::source::Frame;
 use std::collections::BTreeMap;
 
 /// Renders a volume. `frames`: one array per slice in geometric order, with the values that the texture of a frame yields. Returns the
 /// contents of all slots of the plan.
 pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
+    render_with(scene, frames, &mut |_, _, _| false)
+}
+
+/// The frames of a volume in geometric order, as the values that the texture of a frame yields.
+pub fn decoded(scene: &Scene, frames: &[Frame]) -> Vec<Texels> {
+    let format = Slot::Frames.format(scene);
+    let [width, height] = scene.frame_size().map(|n| n as usize);
+    let mut frames: Vec<&Frame> = frames.iter().collect();
+    frames.sort_by_key(|f| f.slice);
+    frames.iter().map(|f| Texels::decode([width, height, 1], format, &f.bytes)).collect()
+}
+
+/// Takes the place of a pass's reference: given the pass's name, its inputs and its outputs, fills the outputs and returns true, or
+/// returns false for a pass that it leaves to its own reference.
+pub type Replacement<'a> = dyn FnMut(&str, &Arrays, &mut Arrays) -> bool + 'a;
+
+/// As [`render`], with some passes by another reference than their own.
+pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) -> BTreeMap<Slot, Texels> {
     let plan = Plan::new(scene);
     let mut slots: BTreeMap<Slot, Texels> = plan.slots.iter().map(|s| (*s, empty(*s, scene))).collect();
     for (slice, frame) in frames.iter().enumerate() {
@@ -20,11 +39,11 @@ pub fn render(scene: &Scene, frames: &[Texels]) -> BTreeMap<Slot, Texels> {
         }
         slots.insert(Slot::Frames, frame.clone());
         for (_, step) in plan.steps_of(Frequency::Frame) {
-            run(scene, step, &DispatchArgs { slice: slice as u32, ..step.args() }, &mut slots);
+            run(scene, step, &DispatchArgs { slice: slice as u32, ..step.args() }, &mut slots, replace);
         }
     }
     for (_, step) in plan.steps_of(Frequency::Volume).chain(plan.steps_of(Frequency::Picture)) {
-        run(scene, step, &DispatchArgs { slices: scene.slices(), ..step.args() }, &mut slots);
+        run(scene, step, &DispatchArgs { slices: scene.slices(), ..step.args() }, &mut slots, replace);
     }
     slots
 }
@@ -45,7 +64,7 @@ fn empty(slot: Slot, scene: &Scene) -> Texels {
     texels
 }
 
-fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>) {
+fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slot, Texels>, replace: &mut Replacement) {
     let (reads, writes) = (step.pass.reads(scene, args), step.pass.writes(scene, args));
     let (mut inputs, mut outputs) = (Arrays::default(), Arrays::default());
     // A plan lists every slot of its steps, and no step reads a slot that it writes.
@@ -56,7 +75,9 @@ fn run(scene: &Scene, step: &Step, args: &DispatchArgs, slots: &mut BTreeMap<Slo
     for bind in &writes {
         outputs.insert(bind.name, slots.remove(&bind.slot).unwrap_or_else(missing));
     }
-    step.pass.reference(scene, args, &inputs, &mut outputs);
+    if !replace(step.pass.name, &inputs, &mut outputs) {
+        step.pass.reference(scene, args, &inputs, &mut outputs);
+    }
     for bind in writes {
         slots.insert(bind.slot, outputs.get(bind.name).clone());
     }

@@ -26,14 +26,15 @@ const MAX_REPORT: u64 = 64 << 20;
 pub struct ErrorReport {
     #[command(flatten)]
     input: InputArgs,
-    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick, or
-    /// all; may be repeated
+    /// step, compositing, format, sampling, filter3d, termination, sigma, perona-malik, adaptive, resolution, rays, lut, half, brick,
+    /// transfer, or all; may be repeated
     #[arg(long, value_name = "NAME", default_value = "all")]
     dial: Vec<String>,
     /// Number of volumes timed at each setting of a dial
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
-    /// Reference: f64 on the CPU, converged (the device's best), or auto: f64 if it takes under a minute
+    /// Reference: exact (rays integrated without steps), f64 on the CPU, converged (the device's best), or auto: exact for dials of rays,
+    /// f64 for others, if it takes under a minute
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     against: String,
     /// Write error.json, error.csv, error.svg and error.png into this folder
@@ -89,9 +90,10 @@ impl ErrorReport {
     fn measure(&self, by: Measure, bounds: &[Bound]) -> Result<(), Failure> {
         let reference = match self.against.as_str() {
             "auto" => measure::ReferenceChoice::Auto,
+            "exact" => measure::ReferenceChoice::Exact,
             "f64" => measure::ReferenceChoice::F64,
             "converged" => measure::ReferenceChoice::Converged,
-            other => return Err(input(format!("--against {other}: must be f64, converged or auto"))),
+            other => return Err(input(format!("--against {other}: must be exact, f64, converged or auto"))),
         };
         let (mut source, scene) = self.input.open()?;
         if let Some(folder) = &self.output {

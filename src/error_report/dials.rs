@@ -2,7 +2,7 @@
 //! accurately, and the dial has the settings of a reference. Others choose another look, such as another filter: their pictures differ from
 //! the scene as it is, and none of them is the right one.
 
-use crate::scene::{Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, VolumeFormat};
+use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme, Volume, VolumeFormat, transfer};
 
 /// One setting of a dial.
 #[derive(Clone, Debug)]
@@ -37,6 +37,11 @@ impl Dial {
     pub fn is_numerical(&self) -> bool {
         !self.is_look && !["resolution", "rays"].contains(&self.name)
     }
+
+    /// True if its settings are ways of taking samples along rays: then exact rays are its reference.
+    pub fn samples_rays(&self) -> bool {
+        ["step", "compositing", "sampling", "termination", "adaptive", "lut", "brick", "transfer"].contains(&self.name)
+    }
 }
 
 /// Names of all dials.
@@ -55,6 +60,7 @@ pub(crate) const NAMES: &[&str] = &[
     "lut",
     "half",
     "brick",
+    "transfer",
 ];
 
 /// The dial of that name.
@@ -108,9 +114,13 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             need(composites, "composites nothing")?;
             let kinds = ["riemann", "corrected", "pre-integrated"];
             let now = serde_word(&s.volume.compositing);
-            let others = kinds.iter().enumerate().filter(|(_, k)| **k != now);
+            // The table of pairs is refused for points that are very close.
+            let pairs = Volume { compositing: Compositing::PreIntegrated, ..s.volume.clone() };
+            let finest = if transfer::entries(&pairs).is_ok() { "pre-integrated" } else { "corrected" };
+            let possible = |k: &str| k != "pre-integrated" || finest == k;
+            let others = kinds.iter().enumerate().filter(|(_, k)| **k != now && possible(k));
             let others = others.map(|(n, k)| at(k.to_string(), &[format!("volume.compositing={k}")], n as f64));
-            let best = |f: f64| ["volume.compositing=pre-integrated".to_string(), format!("ray.step={}", step * f)];
+            let best = |f: f64| [format!("volume.compositing={finest}"), format!("ray.step={}", step * f)];
             let value = kinds.iter().position(|k| *k == now).unwrap_or(0) as f64;
             made("compositing", "", is(now.clone(), value), others.collect(), &best(1.0 / 32.0), &best(1.0 / 16.0))
         }
@@ -297,6 +307,22 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             // The reference takes every sample.
             let all = ["ray.brick=0".to_string()];
             made("brick", "texels", is(word(now), f64::from(now)), others.collect(), &all, &all)
+        }
+        "transfer" => {
+            need(composites, "composites nothing")?;
+            let now = scene.transfer_entries();
+            // Assigning the rule too keeps the two dials from being combined: the table of pairs has a limit of its own.
+            let rule = serde_word(&s.volume.compositing);
+            let set = |n: usize| [format!("volume.entries={n}"), format!("volume.compositing={rule}")];
+            let most = if s.volume.compositing == Compositing::PreIntegrated { 1024 } else { 4096 };
+            // Sizes that the points of the transfer function allow.
+            let allowed = |n: &usize| {
+                let volume = Volume { entries: u32::try_from(*n).ok(), ..s.volume.clone() };
+                *n <= most && transfer::entries(&volume).is_ok()
+            };
+            let others = [16, 32, 64, 128, 256, 512, 1024, 2048, 4096].into_iter().filter(|n| *n != now && allowed(n));
+            let others = others.map(|n| at(n.to_string(), &set(n), n as f64)).collect();
+            made("transfer", "entries", is(now.to_string(), now as f64), others, &set(most), &set(most - most / 4))
         }
         "half" => {
             need(!scene.is_flat(), "casts no ray")?;

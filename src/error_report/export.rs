@@ -33,6 +33,7 @@ pub fn csv(report: &Report) -> String {
             row.push(front.contains(&(d, p)).to_string());
             row.extend(match &dial.reference {
                 Reference::F64 => ["f64".into(), String::new()],
+                Reference::Exact { estimate, .. } => ["exact rays".into(), estimate.to_string()],
                 Reference::AsItIs => ["the scene as it is: another look, no error".into(), String::new()],
                 Reference::Converged { set, rmse } => [format!("converged: {}", set.join("; ")), rmse.to_string()],
             });
@@ -66,6 +67,9 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
     for dial in &report.dials {
         let held = match &dial.reference {
             Reference::F64 => "against the f64 reference".to_string(),
+            Reference::Exact { estimate, pieces } => {
+                format!("against exact rays of {pieces} pieces, by their own estimate good to {estimate:.1e}")
+            }
             Reference::AsItIs => "difference from the scene as it is; another look is no error".to_string(),
             Reference::Converged { set, rmse } => {
                 format!("against the device's own at {}, itself off by about {rmse:.1e}", set.join(" "))
@@ -111,6 +115,9 @@ pub fn summary_table(report: &Report, measure: Measure) -> String {
                 or(rms(&e.mm), 3),
                 or(rms(&e.degrees), 2),
             );
+        }
+        if let Some(note) = &dial.note {
+            let _ = writeln!(text, "  {note}");
         }
         if let Some(order) = &dial.order {
             let _ = writeln!(

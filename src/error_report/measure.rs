@@ -1,16 +1,18 @@
 //! Measures error against run time: renders and times every setting of every dial, and compares it with the f64 reference or, if that
-//! is too slow, with a converged picture whose own error is estimated. Then it does the same with combinations of several dials.
+//! is too slow, with a converged picture whose own error is estimated. Dials of rays are compared with exact rays where these exist.
+//! Then it does the same with combinations of several dials.
 
 use super::choose::{self, Bound, Changes};
 use super::dials::Dial;
 use crate::error_report::convergence::{self, Range};
 use crate::error_report::metrics;
 use crate::error_report::{self, Combination, Errors, FORMAT, Measure, Point, Reference, Report, Sizes, Time, Times};
+use crate::exact_ray::picture::{self, Effort};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::machine;
 use crate::passes::chain::distance_end;
 use crate::passes::shade::normal;
-use crate::passes::{Frequency, PASSES, Slot, Texels};
+use crate::passes::{Frequency, PASSES, Slot, Texels, is_hit};
 use crate::reference;
 use crate::scene::load::{Layers, LoadError};
 use crate::scene::{Scene, SceneError};
@@ -26,10 +28,16 @@ pub enum MeasureError {
     Place { dial: &'static str, set: String, fault: String },
     #[error("{0}")]
     NoChoice(String),
+    #[error("dial {dial}: {fault}")]
+    Reference { dial: &'static str, fault: String },
 }
 
 /// Samples that the f64 reference takes in about a minute.
 const MAX_F64_SAMPLES: f64 = 6e7;
+/// Segments of exact rays that take about a minute.
+const MAX_EXACT_SEGMENTS: f64 = 5e7;
+/// How many times more accurate than a point its reference must be, if the point takes part in the fit of an order.
+const BETTER: f64 = 10.0;
 
 /// Combinations of several dials that are measured.
 pub const MAX_COMBINATIONS: usize = 24;
@@ -37,8 +45,10 @@ pub const MAX_COMBINATIONS: usize = 24;
 /// Which reference to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferenceChoice {
-    /// F64 if it takes about a minute or less, otherwise converged.
+    /// Exact for dials of rays where it exists, else F64, each if it takes about a minute or less; otherwise converged.
     Auto,
+    /// Exact rays for every dial; refused where they do not exist.
+    Exact,
     F64,
     Converged,
 }
@@ -56,6 +66,15 @@ pub struct ErrorMeasurement<'a> {
     pub reference: ReferenceChoice,
 }
 
+/// What a dial is compared with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Look,
+    F64,
+    Exact,
+    Converged,
+}
+
 /// A rendered scene: the picture before the tone mapping of stage 4, and the filtered distance map.
 struct Rendering {
     scene: Scene,
@@ -66,7 +85,7 @@ struct Rendering {
 /// The picture of a scene with the finest setting of every numerical dial: what combinations are compared with.
 pub struct Finest {
     rendering: Rendering,
-    /// Its RMSE against the next coarser picture; 0 in f64.
+    /// Its RMSE against the next coarser picture; by exact rays their own estimate; 0 in f64 with fine steps.
     error: f64,
 }
 
@@ -183,8 +202,15 @@ impl ErrorMeasurement<'_> {
         };
         let scene_of = |set: &[String]| self.scene_with("combination", set);
         let best = scene_of(&of(|dial| &dial.best))?;
-        if self.takes_f64(&best) {
-            return Ok(Finest { rendering: self.in_f64(&best), error: 0.0 });
+        match self.kind("combination", false, true, &best)?.0 {
+            Kind::Exact => {
+                let (rendering, effort) = self.by_exact_rays(&best);
+                return Ok(Finest { rendering, error: effort.estimate });
+            }
+            Kind::F64 => {
+                return Ok(Finest { rendering: self.in_f64(&best, &mut |_, _, _| false), error: 0.0 });
+            }
+            Kind::Look | Kind::Converged => {}
         }
         let (rendering, nearly) = (self.rendered(&best)?, self.rendered(&scene_of(&of(|dial| &dial.nearly))?)?);
         let error = compare("combination", &[], &nearly, &rendering)?.rmse;
@@ -250,14 +276,6 @@ impl ErrorMeasurement<'_> {
         Ok((compare("combination", set, &rendering, &finest.rendering)?, Times::of(&runs.own)))
     }
 
-    fn takes_f64(&self, scene: &Scene) -> bool {
-        match self.reference {
-            ReferenceChoice::F64 => true,
-            ReferenceChoice::Converged => false,
-            ReferenceChoice::Auto => cost(scene) <= MAX_F64_SAMPLES,
-        }
-    }
-
     fn measure_dial(
         &self,
         dial: &Dial,
@@ -265,17 +283,24 @@ impl ErrorMeasurement<'_> {
     ) -> Result<error_report::Dial, MeasureError> {
         progress(dial.name, "its reference");
         let best = self.scene_at(dial, &dial.best)?;
-        let exact = self.takes_f64(&best);
-        let (expected, reference) = match exact {
-            _ if dial.is_look => (self.rendered(&best)?, Reference::AsItIs),
-            true => (self.in_f64(&best), Reference::F64),
-            false => {
+        let (kind, note) = self.kind(dial.name, dial.is_look, dial.samples_rays(), &best)?;
+        let (expected, reference) = match kind {
+            Kind::Look => (self.rendered(&best)?, Reference::AsItIs),
+            Kind::F64 => (self.in_f64(&best, &mut |_, _, _| false), Reference::F64),
+            Kind::Exact => {
+                let (expected, effort) = self.by_exact_rays(&best);
+                (expected, Reference::Exact { estimate: effort.estimate, pieces: effort.pieces })
+            }
+            Kind::Converged => {
                 let rendering = self.rendered(&best)?;
                 let nearly = self.rendered(&self.scene_at(dial, &dial.nearly)?)?;
                 let own = compare(dial.name, &[], &nearly, &rendering)?.rmse;
                 (rendering, Reference::Converged { set: dial.best.clone(), rmse: own })
             }
         };
+        if let Some(fault) = nothing_in(&expected) {
+            return Err(MeasureError::Reference { dial: dial.name, fault });
+        }
         let mut points = Vec::new();
         let (mut default, mut default_runs) = (self.running(self.scene)?, Vec::new());
         for (n, place) in dial.places.iter().enumerate() {
@@ -298,12 +323,18 @@ impl ErrorMeasurement<'_> {
         }
         let steps = dial.name == "step";
         // The error of the device if only its arithmetic differs.
-        let floor = match exact && steps {
+        let floor = match steps && matches!(kind, Kind::F64 | Kind::Exact) {
             true => Some(compare(dial.name, &[], &self.rendered(&best)?, &expected)?.rmse),
             false => None,
         };
         let fitted = || {
-            let pairs: Vec<[f64; 2]> = points.iter().map(|p| [p.value, p.errors.rmse]).collect();
+            // A reference of finer steps is off by as many times less as its step is shorter, if the order is 1.
+            let good = |p: &&Point| match &reference {
+                Reference::Exact { estimate, .. } => p.errors.rmse >= BETTER * estimate,
+                Reference::Converged { rmse, .. } => p.errors.rmse >= BETTER * rmse,
+                Reference::F64 | Reference::AsItIs => p.value >= BETTER * best.step * (1.0 - 1e-9),
+            };
+            let pairs: Vec<[f64; 2]> = points.iter().filter(good).map(|p| [p.value, p.errors.rmse]).collect();
             let pixel = self.scene.grid.pitch[0].min(self.scene.grid.pitch[1]);
             convergence::fit(&pairs, Range { step: [pixel / 64.0, 0.75 * pixel], floor: floor.unwrap_or(0.0) }).ok()
         };
@@ -316,7 +347,50 @@ impl ErrorMeasurement<'_> {
             points,
             order,
             floor,
+            note,
         })
+    }
+
+    /// The scene in f64, with exact rays in place of stage 2.
+    fn by_exact_rays(&self, scene: &Scene) -> (Rendering, Effort) {
+        let mut effort = Effort::default();
+        let scene = &in_floats(scene);
+        let rendering =
+            self.in_f64(scene, &mut |pass, reads, writes| picture::replace(scene, pass, reads, writes, &mut effort));
+        (rendering, effort)
+    }
+
+    /// The reference of a dial, and why it is not the exact one if the dial is of rays.
+    fn kind(
+        &self,
+        dial: &'static str,
+        is_look: bool,
+        samples_rays: bool,
+        best: &Scene,
+    ) -> Result<(Kind, Option<String>), MeasureError> {
+        if is_look {
+            return Ok((Kind::Look, None));
+        }
+        let in_f64 = if cost(best) <= MAX_F64_SAMPLES { Kind::F64 } else { Kind::Converged };
+        let fault = picture::fault(best);
+        let too_long = (picture::cost(best) + cost_of_slices(best) > MAX_EXACT_SEGMENTS)
+            .then(|| "exact rays would take longer than a minute".to_string());
+        match (self.reference, fault) {
+            (ReferenceChoice::F64, _) => Ok((Kind::F64, None)),
+            (ReferenceChoice::Converged, _) => Ok((Kind::Converged, None)),
+            (ReferenceChoice::Exact, None) => Ok((Kind::Exact, None)),
+            (ReferenceChoice::Exact, Some(why)) => {
+                Err(MeasureError::Reference { dial, fault: format!("has no exact reference: {why}") })
+            }
+            (ReferenceChoice::Auto, _) if !samples_rays => Ok((in_f64, None)),
+            (ReferenceChoice::Auto, fault) => match fault.or(too_long) {
+                None => Ok((Kind::Exact, None)),
+                Some(why) => {
+                    let instead = if in_f64 == Kind::F64 { "f64 with fine steps" } else { "a converged picture" };
+                    Ok((in_f64, Some(format!("no exact reference: {why}; the reference is {instead}"))))
+                }
+            },
+        }
     }
 
     fn scene_at(&self, dial: &Dial, set: &[String]) -> Result<Scene, MeasureError> {
@@ -364,14 +438,10 @@ impl ErrorMeasurement<'_> {
         Ok((own.read()?, all))
     }
 
-    fn in_f64(&self, scene: &Scene) -> Rendering {
+    fn in_f64(&self, scene: &Scene, replace: &mut reference::Replacement) -> Rendering {
         let scene = &in_floats(scene);
-        let format = Slot::Frames.format(scene);
-        let [width, height] = scene.frame_size().map(|n| n as usize);
-        let mut frames: Vec<&Frame> = self.frames.iter().collect();
-        frames.sort_by_key(|f| f.slice);
-        let frames: Vec<Texels> = frames.iter().map(|f| Texels::decode([width, height, 1], format, &f.bytes)).collect();
-        let mut slots = reference::render(scene, &frames);
+        let frames = reference::decoded(scene, self.frames);
+        let mut slots = reference::render_with(scene, &frames, replace);
         let distance = if scene.has_distance() { slots.remove(&distance_end(scene)) } else { None };
         let picture = slots.remove(&Slot::Picture).unwrap_or_else(|| Texels::untouched([0; 3], 4));
         Rendering { scene: scene.clone(), picture, distance }
@@ -390,12 +460,38 @@ fn cost(scene: &Scene) -> f64 {
     let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
     let taps = f64::from(scene.settings.ray.sliding.max(1)).powi(3);
     let steps = if scene.is_flat() { 1.0 } else { (scene.high - scene.low).length() / scene.step };
+    rays * steps * taps + cost_of_slices(scene)
+}
+
+/// The filters of slices, in samples of a ray.
+fn cost_of_slices(scene: &Scene) -> f64 {
     let pixels = scene.volume_size().iter().map(|n| f64::from(*n)).product::<f64>();
     let slices = &scene.settings.slices;
     let window = slices.sigma.map_or(0, |s| s.window.pow(2)) + slices.enhanced_sigma.map_or(0, |s| s.largest.pow(2));
     let diffused = slices.perona_malik.map_or(0, |p| 8 * p.repeat);
     // A filter tap costs a tenth of a sample through the inverse map.
-    rays * steps * taps + 0.1 * pixels * f64::from(16 + window + diffused)
+    0.1 * pixels * f64::from(16 + window + diffused)
+}
+
+/// Why a reference is none, in one line: there is nothing in it that a picture could differ from.
+fn nothing_in(reference: &Rendering) -> Option<String> {
+    let scene = &reference.scene;
+    if let Some(map) = &reference.distance
+        && scene.detects_surface()
+        && !map.values.iter().any(|d| is_hit(*d))
+    {
+        let threshold = scene.settings.surface.threshold;
+        return Some(format!(
+            "no ray of the reference hits a surface (surface.threshold={threshold}): lower it, or change the camera or region"
+        ));
+    }
+    let colours =
+        reference.picture.values.chunks_exact(reference.picture.channels.max(1)).flat_map(|p| p.iter().take(3));
+    let is_black = !colours.into_iter().any(|c| *c != 0.0);
+    is_black.then(|| {
+        let what = if scene.composites() { "volume.transfer, volume.window" } else { "the mode's window" };
+        format!("its reference is black everywhere: change {what}, the camera or the region")
+    })
 }
 
 fn compare(

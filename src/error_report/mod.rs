@@ -81,6 +81,9 @@ pub struct Dial {
     /// RMSE of the device against f64 if only its arithmetic and formats differ.
     #[serde(default)]
     pub floor: Option<f64>,
+    /// Why the reference is not the exact one, if the dial is one of rays.
+    #[serde(default)]
+    pub note: Option<String>,
 }
 
 /// The reference of the errors of a dial.
@@ -89,6 +92,14 @@ pub struct Dial {
 pub enum Reference {
     /// The four stages in f64 on the CPU.
     F64,
+    /// The same with exact rays in place of stage 2: no step, no table of the transfer function.
+    Exact {
+        /// Their own estimate of their error, RMS over the rays; no bound. Of the picture, or of the distance map in mm if the scene
+        /// shows surfaces.
+        estimate: f64,
+        /// Parts of rays that were integrated.
+        pieces: u64,
+    },
     /// The device's picture of the scene as it is: the settings differ in look, and what is measured is no error.
     AsItIs,
     /// A picture by the device itself, converged as far as possible.
@@ -288,9 +299,10 @@ impl Report {
             let reference_rmse = match &dial.reference {
                 Reference::F64 | Reference::AsItIs => 0.0,
                 Reference::Converged { rmse, .. } => *rmse,
+                Reference::Exact { estimate, .. } => *estimate,
             };
             if !(reference_rmse.is_finite() && reference_rmse >= 0.0) {
-                return Err(format!("error report: dial '{}': its reference's RMSE is {reference_rmse}", dial.name));
+                return Err(format!("error report: dial '{}': its reference's error is {reference_rmse}", dial.name));
             }
             for point in &dial.points {
                 let wrong = wrong_result(&point.errors, &[point.times, point.ratios], 0.0);

@@ -284,6 +284,7 @@ fn notes(dial: &Dial) -> Vec<String> {
     let order = dial.order.map(|fit| format!("order {:.2} ± {:.2}", fit.order, fit.standard_error));
     let against = match &dial.reference {
         Reference::F64 => None,
+        Reference::Exact { estimate, .. } => Some(format!("against exact rays, estimate {estimate:.0e}")),
         Reference::AsItIs => Some("another look: difference, no error".to_string()),
         Reference::Converged { rmse, .. } => Some(format!("against a picture good to {rmse:.0e}")),
     };

@@ -4,7 +4,7 @@
 use crate::passes::lookup_tables::brick_reaches;
 use crate::passes::pass::*;
 use crate::probe::Geometry;
-use crate::scene::{Compositing, Mode, Scene, Side, TILE, View, transfer};
+use crate::scene::{Compositing, Mode, Scene, Side, TILE, View};
 
 /// Kinds of bricks, as in classify.comp. The samples of an active brick are needed.
 const ACTIVE: u32 = 0;
@@ -218,7 +218,7 @@ pub const CLASSIFY_VOLUME: Pass = Pass {
         let mut constants = vec![("MAX_DISTANCE", MAX_DISTANCE as i32)];
         if s.composites() {
             constants.push(("FROM_ZERO", between_samples(s) as i32));
-            constants.push(("ENTRIES", transfer::ENTRIES as i32));
+            constants.push(("ENTRIES", s.transfer_entries() as i32));
         }
         constants
     },
@@ -231,11 +231,12 @@ pub const CLASSIFY_VOLUME: Pass = Pass {
             });
         }
         let opaque = reads.get("opaque_before").values.clone();
-        let last_entry = (transfer::ENTRIES - 1) as f64;
+        let entries = s.transfer_entries();
+        let last_entry = (entries - 1) as f64;
         let entry = |value: f64| (value * last_entry).clamp(0.0, last_entry) as usize;
         classify_reference(s, s.volume_view(), reads, writes, |side, [low, high]| {
             let first = if between_samples(s) { 0 } else { entry(low - 1e-6) };
-            let last = (entry(high + 1e-6) + 1).min(transfer::ENTRIES - 1);
+            let last = (entry(high + 1e-6) + 1).min(entries - 1);
             let transparent = opaque[last + 1] == opaque[first];
             if side == Side::Outside || transparent { EMPTY } else { ACTIVE }
         });

@@ -152,7 +152,7 @@ pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
 }
 
 fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
-    transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold)
+    transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold, scene.transfer_entries())
 }
 
 /// The tiles of a picture of planes, as `Sheet::table` lays them out.

@@ -3,7 +3,7 @@
 
 use super::lookup_tables;
 use crate::scene::planes::TILE_VECTORS;
-use crate::scene::{Layout, Scene, VolumeFormat, transfer};
+use crate::scene::{Layout, Scene, VolumeFormat};
 use crate::source::StoredType;
 
 /// Frames that may be uploaded at once: layers of the frame array, and slots of the staging ring.
@@ -157,7 +157,7 @@ slots! {
     /// Entries of the transfer function that are not transparent, before each.
     OpaqueBefore = D::table(
         "opaque_before",
-        |_| Shape::Buffer(4 * (transfer::ENTRIES as u32 + 1)),
+        |s| Shape::Buffer(4 * (s.transfer_entries() as u32 + 1)),
         lookup_tables::opaque_before,
         ByContent,
     );
@@ -180,14 +180,14 @@ slots! {
     /// The transfer function: colour and absorption over the sample value.
     Transfer = D::table(
         "transfer",
-        |_| Shape::Buffer(16 * transfer::ENTRIES as u32),
+        |s| Shape::Buffer(16 * s.transfer_entries() as u32),
         lookup_tables::transfer_table,
         ByContent,
     );
     /// The transfer function between every two sample values. It differs when the transfer function does, which is shorter.
     PreIntegrated = D::table(
         "pre_integrated",
-        |_| Shape::Buffer(16 * (transfer::ENTRIES * transfer::ENTRIES) as u32),
+        |s| Shape::Buffer(16 * (s.transfer_entries().pow(2)) as u32),
         lookup_tables::pre_integrated_table,
         By(|a, b| Slot::Transfer.differs(a, b)),
     );

@@ -100,6 +100,10 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
         return refuse("volume.transfer", fault);
     }
+    if let Err(fault) = transfer::entries(&settings.volume) {
+        let field = if settings.volume.entries.is_some() { "volume.entries" } else { "volume.transfer" };
+        return refuse(field, fault);
+    }
     let v = &settings.volume;
     within("volume.threshold", v.threshold, 0.0, 1.0)?;
     within("volume.hit", v.hit, 1e-3, 1.0)?;

@@ -284,6 +284,11 @@ impl Scene {
         camera::ray_size(&self.settings)
     }
 
+    /// Entries of the table of the transfer function; its points were checked.
+    pub fn transfer_entries(&self) -> usize {
+        transfer::entries(&self.settings.volume).unwrap_or(transfer::ENTRIES)
+    }
+
     /// True if the scene runs a surface detector.
     pub fn detects_surface(&self) -> bool {
         matches!(self.settings.mode, Mode::Surface | Mode::Mixed)

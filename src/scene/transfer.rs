@@ -1,9 +1,13 @@
 //! The transfer function and the colour maps as tables, computed in f64.
 
-use super::settings::{ColourMap, Transfer, TransferName, TransferPoint};
+use super::settings::{ColourMap, Compositing, Transfer, TransferName, TransferPoint, Volume};
 
-/// Entries of the transfer table. The shader interpolates between them.
+/// Entries of the transfer table unless the setting or narrow points ask for others. The shader interpolates between them.
 pub const ENTRIES: usize = 256;
+/// Smallest and largest table that can be asked for.
+const ENTRIES_RANGE: [usize; 2] = [16, 4096];
+/// Largest table of pre-integrated compositing, which has its square: 16 MiB.
+const MAX_PRE_INTEGRATED: usize = 1024;
 
 /// Absorption of a fully opaque voxel, in place of the infinite -ln(1 - a): e^-1e6 is 0 in any float format.
 pub const OPAQUE: f64 = 1e6;
@@ -19,15 +23,63 @@ pub fn opacity(y: f64) -> f64 {
     -(-y).exp_m1()
 }
 
-/// Red, green, blue and absorption at `ENTRIES` equidistant sample values from 0 to 1. Below `threshold` the absorption is 0.
-pub fn table(transfer: &Transfer, threshold: f64) -> Vec<[f64; 4]> {
-    let points = match transfer {
+/// The points of a transfer function, those of its name if it has one.
+pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
+    match transfer {
         Transfer::Named(name) => named(*name),
         Transfer::Points(points) => points.clone(),
+    }
+}
+
+/// Entries of the table of a scene's transfer function: those of the setting; without it [`ENTRIES`], or more if two points are closer
+/// than an entry, which would miss what lies between them: then the fewest that meet every point, or four between the closest points.
+///
+/// # Errors
+/// The end of a sentence: the size is out of its range, or two points are closer than one entry of the largest table or of the size set.
+pub fn entries(volume: &Volume) -> Result<usize, String> {
+    let [least, most] = ENTRIES_RANGE;
+    let most = if volume.compositing == Compositing::PreIntegrated { MAX_PRE_INTEGRATED } else { most };
+    let points = resolved(&volume.transfer);
+    let gaps = points.windows(2).enumerate().map(|(n, pair)| (n + 1, pair[1].at - pair[0].at));
+    let (first, gap) = gaps.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1, 1.0));
+    // The slack is that of rounding: points at neighbouring entries are an entry apart.
+    let resolves = |entries: usize| gap * (entries - 1) as f64 >= 1.0 - 1e-6;
+    let narrow = |entries: usize, advice: &str| {
+        let (next, width) = (first + 1, 1.0 / (entries - 1) as f64);
+        format!(
+            "points {first} and {next} are {gap:.2e} apart, less than one of {entries} entries ({width:.2e}): {advice}"
+        )
     };
-    (0..ENTRIES)
+    if let Some(set) = volume.entries {
+        let entries = set as usize;
+        return match entries {
+            n if n < least || n > most => Err(format!("is {set}, must lie in {least}..={most}")),
+            n if !resolves(n) => Err(narrow(n, "leave volume.entries out, or raise it")),
+            n => Ok(n),
+        };
+    }
+    if resolves(ENTRIES) {
+        return Ok(ENTRIES);
+    }
+    let meets = |entries: &usize| {
+        let off = |at: f64| (at * (*entries - 1) as f64 - (at * (*entries - 1) as f64).round()).abs();
+        resolves(*entries) && points.iter().all(|p| off(p.at) < 1e-6)
+    };
+    let four = (4.0 / gap).ceil() + 1.0;
+    match (ENTRIES..=most).find(meets) {
+        Some(entries) => Ok(entries),
+        None if four <= most as f64 => Ok(four as usize),
+        None => Err(narrow(most, "move them apart")),
+    }
+}
+
+/// Red, green, blue and absorption at `entries` equidistant sample values from 0 to 1 (at least 2). Below `threshold` the absorption
+/// is 0.
+pub fn table(transfer: &Transfer, threshold: f64, entries: usize) -> Vec<[f64; 4]> {
+    let points = resolved(transfer);
+    (0..entries)
         .map(|i| {
-            let value = i as f64 / (ENTRIES - 1) as f64;
+            let value = i as f64 / (entries - 1) as f64;
             let [r, g, b, a] = at(&points, value);
             [r, g, b, if value < threshold { 0.0 } else { absorption(a) }]
         })
@@ -86,7 +138,8 @@ pub fn fault(transfer: &Transfer) -> Option<String> {
     None
 }
 
-fn at(points: &[TransferPoint], value: f64) -> [f64; 4] {
+/// Red, green, blue and opacity of a sample value: linear between two points, constant beyond the first and the last.
+pub fn at(points: &[TransferPoint], value: f64) -> [f64; 4] {
     let rgba = |p: &TransferPoint| [p.colour[0], p.colour[1], p.colour[2], p.opacity];
     let after = points.partition_point(|p| p.at <= value);
     match (after.checked_sub(1).and_then(|i| points.get(i)), points.get(after)) {
@@ -170,10 +223,43 @@ mod tests {
         let transfer =
             Transfer::Points(points(&[(0.2, [0.0, 0.0, 0.0], 0.0), (0.6, [1.0, 0.5, 0.0], 0.5), (0.7, [0.0; 3], 1.0)]));
         assert_eq!(fault(&transfer), None);
-        let table = table(&transfer, 0.0);
+        let table = table(&transfer, 0.0, ENTRIES);
         assert_eq!(table[0], [0.0, 0.0, 0.0, 0.0]);
         assert!((table[102][0] - 0.5).abs() < 1e-9, "{:?}", table[102]);
         assert_eq!(table[255], [0.0, 0.0, 0.0, OPAQUE]);
+    }
+
+    /// Prevents a spike between two entries, which draws nothing.
+    #[test]
+    fn narrow_points_get_the_table_that_meets_them_or_are_refused() {
+        let spike = |half: f64| {
+            let transfer = Transfer::Points(points(&[
+                (0.5 - half, [1.0; 3], 0.0),
+                (0.5, [1.0; 3], 0.5),
+                (0.5 + half, [1.0; 3], 0.0),
+            ]));
+            Volume { transfer, ..Volume::default() }
+        };
+        assert_eq!(entries(&Volume::default()), Ok(ENTRIES));
+        assert_eq!(entries(&spike(0.01)), Ok(ENTRIES));
+        assert_eq!(entries(&spike(0.001)), Ok(1001));
+        let tallest = |volume: &Volume, count: usize| {
+            table(&volume.transfer, 0.0, count).iter().map(|e| e[3]).fold(0.0, f64::max)
+        };
+        assert_eq!(tallest(&spike(0.001), 1001), absorption(0.5));
+        // What the default table made of it.
+        assert_eq!(tallest(&spike(0.001), ENTRIES), 0.0);
+        // No table meets these; four entries lie between two points.
+        assert_eq!(entries(&spike(0.001_234_567)), Ok(3242));
+        let said = entries(&spike(1e-5)).expect_err("too narrow for any table");
+        assert!(said.contains("points 1 and 2") && said.contains("1.00e-5") && said.contains("4096"), "{said}");
+        let set = |count: u32, half: f64| entries(&Volume { entries: Some(count), ..spike(half) });
+        assert_eq!((set(16, 0.1), set(2001, 0.001)), (Ok(16), Ok(2001)));
+        assert!(set(256, 0.001).expect_err("set too small").contains("volume.entries"));
+        assert!(set(15, 0.1).is_err() && set(4097, 0.1).is_err());
+        let pairs =
+            |count| entries(&Volume { entries: count, compositing: Compositing::PreIntegrated, ..spike(0.001) });
+        assert_eq!((pairs(None), pairs(Some(1024)), pairs(Some(1025)).is_err()), (Ok(1001), Ok(1024), true));
     }
 
     #[test]

@@ -121,3 +121,58 @@ fn a_converged_reference_states_its_own_error() {
     let of = |entries: f64| lut.points.iter().find(|p| p.value == entries).expect("place").errors.rmse;
     assert!(of(3.0) > 3.0 * of(1025.0), "three entries must show: {} and {}", of(3.0), of(1025.0));
 }
+
+/// Prevents the spike between two entries of the table that drew black and was reported as an error of 0: the reference had the
+/// same table.
+#[test]
+fn a_narrow_spike_of_the_transfer_function_is_drawn_and_its_error_is_seen() {
+    let _alone = alone();
+    let spike = "volume.transfer=[{at=0.499,colour=[1,1,1],opacity=0.0},{at=0.5,colour=[1,1,1],opacity=0.5},\
+                 {at=0.501,colour=[1,1,1],opacity=0.0}]";
+    assert_eq!(resolved(&layers(&[spike])).transfer_entries(), 1001);
+    let report = report(&[spike], &["step", "transfer"], ReferenceChoice::Auto);
+    for dial in &report.dials {
+        let Reference::Exact { estimate, pieces } = dial.reference else { panic!("{:?}", dial.reference) };
+        println!("{}: estimate {estimate:.1e}, {pieces} pieces, order {:?}", dial.name, dial.order.map(|o| o.order));
+        dial.points.iter().for_each(|p| println!("  {} {:.2e}", p.label, p.errors.rmse));
+        assert!(estimate < 1e-9 && pieces > 500, "{estimate:.1e}, {pieces}");
+        let own = dial.points.iter().find(|p| p.is_default).expect("a default");
+        assert!(own.errors.rmse > 1e-3, "long steps miss a layer this thin: {}", own.errors.rmse);
+    }
+    let steps = &report.dials[0].points;
+    let of = |n: usize| steps.iter().map(|p| (p.value, p.errors.rmse)).nth(n).expect("a point").1;
+    assert!(of(steps.len() - 1) < 0.7 * of(1), "finer steps meet more of it: {} and {}", of(1), of(steps.len() - 1));
+}
+
+/// Prevents orders and errors against a picture in which there is nothing.
+#[test]
+fn a_reference_without_hits_is_refused_by_name() {
+    let _alone = alone();
+    let refused = |more: &[&str], name: &str, reference: ReferenceChoice| {
+        let (layers, frames) = (layers(more), frames());
+        let scene = resolved(&layers);
+        let context = device();
+        let measurement = ErrorMeasurement {
+            context: &context,
+            layers: &layers,
+            scene: &scene,
+            frames: &frames,
+            input: "a bumpy wall",
+            repeats: 1,
+            reference,
+        };
+        let dials = [dial(name, &scene).expect("dial")];
+        let finest = measurement.finest();
+        let found = finest.and_then(|finest| measurement.report(&dials, &finest, None, |_, _| {}));
+        found.expect_err("nothing to compare with").to_string()
+    };
+    let said = refused(&["volume.transfer=[{at=0,colour=[1,1,1],opacity=0.0}]"], "brick", ReferenceChoice::Auto);
+    assert!(
+        said.contains("dial brick") && said.contains("black everywhere") && said.contains("volume.transfer"),
+        "{said}"
+    );
+    let said = refused(&["mode=sr", "surface.threshold=0.95", "surface.rough=1"], "brick", ReferenceChoice::Exact);
+    assert!(said.contains("surface.threshold=0.95") && !said.contains('\n'), "{said}");
+    let said = refused(&["mode=sr"], "step", ReferenceChoice::Exact);
+    assert!(said.contains("no exact reference") && said.contains("surface.rough=1"), "{said}");
+}

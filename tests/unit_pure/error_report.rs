@@ -50,6 +50,7 @@ fn dial(name: &str, unit: &str, default: usize, mut points: Vec<Point>) -> Dial 
         points,
         order: None,
         floor: None,
+        note: None,
     }
 }
 
@@ -88,6 +89,20 @@ fn small() -> Report {
         combination(&["ray.step=0.25", "volume_format=r32f"], 0.0075, 28.0),
     ];
     Report { choices, ..report(vec![dial("step", "mm", 1, steps), dial("format", "", 1, formats)]) }
+}
+
+#[test]
+fn an_exact_reference_prints_its_own_estimate_everywhere() {
+    let mut exact = small();
+    for dial in &mut exact.dials {
+        dial.reference = Reference::Exact { estimate: 1e-12, pieces: 1000 };
+    }
+    let text = export::summary_table(&exact, Measure::Rmse);
+    assert!(text.contains("exact rays of 1000 pieces") && text.contains("1.0e-12"), "{text}");
+    assert!(export::csv(&exact).contains("exact rays,0.000000000001"), "{}", export::csv(&exact));
+    let svg = plot::svg(&exact, Measure::Rmse, [1200, 800]).expect("a plot");
+    assert!(svg.contains("estimate 1e-12"));
+    assert_eq!(Report::from_json(&exact.to_json().expect("JSON")).expect("its report"), exact);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod bricks;
 mod common;
 mod compositing_orders;
 mod error_report;
+mod exact_ray;
 mod freehand;
 mod geometry;
 mod module_cycles;

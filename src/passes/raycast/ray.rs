@@ -279,7 +279,7 @@ fn spread_range(probe: &Probe) -> f64 {
 }
 
 /// Where a ray enters and leaves the rendered region, mm; leave < enter is a miss.
-fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
+pub(crate) fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64) {
     let (mut enter, mut leave) = (0.0f64, f64::MAX);
     for axis in 0..3 {
         let (low, high) = (view.low[axis] - origin[axis], scene.high[axis] - origin[axis]);
@@ -307,7 +307,7 @@ fn span(scene: &Scene, view: View, origin: DVec3, direction: DVec3) -> (f64, f64
 
 /// Texture indices of a place in space; none outside the insonified region. By the exact inverse of the probe's maps, not by the
 /// tables that the shader reads.
-pub(super) fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
+pub(crate) fn texel(scene: &Scene, place: DVec3) -> Option<[f64; 3]> {
     let grid = &scene.grid;
     let column = |x: f64, y: f64| [(x - grid.origin[0]) / grid.pitch[0], (y - grid.origin[1]) / grid.pitch[1]];
     match &scene.geometry {

@@ -4,7 +4,7 @@ use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::empty_space;
 use crate::passes::pass::*;
-use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour, transfer};
+use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour};
 use glam::DVec3;
 
 pub const PASS: Pass = Pass {
@@ -62,7 +62,7 @@ pub const PASS: Pass = Pass {
         constants.push(("EARLY_END", (s.settings.ray.early_end > 0.0) as i32));
         constants.push(("COMPOSITING", compositing));
         constants.push(("DEPTH_CODED", (s.settings.volume.shading == Shading::DepthCoded) as i32));
-        constants.push(("ENTRIES", transfer::ENTRIES as i32));
+        constants.push(("ENTRIES", s.transfer_entries() as i32));
         constants
     },
     tolerance: Tolerance {
@@ -129,7 +129,7 @@ pub fn reference_length(scene: &Scene) -> f64 {
 
 /// Depth of a place along the view: its dot product with the first, less the second, is 0 at the box's nearest corner and 1 at
 /// its farthest.
-fn depth_axis(scene: &Scene) -> (DVec3, f64) {
+pub(crate) fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     let forward = scene.rays.forward;
     let low = scene.volume_view().low;
     let middle = (low + scene.high) / 2.0;
@@ -142,6 +142,8 @@ struct RayMedium<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
     table: &'a Texels,
+    /// Of the table, along each side.
+    entries: usize,
     depth_axis: (DVec3, f64),
 }
 
@@ -161,12 +163,12 @@ impl RayMedium<'_> {
 impl Medium for RayMedium<'_> {
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let value = self.ray.sample(place.offset, place.n)?;
-        Some(self.tinted(looked_up(self.table, value), place.offset))
+        Some(self.tinted(looked_up(self.table, self.entries, value), place.offset))
     }
 
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]> {
         let (front, back) = (self.ray.sample(from.offset, from.n)?, self.ray.sample(to.offset, to.n)?);
-        Some(self.tinted(looked_up_between(self.table, front, back), to.offset))
+        Some(self.tinted(looked_up_between(self.table, self.entries, front, back), to.offset))
     }
 }
 
@@ -179,7 +181,7 @@ fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
         early_end: scene.settings.ray.early_end,
         hit: scene.settings.volume.hit,
     };
-    let medium = RayMedium { scene, ray, table, depth_axis: depth_axis(scene) };
+    let medium = RayMedium { scene, ray, table, entries: scene.transfer_entries(), depth_axis: depth_axis(scene) };
     let (colour, hit) = march.through(&medium, |n| ray.offset(n));
     (colour, hit.map_or(MISS, |offset| ray.enter + offset))
 }
@@ -193,21 +195,21 @@ fn between(low: [f64; 4], high: [f64; 4], share: f64) -> [f64; 4] {
 }
 
 /// Index of the entry before a value in 0..1, and the fraction to the next entry.
-fn placed(value: f64) -> (usize, f64) {
-    let at = value * (transfer::ENTRIES - 1) as f64;
-    let n = (at.floor() as usize).min(transfer::ENTRIES - 2);
+fn placed(value: f64, entries: usize) -> (usize, f64) {
+    let at = value * (entries - 1) as f64;
+    let n = (at.floor() as usize).min(entries - 2);
     (n, at - n as f64)
 }
 
-fn looked_up(table: &Texels, value: f64) -> [f64; 4] {
-    let (n, share) = placed(value);
+fn looked_up(table: &Texels, entries: usize, value: f64) -> [f64; 4] {
+    let (n, share) = placed(value, entries);
     between(entry(table, n), entry(table, n + 1), share)
 }
 
-fn looked_up_between(table: &Texels, front: f64, back: f64) -> [f64; 4] {
-    let ((row, down), (column, along)) = (placed(front), placed(back));
+fn looked_up_between(table: &Texels, entries: usize, front: f64, back: f64) -> [f64; 4] {
+    let ((row, down), (column, along)) = (placed(front, entries), placed(back, entries));
     let at = |row: usize| {
-        let first = row * transfer::ENTRIES + column;
+        let first = row * entries + column;
         between(entry(table, first), entry(table, first + 1), along)
     };
     between(at(row), at(row + 1), down)

@@ -115,6 +115,9 @@ pub struct Volume {
     pub start_depth: Option<f64>,
     /// Transfer function.
     pub transfer: Transfer,
+    /// Entries of its table, 16..=4096 (1024 with pre-integrated compositing); absorption is linear between two. Absent: 256, or
+    /// as many as it takes to meet points of the transfer function that are closer than an entry.
+    pub entries: Option<u32>,
     /// Samples below this are transparent, 0..1 after the window.
     pub threshold: f64,
     /// Compositing rule.
@@ -137,6 +140,7 @@ impl Default for Volume {
             window: [0.0, 1.0],
             start_depth: None,
             transfer: Transfer::Named(TransferName::Grey),
+            entries: None,
             threshold: 0.0,
             compositing: Compositing::Corrected,
             shading: Shading::None,

@@ -158,7 +158,9 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
         Mode::Cube => settings.cube.window,
         _ => settings.planes.window,
     };
-    let table = scene.composites().then(|| transfer::table(&settings.volume.transfer, settings.volume.threshold));
+    let table = scene
+        .composites()
+        .then(|| transfer::table(&settings.volume.transfer, settings.volume.threshold, scene.transfer_entries()));
     let ramp = |value: f64| {
         let Some(table) = &table else { return [value; 3] };
         let last = table.len() - 1;

@@ -1,0 +1,146 @@
+//! Stage 2 of a scene by exact rays, in place of the passes that sample.
+
+use super::coordinates::Line;
+use super::field::segments;
+use super::projection::projected;
+use super::surface;
+use super::volume::Medium;
+use crate::passes::raycast::ray::span;
+use crate::passes::{Arrays, MISS, Texels, is_hit};
+use crate::scene::{Mode, Scene, SurfaceColour, View};
+use rayon::prelude::*;
+
+/// Largest difference of two quadrature rules on one piece of a ray, in light of 0..1.
+pub const TOLERANCE: f64 = 1e-12;
+
+/// What the exact rays of a picture cost, and how accurate they are by their own estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Root mean square over the rays of the estimated error of a ray: an estimate, no bound. Of a channel of the picture, or, of
+    /// surfaces, of the distance in mm.
+    pub estimate: f64,
+    /// Parts of rays that were integrated or searched.
+    pub pieces: u64,
+    pub rays: u64,
+}
+
+/// Why there is no exact reference of a scene's stage 2, as the end of a sentence; none if there is one.
+pub fn fault(scene: &Scene) -> Option<String> {
+    let s = &scene.settings;
+    if scene.is_flat() || s.mode == Mode::Cube {
+        return Some("the mode casts no ray".into());
+    }
+    if s.ray.sliding != 0 {
+        return Some("ray.sliding filters samples, at distances of one step".into());
+    }
+    let surface = scene.detects_surface().then(|| surface::fault(scene)).flatten();
+    surface.map(str::to_string)
+}
+
+/// Number of segments of all rays of a scene, roughly: what the time is proportional to.
+pub fn cost(scene: &Scene) -> f64 {
+    let rays = scene.ray_size().iter().map(|n| f64::from(*n)).product::<f64>();
+    // A ray crosses a face of a cell on each axis about once a texel.
+    let across = (scene.high - scene.low).length();
+    let pitch = scene.grid.pitch[0].min(scene.grid.pitch[1]);
+    rays * 2.0 * across / pitch
+}
+
+/// Replaces the reference of a pass of stage 2: writes what it writes. False for a pass that casts no ray through the volume.
+pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) -> bool {
+    match pass {
+        "raycast_volume" => volume(scene, reads, writes, effort),
+        "raycast_projection" => projection(scene, reads, writes, effort),
+        "raycast_surface" => surfaces(scene, reads, writes, effort),
+        _ => return false,
+    }
+    true
+}
+
+/// Calls `each` with the line of every pixel of a picture, its path and the distance of its beginning, mm, in parallel. A line begins
+/// where its ray enters the region of the view.
+fn for_each_ray<T: Send>(
+    scene: &Scene,
+    view: View,
+    size: [usize; 3],
+    each: impl Fn([usize; 2], &Line, f64, f64) -> T + Sync,
+) -> Vec<T> {
+    let [width, height, _] = size;
+    let one = |n: usize| {
+        let (x, y) = (n % width, n / width);
+        let (origin, direction) = scene.rays.at(x as f64 + 0.5, y as f64 + 0.5);
+        let (enter, leave) = span(scene, view, origin, direction);
+        let line = Line { scene, base: origin + direction * enter, direction };
+        each([x, y], &line, leave - enter, enter)
+    };
+    (0..width * height).into_par_iter().with_min_len(8).map(one).collect()
+}
+
+fn rms(errors: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = errors.len().max(1) as f64;
+    (errors.map(|e| e * e).sum::<f64>() / count).sqrt()
+}
+
+fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
+    let texels = reads.get("volume");
+    let view = scene.volume_view();
+    let size = writes.get("picture").size;
+    let surface = &scene.settings.surface;
+    let is_behind = scene.settings.mode == Mode::Surface && surface.colour == SurfaceColour::Behind;
+    let map: Option<&Texels> = (scene.settings.mode == Mode::Mixed || is_behind).then(|| reads.get("distance_map"));
+    let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
+        let ends = match map.map(|map| map.one(x, y, 0) - enter) {
+            None => [0.0, path],
+            Some(found) if is_behind => [found.max(0.0), path.min(found + surface.colour_depth)],
+            Some(found) => [0.0, path.min(found)],
+        };
+        let segments = segments(line, texels, view.window, ends);
+        let light = Medium::of(scene, line, TOLERANCE).light(&segments);
+        (light, light.hit.map_or(MISS, |s| enter + s))
+    });
+    effort.estimate = effort.estimate.max(rms(lights.iter().map(|(light, _)| light.estimate)));
+    effort.pieces += lights.iter().map(|(light, _)| light.pieces).sum::<u64>();
+    effort.rays += lights.len() as u64;
+    let pixels = lights.iter().enumerate().map(|(n, light)| ([n % size[0], n / size[0], 0], light));
+    for (at, (light, hit)) in pixels {
+        writes.get_mut("picture").set(at, &light.rgba);
+        if scene.lights_volume() {
+            writes.get_mut("distance_map").set(at, &[*hit]);
+        }
+    }
+}
+
+fn projection(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
+    let texels = reads.get("volume");
+    let view = scene.projection_view();
+    let picture = writes.get_mut("picture");
+    let values = for_each_ray(scene, view, picture.size, |_, line, path, _| {
+        let segments = segments(line, texels, view.window, [0.0, path]);
+        let off = segments.iter().map(|s| s.off).fold(0.0, f64::max);
+        (projected(&segments, scene.settings.mode), segments.len() as u64, off)
+    });
+    effort.estimate = effort.estimate.max(rms(values.iter().map(|v| v.2)));
+    effort.pieces += values.iter().map(|v| v.1).sum::<u64>();
+    effort.rays += values.len() as u64;
+    for (n, (value, ..)) in values.iter().enumerate() {
+        picture.set([n % picture.size[0], n / picture.size[0], 0], &value.map_or([0.0; 4], |v| [v, v, v, 1.0]));
+    }
+}
+
+fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
+    let texels = reads.get("volume");
+    let size = writes.get("distance_map").size;
+    let found = for_each_ray(scene, scene.surface_view(), size, |_, line, path, enter| {
+        let found = if path > 0.0 { surface::surface(line, texels, path, enter) } else { None };
+        found.map(|f| (enter + f.place, [f.echo, 1.0, f.behind, 0.0], f.off))
+    });
+    effort.estimate = effort.estimate.max(rms(found.iter().map(|f| f.map_or(0.0, |f| f.2))));
+    effort.rays += found.len() as u64;
+    for (n, found) in found.iter().enumerate() {
+        let at = [n % size[0], n / size[0], 0];
+        let (distance, surface) = found.map(|f| (f.0, f.1)).filter(|f| is_hit(f.0)).unwrap_or((MISS, [0.0; 4]));
+        writes.get_mut("distance_map").set(at, &[distance]);
+        let map = writes.get_mut("surface");
+        map.set(at, &surface[..map.channels]);
+    }
+}

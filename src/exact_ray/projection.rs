@@ -1,0 +1,53 @@
+//! The largest, the smallest and the mean value of the field along a ray, exactly: the field is a polynomial on each segment.
+
+use super::field::Segment;
+use super::gauss_kronrod::RULE;
+use super::volume::cut;
+use crate::scene::Mode;
+
+/// The value that a projection keeps of a ray, clamped to 0..1; none if the ray meets nothing. `mode`: the largest value unless it is
+/// the smallest (MinIP) or the mean over the length inside the insonified region.
+pub fn projected(segments: &[Segment], mode: Mode) -> Option<f64> {
+    if segments.is_empty() {
+        return None;
+    }
+    match mode {
+        Mode::Mean => {
+            let length: f64 = segments.iter().map(|s| s.to - s.from).sum();
+            Some(segments.iter().map(integral).sum::<f64>() / length)
+        }
+        Mode::MinIp => Some(1.0 - largest(segments, -1.0, 1.0)),
+        _ => Some(largest(segments, 1.0, 0.0)),
+    }
+}
+
+/// The largest value of offset + sign times the field, clamped to 0..1.
+fn largest(segments: &[Segment], sign: f64, offset: f64) -> f64 {
+    let mut best = f64::MIN;
+    let mut places = Vec::new();
+    for segment in segments {
+        let [low, high] = segment.field.range();
+        if offset + (sign * low).max(sign * high) <= best {
+            continue;
+        }
+        places.clear();
+        segment.field.slope().roots(&mut places);
+        places.extend([-1.0, 1.0]);
+        best = places.iter().map(|x| offset + sign * segment.field.at(*x)).fold(best, f64::max);
+    }
+    best.clamp(0.0, 1.0)
+}
+
+/// The integral of the clamped field over a segment, in units of mm.
+pub(super) fn integral(segment: &Segment) -> f64 {
+    let mut cuts = Vec::new();
+    cut(segment, &[0.0, 1.0], &mut cuts);
+    cuts.windows(2).map(|pair| integral_between(segment, pair[0], pair[1])).sum()
+}
+
+/// The same between two places in -1..1 between which the field does not cross 0 or 1.
+pub(super) fn integral_between(segment: &Segment, from: f64, to: f64) -> f64 {
+    let half = (to - from) / 2.0;
+    let values = RULE.nodes.map(|x| segment.field.at(from + half * (1.0 + x)).clamp(0.0, 1.0));
+    RULE.integrals(&values)[0] * half * segment.half()
+}
