@@ -188,7 +188,7 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
 }
 
 /// NPY, format 1.0: a magic number, a Python literal padded to 64 bytes, and the values.
-fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
+pub(crate) fn npy(shape: &[usize], values: &[f64], as_f64: bool) -> Vec<u8> {
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let kind = if as_f64 { "<f8" } else { "<f4" };
     let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}), }}", sizes.trim_end());

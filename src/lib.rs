@@ -14,7 +14,8 @@
 //! - [`gpu`] is the only module that uses Vulkan and the only one with unsafe code.
 //! - [`live`] renders frames while they arrive. [`mod@ui`] shows the pictures and handles input. [`kiosk`] holds the configuration, the logs
 //!   and the support bundle of a kiosk display.
-//! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples. [`profile`] measures GPU times, [`error_report`] error against run time,
+//! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
+//!   [`profile`] measures GPU times, [`error_report`] error against run time,
 //!   [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures. [`cli`] is the command line.
 //!
@@ -169,6 +170,8 @@
 mod args;
 #[forbid(unsafe_code)]
 pub mod barriers;
+#[forbid(unsafe_code)]
+pub mod bounds;
 #[forbid(unsafe_code)]
 pub mod cli;
 #[forbid(unsafe_code)]

@@ -15,7 +15,7 @@ mod view_config;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::terminal::{self, Failure, failed, input};
-use crate::{error_report, profile, thesis_tables, verify};
+use crate::{bounds, error_report, profile, thesis_tables, verify};
 use clap::{Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
@@ -60,7 +60,7 @@ enum Command {
     Profile(Box<profile::command::Profile>),
     /// Test whether this device and its driver render correctly
     Verify(verify::command::Verify),
-    /// Report error against run time for each dial, or the tables of the thesis
+    /// Report error against run time for each dial, proven bounds of a picture, or the tables of the thesis
     Report(Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(recordings::MakePhantom),
@@ -86,6 +86,8 @@ struct Report {
 enum ReportKind {
     /// Measure error against run time: renders and times every setting of each dial and compares it with the reference
     Error(Box<error_report::command::ErrorReport>),
+    /// Enclose every ray of volume rendering by proven bounds, on the CPU
+    Bounds(Box<bounds::command::BoundsReport>),
     /// Measure the thesis' tables of times under its conditions, and print them with its figures
     Tables(thesis_tables::command::ThesisTables),
 }
@@ -94,6 +96,7 @@ impl Report {
     fn run(&self) -> Result<(), Failure> {
         match &self.kind {
             ReportKind::Error(error) => error.run(),
+            ReportKind::Bounds(bounds) => bounds.run(),
             ReportKind::Tables(tables) => tables.run(),
         }
     }

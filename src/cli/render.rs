@@ -4,17 +4,18 @@ use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
 use crate::error_report::command::{parse_nanoseconds, read_report};
-use crate::error_report::{Measure, choose};
+use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{GpuError, Renderer, RendererOptions};
-use crate::passes::PassTime;
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::passes::{PassTime, Slot, Texels};
 use crate::plan::Plan;
 use crate::profile::export::pass_time_table;
-use crate::scene::Scene;
+use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(
@@ -45,6 +46,13 @@ pub struct Render {
     /// The error.json that `echolume report error -o DIR` wrote for this recording on this device
     #[arg(long, value_name = "FILE", requires = "budget")]
     report: Option<PathBuf>,
+    /// Write the difference of every pixel from the picture of half the step as a map too (PNG); hatched where it exceeds
+    /// --error-tolerance
+    #[arg(long, value_name = "FILE")]
+    error_map: Option<PathBuf>,
+    /// Largest difference of a pixel that --error-map does not hatch, 0..=1
+    #[arg(long, value_name = "ERROR", default_value_t = 0.01, requires = "error_map")]
+    error_tolerance: f64,
     /// Print the time of every pass
     #[arg(long)]
     timings: bool,
@@ -67,19 +75,26 @@ impl Render {
             return Ok(());
         }
 
-        let target: Output = ("-o", Some(&self.output));
-        self.input.check_outputs(&[target], &*source)?;
-        check_outputs(&[target], self.report.as_deref())?;
+        let targets: [Output; 2] = [("-o", Some(&self.output)), ("--error-map", self.error_map.as_deref())];
+        self.input.check_outputs(&targets, &*source)?;
+        check_outputs(&targets, self.report.as_deref())?;
+        let finer = self.finer(&scene)?;
         if let Some(folder) = &self.dump {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
         let context = self.input.open_device(self.validate)?;
+        let mut kept = Vec::new();
+        let compared = finer.map(|finer| (scene.clone(), finer));
         let mut renderer = Renderer::new(&context, scene, &options).map_err(|e| match e {
             GpuError::Shader { .. } if self.glsl.is_some() => input(e),
             e => failed(e),
         })?;
-        let send = |frame: Frame| renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed);
+        let send = |frame: Frame| {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
+            kept.extend(compared.is_some().then_some(frame));
+            Ok(())
+        };
         self.input.for_each_frame(&mut *source, send)?;
         renderer.show(0).map_err(failed)?;
         let picture = renderer.picture().map_err(failed)?;
@@ -94,6 +109,10 @@ impl Render {
             self.write_dump(folder, &mut renderer)?;
         }
         drop(renderer);
+        if let (Some(pair), Some(file)) = (compared, &self.error_map) {
+            let [picture, finer] = [pair.0, pair.1].map(|scene| in_floats(&context, scene, &options, &kept));
+            self.write_error_map(file, &picture?, &finer?)?;
+        }
         match context.messages().first() {
             None => Ok(()),
             Some(first) => Err(failed(format!("validation: {first}"))),
@@ -138,6 +157,40 @@ impl Render {
         Ok(())
     }
 
+    fn write_error_map(&self, file: &Path, picture: &Texels, finer: &Texels) -> Result<(), Failure> {
+        let found = map::error_map(picture, finer, self.error_tolerance).map_err(failed)?;
+        found.picture.save(file).map_err(failed)?;
+        let ([least, most], tolerance) = (map::SCALE, self.error_tolerance);
+        say!(
+            "error map: {}: difference from half the step, dark {least:e} to light {most}, logarithmic; RMS {:.1e}, largest {:.1e}; \
+             hatched above {tolerance}: {:.1} % of the pixels",
+            file.display(),
+            found.rms,
+            found.largest,
+            100.0 * found.share_above
+        );
+        Ok(())
+    }
+
+    /// With --error-map the scene at half its step.
+    fn finer(&self, scene: &Scene) -> Result<Option<Scene>, Failure> {
+        if self.error_map.is_none() {
+            return Ok(None);
+        }
+        if !(0.0..=1.0).contains(&self.error_tolerance) {
+            return Err(input(format!("--error-tolerance {}: must lie in 0..=1", self.error_tolerance)));
+        }
+        if scene.is_flat() || scene.settings.mode == Mode::Cube {
+            return Err(input("--error-map: this mode takes no steps along rays"));
+        }
+        let mut settings = scene.settings.clone();
+        settings.ray.step = Some(scene.step / 2.0);
+        // An edge that is not set is four slice pixels long at any step.
+        Scene::new(scene.geometry.clone(), scene.input, settings)
+            .map(Some)
+            .map_err(|e| input(format!("--error-map: {e}")))
+    }
+
     fn options(&self) -> Result<RendererOptions, Failure> {
         let mut options = RendererOptions::default();
         if let Some(folder) = &self.glsl {
@@ -165,6 +218,23 @@ impl Render {
         say!("slots: {}", folder.display());
         Ok(())
     }
+}
+
+/// The picture before the tone mapping of stage 4.
+fn in_floats(
+    context: &Arc<Context>,
+    mut scene: Scene,
+    options: &RendererOptions,
+    frames: &[Frame],
+) -> Result<Texels, Failure> {
+    scene.settings.post.floats = true;
+    let mut renderer = Renderer::new(context, scene, options).map_err(failed)?;
+    for frame in frames {
+        renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
+    }
+    renderer.show(0).map_err(failed)?;
+    renderer.picture().map_err(failed)?;
+    renderer.read(Slot::Picture).map_err(failed)?.ok_or_else(|| failed("--error-map: the plan has no picture"))
 }
 
 fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), Failure> {

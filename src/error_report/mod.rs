@@ -7,6 +7,7 @@ pub(crate) mod command;
 pub mod convergence;
 pub mod dials;
 pub mod export;
+pub mod map;
 pub mod measure;
 pub mod metrics;
 pub mod plot;

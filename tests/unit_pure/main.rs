@@ -1,5 +1,6 @@
 //! What needs neither a device nor the program: geometry, plans, references, statistics, reports, and the rules of the source tree.
 
+mod bounds;
 mod bricks;
 #[path = "../common/mod.rs"]
 mod common;

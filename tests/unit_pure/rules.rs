@@ -60,6 +60,7 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/error_report", &["crate::verify", "ash::vk"]),
         ("src/thesis_tables", &["crate::verify", "ash::vk"]),
         ("src/reference", &["crate::gpu", "ash::vk"]),
+        ("src/bounds", &["crate::gpu", "crate::plan", "crate::error_report", "ash::vk"]),
         ("src/exact_ray", &["crate::gpu", "crate::plan", "crate::reference", "crate::error_report", "ash::vk"]),
         ("src/live", &["crate::profile", "crate::error_report", "crate::verify", "ash::vk"]),
         ("src/kiosk", &["crate::gpu", "crate::profile", "crate::verify", "ash::", "winit::", "egui::"]),

@@ -1,0 +1,179 @@
+//! Bounds of the light of a ray: each part's opacity and colours are ranges, composited from back to front with both ends of the
+//! opacity, and parts are halved where that narrows the result most.
+
+use super::field::{Content, Field};
+use super::interval::Interval;
+use crate::scene::{TransferPoint, transfer};
+
+/// The transfer function as ranges.
+#[derive(Clone, Debug)]
+pub struct Medium {
+    points: Vec<TransferPoint>,
+    threshold: f64,
+    reference_length: f64,
+    /// Factors of the colours at 0 mm along the ray, and their growth per mm.
+    tint: Option<[[Interval; 3]; 2]>,
+}
+
+impl Medium {
+    /// `points` as of [`transfer::resolved`]; samples below `threshold` are transparent; opacities hold for `reference_length` mm.
+    pub fn new(points: Vec<TransferPoint>, threshold: f64, reference_length: f64) -> Medium {
+        Medium { points, threshold, reference_length, tint: None }
+    }
+
+    /// With colours that are multiplied by a factor which is linear along the ray.
+    pub fn tinted(self, start: [Interval; 3], rate: [Interval; 3]) -> Medium {
+        Medium { tint: Some([start, rate]), ..self }
+    }
+
+    /// Red, green, blue and absorption per mm over a range of values in 0..1.
+    fn over(&self, values: Interval) -> ([Interval; 3], Interval) {
+        let mut all = self.at(values.low);
+        let ends = self.points.iter().filter(|p| values.low < p.at && p.at < values.high);
+        let inner = ends.map(|p| [p.colour[0], p.colour[1], p.colour[2], p.opacity].map(Interval::of));
+        for rgba in inner.chain([self.at(values.high)]) {
+            all = std::array::from_fn(|c| all[c].hull(rgba[c]));
+        }
+        let mut absorption = all[3].clamped().absorption(transfer::OPAQUE);
+        if values.low < self.threshold {
+            absorption.low = 0.0;
+        }
+        if values.high < self.threshold {
+            absorption = Interval::ZERO;
+        }
+        ([all[0], all[1], all[2]], absorption.over(Interval::of(self.reference_length)))
+    }
+
+    fn at(&self, value: f64) -> [Interval; 4] {
+        let after = self.points.partition_point(|p| p.at <= value);
+        let rgba = |p: &TransferPoint| [p.colour[0], p.colour[1], p.colour[2], p.opacity].map(Interval::of);
+        let before = after.checked_sub(1).and_then(|n| self.points.get(n));
+        match (before, self.points.get(after)) {
+            (Some(low), Some(high)) => {
+                let from = Interval::of(low.at);
+                let share = (Interval::of(value) - from).over(Interval::of(high.at) - from);
+                let (low, high) = (rgba(low), rgba(high));
+                std::array::from_fn(|c| low[c] + (high[c] - low[c]) * share)
+            }
+            (Some(end), None) | (None, Some(end)) => rgba(end),
+            (None, None) => [Interval::ZERO; 4],
+        }
+    }
+}
+
+/// A part of a ray: what it adds to the light behind it.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    from: f64,
+    to: f64,
+    opacity: Interval,
+    /// Red, green, blue, and 1 for the opacity.
+    colour: [Interval; 4],
+}
+
+/// Bounds of a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Red, green, blue, opacity.
+    pub rgba: [Interval; 4],
+    /// Parts at the end.
+    pub parts: usize,
+}
+
+impl Bounds {
+    /// The width of the widest channel.
+    pub fn width(&self) -> f64 {
+        self.rgba.iter().map(|c| c.width()).fold(0.0, f64::max)
+    }
+}
+
+/// Halves parts until the widest channel is narrower than `target`, or there are `most` parts. `hints`: places in rising order at
+/// which a part should end, such as the faces of cells; the bounds hold whatever they are.
+pub fn bounds(field: &Field, medium: &Medium, hints: &[f64], target: f64, most: usize) -> Bounds {
+    let part = |from: f64, to: f64| part(field, medium, from, to);
+    let mut parts: Vec<Part> = hints.windows(2).filter(|p| p[1] > p[0]).filter_map(|p| part(p[0], p[1])).collect();
+    loop {
+        let found = Bounds { rgba: composited(&parts), parts: parts.len() };
+        if found.width() <= target || parts.len() >= most {
+            return found;
+        }
+        let doubt = doubts(&parts);
+        // Those that hold most of the doubt; a part that cannot be halved is left.
+        let mut order: Vec<usize> = (0..parts.len()).filter(|n| divisible(&parts[*n])).collect();
+        order.sort_by(|a, b| doubt[*b].total_cmp(&doubt[*a]));
+        let total: f64 = order.iter().map(|n| doubt[*n]).sum();
+        let mut halved = vec![false; parts.len()];
+        let (mut covered, mut count) = (0.0, 0);
+        for n in order {
+            if covered >= 0.7 * total || count + parts.len() >= most {
+                break;
+            }
+            covered += doubt[n];
+            count += 1;
+            halved[n] = true;
+        }
+        if count == 0 {
+            return found;
+        }
+        let split = |(n, p): (usize, &Part)| match halved[n] {
+            false => [Some(*p), None],
+            true => {
+                let middle = p.from + (p.to - p.from) / 2.0;
+                [part(p.from, middle), part(middle, p.to)]
+            }
+        };
+        parts = parts.iter().enumerate().flat_map(split).flatten().collect();
+    }
+}
+
+fn divisible(part: &Part) -> bool {
+    part.to - part.from > 1e-9 * part.to.abs().max(1.0)
+}
+
+/// None where nothing is, or all is transparent.
+fn part(field: &Field, medium: &Medium, from: f64, to: f64) -> Option<Part> {
+    let Content::Within { values, surely_inside } = field.content(from, to) else { return None };
+    let (mut colour, mut absorption) = medium.over(values);
+    if absorption.high <= 0.0 {
+        return None;
+    }
+    if !surely_inside {
+        absorption.low = 0.0;
+    }
+    if let Some([start, rate]) = &medium.tint {
+        let s = Interval::between(from, to);
+        colour = std::array::from_fn(|c| colour[c] * (start[c] + rate[c] * s));
+    }
+    let length = Interval::of(to) - Interval::of(from);
+    let [r, g, b] = colour;
+    Some(Part { from, to, opacity: (absorption * length).opacity(), colour: [r, g, b, Interval::ONE] })
+}
+
+/// From back to front: light a c + (1 - a) behind. It is linear in the opacity a, so that its extremes are at the ends of a, and it rises
+/// with the colour and with what is behind.
+fn composited(parts: &[Part]) -> [Interval; 4] {
+    let mut behind = [Interval::ZERO; 4];
+    for part in parts.iter().rev() {
+        for (behind, colour) in behind.iter_mut().zip(part.colour) {
+            let over = |a: f64| {
+                let (a, rest) = (Interval::of(a), Interval::ONE - Interval::of(a));
+                a * colour + rest * *behind
+            };
+            let (thin, thick) = (over(part.opacity.low), over(part.opacity.high));
+            *behind = thin.hull(thick);
+        }
+    }
+    behind
+}
+
+/// How much each part widens the result, roughly: the light that reaches it times its own doubt.
+fn doubts(parts: &[Part]) -> Vec<f64> {
+    let mut left = 1.0;
+    let each = parts.iter().map(|part| {
+        let colours = part.colour.iter().map(|c| c.high - c.low).fold(0.0, f64::max);
+        let doubt = left * ((part.opacity.high - part.opacity.low) + part.opacity.high * colours);
+        left *= 1.0 - (part.opacity.low + part.opacity.high) / 2.0;
+        doubt
+    });
+    each.collect()
+}

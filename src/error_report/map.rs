@@ -1,0 +1,105 @@
+//! A map of the error of a picture's step: each pixel's difference from the picture of half the step, which for a rule of order 1 is half
+//! of the error, and of order 2 three quarters.
+
+use crate::passes::Texels;
+use crate::picture::Picture;
+
+/// The smallest and the largest difference that the colours tell apart; the scale is logarithmic.
+pub const SCALE: [f64; 2] = [1e-4, 1.0];
+
+/// Pixels between two lines of the hatching.
+const HATCH: usize = 6;
+
+/// Colours of evenly rising lightness (CIE L* 8, 30, 52, 74, 95), from nearly black over violet and orange to pale yellow: they are
+/// told apart in grey as well.
+const COLOURS: [[f64; 3]; 5] =
+    [[0.07, 0.08, 0.17], [0.41, 0.15, 0.46], [0.80, 0.33, 0.38], [0.97, 0.64, 0.35], [0.99, 0.95, 0.75]];
+
+/// The map and what it says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorMap {
+    pub picture: Picture,
+    /// RMS and largest of the differences of the pixels.
+    pub rms: f64,
+    pub largest: f64,
+    /// Share of the pixels above the tolerance.
+    pub share_above: f64,
+}
+
+/// The difference of each pixel, the largest of red, green and blue, as a colour; hatched where it exceeds `tolerance` (0..1).
+///
+/// # Errors
+/// One line: the pictures differ in size or have fewer than 3 channels.
+pub fn error_map(picture: &Texels, finer: &Texels, tolerance: f64) -> Result<ErrorMap, String> {
+    if picture.size != finer.size || picture.channels != finer.channels || picture.channels < 3 {
+        return Err(format!("error map: {:?} and {:?} cannot be compared", picture.size, finer.size));
+    }
+    let channels = picture.channels;
+    let pairs = picture.values.chunks_exact(channels).zip(finer.values.chunks_exact(channels));
+    let differences: Vec<f64> = pairs.map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max)).collect();
+    let [width, height, _] = picture.size;
+    let mut rgba = Vec::with_capacity(4 * differences.len());
+    for (n, difference) in differences.iter().enumerate() {
+        let (x, y) = (n % width.max(1), n / width.max(1));
+        let hatched = *difference > tolerance && (x + y) % HATCH < 2;
+        let colour = colour(*difference);
+        // White lines on dark colours, black ones on light colours.
+        let line = if colour[1] < 0.5 { 1.0 } else { 0.0 };
+        rgba.extend(colour.map(|c| ((if hatched { line } else { c }) * 255.0_f64).round() as u8));
+        rgba.push(255);
+    }
+    let count = differences.len().max(1) as f64;
+    Ok(ErrorMap {
+        picture: Picture { width: width as u32, height: height as u32, rgba },
+        rms: (differences.iter().map(|d| d * d).sum::<f64>() / count).sqrt(),
+        largest: differences.iter().copied().fold(0.0, f64::max),
+        share_above: differences.iter().filter(|d| **d > tolerance).count() as f64 / count,
+    })
+}
+
+/// The colour of a difference: linear between the colours over its logarithm.
+fn colour(difference: f64) -> [f64; 3] {
+    let [least, most] = SCALE;
+    let share = (difference.max(least) / least).ln() / (most / least).ln();
+    let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    let n = (at as usize).min(COLOURS.len() - 2);
+    std::array::from_fn(|c| COLOURS[n][c] + (COLOURS[n + 1][c] - COLOURS[n][c]) * (at - n as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Lightness of CIELAB over sRGB (IEC 61966-2-1).
+    fn lightness([r, g, b]: [f64; 3]) -> f64 {
+        let linear = |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        let y = 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+        if y > 0.008_856 { 116.0 * y.cbrt() - 16.0 } else { 903.3 * y }
+    }
+
+    #[test]
+    fn colours_rise_evenly_in_lightness() {
+        let steps: Vec<f64> = COLOURS.map(lightness).windows(2).map(|p| p[1] - p[0]).collect();
+        assert!(steps.iter().all(|s| (15.0..30.0).contains(s)), "{:?} rises by {steps:?}", COLOURS.map(lightness));
+    }
+
+    #[test]
+    fn differences_become_colours_and_hatching_above_the_tolerance_alone() {
+        let flat = |v: f64| Texels { size: [12, 12, 1], channels: 4, values: [v, 0.5, 0.5, 1.0].repeat(144) };
+        let colours = |map: &ErrorMap| {
+            let mut all: Vec<_> = map.picture.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+            all.sort();
+            all.dedup();
+            all
+        };
+        let below = error_map(&flat(0.2), &flat(0.204), 0.01).expect("same size");
+        assert_eq!((colours(&below).len(), below.share_above), (1, 0.0));
+        assert!((below.rms - 0.004).abs() < 1e-15 && (below.largest - 0.004).abs() < 1e-15);
+        let above = error_map(&flat(0.2), &flat(0.25), 0.01).expect("same size");
+        assert_eq!((colours(&above).len(), above.share_above), (2, 1.0));
+        let none = error_map(&flat(0.2), &flat(0.2), 0.01).expect("same size");
+        assert_eq!(colours(&none), [COLOURS[0].map(|c| (c * 255.0).round() as u8)]);
+        let small = Texels { size: [1, 1, 1], channels: 4, values: vec![0.0; 4] };
+        assert!(error_map(&flat(0.2), &small, 0.01).is_err());
+    }
+}
