@@ -163,7 +163,9 @@ fn composited(parts: &[Part]) -> [Interval; 4] {
             *behind = thin.hull(thick);
         }
     }
-    behind
+    // No light is negative, and no opacity above 1: only rounding outwards is.
+    let [r, g, b, opacity] = behind.map(|v| Interval { low: v.low.max(0.0), ..v });
+    [r, g, b, Interval { high: opacity.high.min(1.0), ..opacity }]
 }
 
 /// How much each part widens the result, roughly: the light that reaches it times its own doubt.

@@ -330,7 +330,11 @@ impl ErrorMeasurement<'_> {
         let fitted = || {
             // A reference of finer steps is off by as many times less as its step is shorter, if the order is 1.
             let good = |p: &&Point| match &reference {
-                Reference::Exact { estimate, .. } => p.errors.rmse >= BETTER * estimate,
+                // Its estimate is of distances where these are measured.
+                Reference::Exact { estimate, .. } => {
+                    let distances = p.errors.mm.as_ref().and_then(|mm| mm.error.as_ref());
+                    distances.map_or(p.errors.rmse, |mm| mm.rms) >= BETTER * estimate
+                }
                 Reference::Converged { rmse, .. } => p.errors.rmse >= BETTER * rmse,
                 Reference::F64 | Reference::AsItIs => p.value >= BETTER * best.step * (1.0 - 1e-9),
             };

@@ -112,6 +112,13 @@ impl Run {
         self.ends[self.ends.len() - 1]
     }
 
+    /// How far apart two values of the clamped field may be.
+    fn spread(&self) -> f64 {
+        let ranges = self.parts.iter().map(|(segment, _)| segment.field.range().map(|v| v.clamp(0.0, 1.0)));
+        let [low, high] = ranges.fold([1.0, 0.0], |[l, h]: [f64; 2], [a, b]| [l.min(a), h.max(b)]);
+        high - low
+    }
+
     /// Integral of the clamped field from the run's beginning to s, mm.
     fn integral(&self, s: f64) -> f64 {
         let part = (self.ends.partition_point(|end| *end <= s).max(1) - 1).min(self.parts.len() - 1);
@@ -225,6 +232,10 @@ impl Search<'_> {
     fn surface(&self, seen: &mut u32) -> End {
         let settings = &self.scene.settings.surface;
         let last = self.run.last().min(self.limit) - self.edge;
+        // Two means differ by no more than the field does.
+        if self.run.spread() <= settings.threshold {
+            return End::Run;
+        }
         // The first place whose older half may be used.
         let mut since = self.run.first();
         loop {
@@ -232,9 +243,8 @@ impl Search<'_> {
             if first >= last {
                 return End::Run;
             }
-            let parts = self.parts(first, last);
-            let Some(crossing) = self.crossing(&parts, first) else { return End::Run };
-            let peak = self.peak(&parts, crossing);
+            let Some((crossing, parts)) = self.crossing(first, last) else { return End::Run };
+            let peak = self.peak(&parts, crossing, last);
             let beyond = (peak.end + self.edge).max(crossing + 3.0 * self.edge);
             let wanted = *seen + 1 == settings.number;
             let whole = beyond <= self.run.last().min(self.limit);
@@ -264,13 +274,37 @@ impl Search<'_> {
         }
     }
 
-    /// Where the difference rises above the threshold, at 0 or behind it. An edge that is above it where the first ring of the run
-    /// ends counts, unless that is where the region begins.
-    fn crossing(&self, parts: &[Part], first: f64) -> Option<f64> {
+    /// Where the difference rises above the threshold between two places, at 0 or behind it, and its parts as far as an edge may be
+    /// followed from there. An edge that is above it where the first ring of the run ends counts, unless that is where the region
+    /// begins.
+    fn crossing(&self, first: f64, last: f64) -> Option<(f64, Vec<Part>)> {
         let threshold = self.scene.settings.surface.threshold;
-        if first > 1e-9 && parts.first()?.at(first) > threshold {
-            return Some(first);
+        let mut parts: Vec<Part> = Vec::new();
+        let mut known = first;
+        // A few edges at a time: most surfaces are far from the end of the ray.
+        while known < last {
+            let to = (known + 4.0 * self.edge).min(last);
+            let begun = parts.len();
+            parts.extend(self.parts(known, to));
+            let found = match parts.first() {
+                Some(part) if begun == 0 && first > 1e-9 && part.at(first) > threshold => Some(first),
+                _ => self.rise(parts.get(begun..).unwrap_or_default()),
+            };
+            known = to;
+            if let Some(crossing) = found {
+                let end = (crossing + 17.0 * self.edge).min(last);
+                if end > known {
+                    parts.extend(self.parts(known, end));
+                }
+                return Some((crossing, parts));
+            }
         }
+        None
+    }
+
+    /// The first place at 0 or behind it at which the difference rises above the threshold.
+    fn rise(&self, parts: &[Part]) -> Option<f64> {
+        let threshold = self.scene.settings.surface.threshold;
         for part in parts.iter().filter(|p| p.to > 0.0) {
             for pair in part.turns().windows(2) {
                 let (from, to) = (pair[0].max(0.0), pair[1]);
@@ -283,10 +317,9 @@ impl Search<'_> {
     }
 
     /// Follows the difference until it falls below 0.7 of its largest value, over at most max(h, h / (4 threshold)), 16 h at most.
-    fn peak(&self, parts: &[Part], crossing: f64) -> Peak {
+    fn peak(&self, parts: &[Part], crossing: f64, last: f64) -> Peak {
         let threshold = self.scene.settings.surface.threshold;
         let limit = crossing + self.edge * (0.25 / threshold).clamp(1.0, 16.0);
-        let last = parts.last().map_or(crossing, |p| p.to);
         let mut peak = Peak { best: f64::MIN, at: crossing, end: limit, fallen: None, cut: false };
         for part in parts.iter().filter(|p| p.to > crossing && p.from < limit) {
             for pair in part.turns().windows(2) {
