@@ -61,10 +61,10 @@ void main() {
     vec3 normal = normal_at(pixel, distance, along_ray);
     vec3 to_light = light_at;
     if (POINT == 1) {
-        // A light on the surface shines along the normal.
+        // A light on the surface, as far as f32 can tell, shines along the normal.
         vec3 towards = light_at - (ray_origin(vec2(pixel) + 0.5) + along_ray * distance);
         float far = length(towards);
-        to_light = far > 1e-6 ? towards / far : normal;
+        to_light = far > 1e-7 * distance ? towards / far : normal;
     }
 
     float cosine = dot(normal, to_light);

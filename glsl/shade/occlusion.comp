@@ -22,7 +22,7 @@ void main() {
         vec3 here = ray_origin(at) + along_ray * distance;
         vec3 normal = normal_at(pixel, distance, along_ray);
         // The radius in pixels at the surface's distance.
-        float pixels = radius / max(length(origin_dx + direction_dx * distance), 1e-9);
+        float pixels = radius / max(length(origin_dx + direction_dx * distance), 1e-30);
         float taken = 0.0;
         for (int i = 0; i < SAMPLES; ++i) {
             // Uniform over the disc's area; the golden angle keeps directions apart.
@@ -34,7 +34,7 @@ void main() {
             vec2 there = vec2(tap) + 0.5;
             vec3 towards = ray_origin(there) + ray_direction(there) * other - here;
             float far = length(towards);
-            if (far < 1e-6) continue;
+            if (far < 1e-7 * radius) continue;
             float falls = max(1.0 - far * far / (radius * radius), 0.0);
             // The bias of 0.1 ignores the map's own roughness.
             taken += max(dot(normal, towards) / far - 0.1, 0.0) * falls;

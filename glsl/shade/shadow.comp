@@ -23,9 +23,9 @@ vec3 projected(vec3 place) {
     vec3 offset = place - origin;
     if (PERSPECTIVE == 1) {
         float depth = dot(offset, forward);
-        vec3 across = offset / max(depth, 1e-6) - direction;
+        vec3 across = offset / max(depth, 1e-30) - direction;
         vec2 at = vec2(dot(across, direction_dx) / dot(direction_dx, direction_dx), dot(across, direction_dy) / dot(direction_dy, direction_dy));
-        return vec3(at, depth > 1e-6 ? length(offset) : -1.0);
+        return vec3(at, depth > 0.0 ? length(offset) : -1.0);
     }
     vec2 at = vec2(dot(offset, origin_dx) / dot(origin_dx, origin_dx), dot(offset, origin_dy) / dot(origin_dy, origin_dy));
     return vec3(at, dot(offset, forward));
@@ -57,7 +57,7 @@ void main() {
         if (POINT == 1) {
             to_light = light_at - place;
             float far = length(to_light);
-            to_light = far > 1e-6 ? to_light / far : -ray_direction(at);
+            to_light = far > 1e-7 * distance ? to_light / far : -ray_direction(at);
             length_to_light = min(reach, far);
         }
         float stride = length_to_light / float(STEPS);
@@ -68,7 +68,7 @@ void main() {
             if (any(lessThan(pixel_place.xy, vec2(0.0))) || any(greaterThanEqual(pixel_place.xy, size)) || pixel_place.z < 0.0) break;
             float nearest = map_at(pixel_place.xy);
             // Depth of the sample behind the surface. A miss blocks nothing.
-            float inside = is_hit(nearest) ? pixel_place.z - nearest - bias : -1e6;
+            float inside = is_hit(nearest) ? pixel_place.z - nearest - bias : -MISS;
             if (inside > thickness) continue;
             float blocked = SOFT == 1 ? clamp(0.5 + inside / (softness * travelled), 0.0, 1.0) : (inside > 0.0 ? 1.0 : 0.0);
             arrives = min(arrives, 1.0 - blocked);

@@ -155,14 +155,24 @@ fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {
     transfer::table(&scene.settings.volume.transfer, scene.settings.volume.threshold, scene.transfer_entries())
 }
 
-/// The tiles of a picture of planes, as `Sheet::table` lays them out.
+/// The tiles of a picture of planes, as `Sheet::table` lays them out, relative to [`Scene::local_origin`].
 pub(super) fn tile_table(scene: &Scene) -> Vec<f32> {
-    floats(scene.sheet().table(scene.settings.planes.thickness))
+    let mut sheet = scene.sheet();
+    for tile in &mut sheet.tiles {
+        tile.plane.at = scene.to_local(tile.plane.at);
+        tile.crossed_by.iter_mut().for_each(|(plane, _)| plane.at = scene.to_local(plane.at));
+    }
+    floats(sheet.table(scene.settings.planes.thickness))
 }
 
-/// Outward normal and limit of each half-space of the block.
+/// Outward normal and limit of each half-space of the block, relative to [`Scene::local_origin`].
 pub(super) fn block_table(scene: &Scene) -> Vec<f32> {
-    floats(scene.block().iter().flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, f.limit]))
+    floats(
+        scene
+            .block()
+            .iter()
+            .flat_map(|f| [f.normal.x, f.normal.y, f.normal.z, scene.limit_to_local(f.normal, f.limit)]),
+    )
 }
 
 /// The part of the texture that the samples of each brick may touch, x fastest.

@@ -321,11 +321,11 @@ impl Params {
     }
 }
 
-/// The rays of a scene, as every shader that casts or retraces them names them.
+/// The rays of a scene, as every shader that casts or retraces them names them; relative to [`Scene::local_origin`].
 pub(super) fn ray_params(scene: &Scene) -> Params {
     let rays = &scene.rays;
     Params::default()
-        .vec3("origin", rays.origin)
+        .vec3("origin", scene.to_local(rays.origin))
         .vec3("origin_dx", rays.origin_dx)
         .vec3("origin_dy", rays.origin_dy)
         .vec3("direction", rays.direction)

@@ -294,7 +294,7 @@ fn seen_at(scene: &Scene, place: DVec3, size: [usize; 3]) -> Option<([f64; 2], f
     let solve = |v: DVec3, dx: DVec3, dy: DVec3| [v.dot(dx) / dx.length_squared(), v.dot(dy) / dy.length_squared()];
     let (at, distance) = if rays.is_perspective {
         let depth = way.dot(rays.forward);
-        if depth <= 1e-6 {
+        if depth <= 0.0 {
             return None;
         }
         (solve(way / depth - rays.direction, rays.direction_dx, rays.direction_dy), way.length())
@@ -378,7 +378,7 @@ fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
     let (here, distance) = place(scene, distances, x, y)?;
     let normal = normal(scene, distances, x, y)?;
     let rays = &scene.rays;
-    let pixels = settings.radius / (rays.origin_dx + rays.direction_dx * distance).length().max(1e-9);
+    let pixels = settings.radius / (rays.origin_dx + rays.direction_dx * distance).length();
     let mut taken = 0.0;
     for i in 0..OCCLUSION_SAMPLES {
         let share = ((f64::from(i) + 0.5) / f64::from(OCCLUSION_SAMPLES)).sqrt();
@@ -386,7 +386,7 @@ fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
         let tap = |at: i64, along: f64| (at as f64 + 0.5 + pixels * share * along).floor() as i64;
         let Some((there, _)) = place(scene, distances, tap(x, cos), tap(y, sin)) else { continue };
         let far = there.distance(here);
-        if far >= 1e-6 {
+        if far >= 1e-7 * settings.radius {
             let falls = (1.0 - (far / settings.radius).powi(2)).max(0.0);
             taken += (normal.dot(there - here) / far - ROUGHNESS).max(0.0) * falls;
         }
@@ -398,16 +398,24 @@ fn camera_params(scene: &Scene) -> Params {
     ray_params(scene).f32("cliff", scene.cliff())
 }
 
-/// Unit direction to a directional light, or the position of a point light, in space.
+/// Unit direction to a light that is infinitely far away.
+fn direction_to_light(scene: &Scene) -> DVec3 {
+    scene.rays.from_camera(scene.settings.light.direction.normalize())
+}
+
+/// Unit direction to a directional light, or the position of a point light as the shaders get it.
 fn light_at(scene: &Scene) -> DVec3 {
-    scene.light_place().unwrap_or_else(|| scene.rays.from_camera(scene.settings.light.direction.normalize()))
+    match scene.light_place() {
+        Some(place) => scene.to_local(place),
+        None => direction_to_light(scene),
+    }
 }
 
 /// Unit direction from a place to the light, and the distance to it; the direction is `otherwise` for a light at that place.
 fn to_light(scene: &Scene, place: DVec3, otherwise: DVec3) -> (DVec3, f64) {
     match scene.light_place() {
         Some(light) => ((light - place).try_normalize().unwrap_or(otherwise), light.distance(place)),
-        None => (light_at(scene), f64::MAX),
+        None => (direction_to_light(scene), f64::MAX),
     }
 }
 

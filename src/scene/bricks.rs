@@ -78,7 +78,8 @@ impl Scene {
         }
         // No skipping where f32 cannot resolve positions to a brick's margin, as with a camera kilometres away.
         let bricks = self.bricks();
-        let farthest = self.low.abs().max(self.high.abs()).max(self.rays.origin.abs()).max_element();
+        let farthest = [self.low, self.high, self.rays.origin].map(|place| self.to_local(place).abs().max_element());
+        let farthest = farthest.into_iter().fold(0.0, f64::max);
         farthest * 1e-6 < MARGIN * bricks.edge.min_element()
     }
 

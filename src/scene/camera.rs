@@ -75,7 +75,8 @@ pub fn rays(settings: &Settings, low: DVec3, high: DVec3, depth_offset: f64, sti
     let fit = (along(up) / height).max(along(right) / width);
     // mm per pixel at the target.
     let pixel = 2.0 * fit / camera.zoom;
-    let away = along(forward) * 1.05 + 1.0;
+    // The millimetre keeps the camera off a thin box. A box of micrometres gets less: in f32 the distance must not hide it.
+    let away = along(forward) * 1.05 + half.length().min(1.0);
 
     // Offset of the picture's upper left corner from its middle, pixels.
     let corner = |right: DVec3, up: DVec3| right * (-width / 2.0) + up * (height / 2.0);

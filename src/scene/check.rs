@@ -91,10 +91,10 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
         );
     }
     for value in c.target.iter().flatten() {
-        within("camera.target", *value, -1e6, 1e6)?;
+        within("camera.target", *value, -1e10, 1e10)?;
     }
     if let Some(step) = settings.ray.step {
-        within("ray.step", step, 1e-4, 1e3)?;
+        within("ray.step", step, 1e-9, 1e9)?;
     }
     within("ray.early_end", settings.ray.early_end, 0.0, 1.0)?;
     if let Some(fault) = transfer::fault(&settings.volume.transfer) {
@@ -115,7 +115,7 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     within("surface.threshold", f.threshold, 1e-6, 1.0)?;
     within("surface.rough_threshold", f.rough_threshold.unwrap_or(f.threshold), 1e-6, 1.0)?;
     if let Some(Edge::Length(edge)) = f.edge {
-        within("surface.edge", edge, 1e-3, 1e3)?;
+        within("surface.edge", edge, 1e-9, 1e9)?;
     }
     within("surface.noise", f.noise, 0.0, 10.0)?;
     within("surface.rough", f64::from(f.rough), 1.0, 8.0)?;
@@ -133,7 +133,7 @@ fn check_clip(planes: &[Clip]) -> Result<(), SceneError> {
     }
     for plane in planes {
         for value in plane.at {
-            within("clip.at", value, -1e6, 1e6)?;
+            within("clip.at", value, -1e10, 1e10)?;
         }
         let normal = DVec3::from(plane.normal);
         if !normal.is_finite() || normal.length() < 1e-9 {
@@ -199,7 +199,7 @@ fn check_light(l: &Light) -> Result<(), SceneError> {
         return refuse("light.direction", "must be finite and not zero");
     }
     for value in l.position.iter().flat_map(|p| p.to_array()) {
-        within("light.position", value, -1e6, 1e6)?;
+        within("light.position", value, -1e10, 1e10)?;
     }
     let shadow = l.shadow.unwrap_or_default();
     let occlusion = l.occlusion.unwrap_or_default();
@@ -335,7 +335,7 @@ fn check_edge(field: &'static str, edge: f64) -> Result<(), SceneError> {
 pub(super) fn check_planes(settings: &Settings) -> Result<(), SceneError> {
     let p = &settings.planes;
     for value in p.position.iter().flatten() {
-        within("planes.position", *value, -1e6, 1e6)?;
+        within("planes.position", *value, -1e10, 1e10)?;
     }
     for (field, value) in [("planes.azimuth", p.azimuth), ("planes.tilt", p.tilt), ("planes.roll", p.roll)] {
         within(field, value, -360.0, 360.0)?;

@@ -56,9 +56,13 @@ impl Scene {
 
     /// Refuses faces with nothing left between them.
     pub(super) fn check_block(&self) -> Result<(), SceneError> {
-        let faces = self.faces();
-        match middle_of(&faces) {
-            Some(middle) if faces.iter().all(|f| f.room(middle) > 1e-6) => Ok(()),
+        // About the box's centre, and relative to its size: a volume may be a micrometre wide, or a kilometre away.
+        let centre = (self.low + self.high) / 2.0;
+        let about = |f: HalfSpace| HalfSpace { limit: f.room(centre), ..f };
+        let faces: Vec<HalfSpace> = self.faces().into_iter().map(about).collect();
+        let slack = 1e-8 * (self.high - self.low).max_element();
+        match middle_of(&faces, slack) {
+            Some(middle) if faces.iter().all(|f| f.room(middle) > slack) => Ok(()),
             _ => {
                 let [x, y, z] = (self.high - self.low).to_array();
                 refuse("cube.inset", format!("leaves nothing of the block of {x:.2} x {y:.2} x {z:.2} mm"))
@@ -67,8 +71,9 @@ impl Scene {
     }
 }
 
-/// The mean of the corners of a convex solid, a point strictly inside it. None if the solid is flat or empty.
-fn middle_of(faces: &[HalfSpace]) -> Option<DVec3> {
+/// The mean of the corners of a convex solid, a point strictly inside it. None if the solid is flat or empty. `slack`: by how many mm
+/// rounding may put a corner beyond a face.
+fn middle_of(faces: &[HalfSpace], slack: f64) -> Option<DVec3> {
     let (mut sum, mut count) = (DVec3::ZERO, 0.0);
     for (i, a) in faces.iter().enumerate() {
         for (j, b) in faces.iter().enumerate().skip(i + 1) {
@@ -78,7 +83,7 @@ fn middle_of(faces: &[HalfSpace]) -> Option<DVec3> {
                     continue;
                 }
                 let corner = across.inverse() * DVec3::new(a.limit, b.limit, c.limit);
-                if faces.iter().all(|f| f.room(corner) > -1e-6) {
+                if faces.iter().all(|f| f.room(corner) > -slack) {
                     sum += corner;
                     count += 1.0;
                 }
@@ -103,10 +108,10 @@ mod tests {
     #[test]
     fn the_middle_of_a_box_is_its_centre_and_of_nothing_there_is_none() {
         let (low, high) = (DVec3::new(-3.0, 10.0, -1.0), DVec3::new(5.0, 40.0, 2.0));
-        let middle = middle_of(&sides(low, high)).unwrap();
+        let middle = middle_of(&sides(low, high), 1e-6).unwrap();
         assert!(middle.distance((low + high) / 2.0) < 1e-9);
         let mut faces = sides(low, high);
         faces.push(HalfSpace { normal: DVec3::X, limit: -3.5 });
-        assert!(middle_of(&faces).is_none());
+        assert!(middle_of(&faces, 1e-6).is_none());
     }
 }

@@ -235,6 +235,25 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The origin of the coordinates that shaders compute with, mm in space ("relative to center", Ohlarik 2008): the centre of the
+    /// rendered box of a Cartesian volume, which may lie anywhere. A sweep's own origin, which its inverse map needs, is on its probe.
+    pub fn local_origin(&self) -> DVec3 {
+        match self.geometry {
+            Geometry::Cartesian(_) => (self.low + self.high) / 2.0,
+            Geometry::Sweep(_) => DVec3::ZERO,
+        }
+    }
+
+    /// A place in space, mm, as shaders get it. The subtraction is in f64: f32 would lose a voxel of 0.1 mm at 1e6 mm.
+    pub fn to_local(&self, place: DVec3) -> DVec3 {
+        place - self.local_origin()
+    }
+
+    /// The limit w of a half-space dot(n, p) <= w in space, mm, for places as shaders get them.
+    pub fn limit_to_local(&self, normal: DVec3, limit: f64) -> f64 {
+        limit - normal.dot(self.local_origin())
+    }
+
     pub fn probe(&self) -> Option<&Probe> {
         match &self.geometry {
             Geometry::Sweep(probe) => Some(probe),

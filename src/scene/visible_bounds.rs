@@ -262,7 +262,8 @@ fn corners(low: DVec3, high: DVec3, planes: &[(DVec3, f64)]) -> Vec<DVec3> {
     }
     let sides = DVec3::AXES.iter().enumerate().flat_map(|(a, n)| [(-*n, -low[a]), (*n, high[a])]);
     let all: Vec<(DVec3, f64)> = sides.chain(planes.iter().copied()).collect();
-    let tolerance = 1e-6 * (1.0 + low.abs().max(high.abs()).max_element());
+    // A share of the box, and what f64 leaves of places that are far away.
+    let tolerance = 1e-6 * (high - low).max_element() + 1e-14 * low.abs().max(high.abs()).max_element();
     let mut corners = Vec::new();
     for (i, a) in all.iter().enumerate() {
         for (j, b) in all.iter().enumerate().skip(i + 1) {

@@ -15,6 +15,7 @@ mod diffusion;
 mod empty_space;
 mod extreme_geometry;
 mod extremes;
+mod far_and_tiny;
 mod filters;
 mod goldens;
 mod growth;

@@ -97,15 +97,15 @@ pub(super) fn marching_constants(scene: &Scene, skipping: Skipping) -> Vec<(&'st
 
 pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
     let [window_low, window_high] = view.window;
-    let grid = &scene.grid;
+    let (grid, local) = (&scene.grid, scene.local_origin());
     let mut clips = [[0.0; 4]; MAX_CLIPS];
     for (clip, (normal, limit)) in clips.iter_mut().zip(scene.clips()) {
-        *clip = [normal.x, normal.y, normal.z, limit];
+        *clip = [normal.x, normal.y, normal.z, scene.limit_to_local(normal, limit)];
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
     let bricks = scene.bricks();
     let params = ray_params(scene)
-        .vec3("brick_low", bricks.low)
+        .vec3("brick_low", scene.to_local(bricks.low))
         .vec3("brick_density", bricks.edge.recip())
         .f32("spread", scene.settings.ray.spread)
         .f32("spread_range", scene.probe().map_or(1.0, spread_range).max(1e-6))
@@ -113,16 +113,16 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .vec4("clip_1", clip_1)
         .vec4("clip_2", clip_2)
         .vec4("clip_3", clip_3)
-        .vec3("box_low", view.low)
-        .vec3("box_high", scene.high)
+        .vec3("box_low", scene.to_local(view.low))
+        .vec3("box_high", scene.to_local(scene.high))
         .f32("step_length", step)
         .f32("window_low", window_low)
         .f32("window_scale", 1.0 / (window_high - window_low))
-        .vec2("grid_origin", grid.origin)
+        .vec2("grid_origin", [grid.origin[0] - local.x, grid.origin[1] - local.y])
         .vec2("grid_density", grid.pitch.map(|p| 1.0 / p));
     match &scene.geometry {
         Geometry::Cartesian(volume) => sector(params, [0.0; 4])
-            .f32("slice_origin", volume.origin[2])
+            .f32("slice_origin", volume.origin[2] - local.z)
             .f32("slice_density", 1.0 / volume.spacing[2])
             .f32("axis_depth", 0.0)
             .f32("sweep_low", 0.0)

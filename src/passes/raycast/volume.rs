@@ -39,6 +39,7 @@ pub const PASS: Pass = Pass {
     params: |s, _| {
         let volume = &s.settings.volume;
         let (axis, near) = depth_axis(s);
+        let near = s.limit_to_local(axis, near);
         let params = ray::params(s, s.volume_view(), s.step)
             .f32("absorption_scale", s.step / reference_length(s))
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
@@ -133,7 +134,7 @@ pub(crate) fn depth_axis(scene: &Scene) -> (DVec3, f64) {
     let forward = scene.rays.forward;
     let low = scene.volume_view().low;
     let middle = (low + scene.high) / 2.0;
-    let half = forward.abs().dot((scene.high - low) / 2.0).max(1e-9);
+    let half = forward.abs().dot((scene.high - low) / 2.0);
     (forward / (2.0 * half), (forward.dot(middle) - half) / (2.0 * half))
 }
 

@@ -43,7 +43,7 @@ fn one_of_many(scene: &Scene, args: &DispatchArgs) -> bool {
 
 /// Shifts rays by half a pixel to the right.
 fn shifted(scene: &Scene, params: &mut Params) {
-    let of = [("origin", scene.rays.origin + 0.5 * scene.rays.origin_dx)];
+    let of = [("origin", scene.to_local(scene.rays.origin + 0.5 * scene.rays.origin_dx))];
     let directed = [("direction", scene.rays.direction + 0.5 * scene.rays.direction_dx)];
     for (name, to) in of.into_iter().chain(directed) {
         number(params, name, |value| *value = Value::Vec3(to.to_array().map(|v| v as f32)));
