@@ -68,6 +68,11 @@ pub fn print(line: std::fmt::Arguments) {
     }
 }
 
+/// Prints a remark on standard error as one line: the command goes on, and succeeds.
+pub fn remark(message: &str) {
+    let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
+}
+
 /// Prints the failure on standard error as one line.
 pub fn print_failure(failure: &Failure) {
     let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = failure;

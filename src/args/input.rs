@@ -40,8 +40,10 @@ impl InputArgs {
             return Err(input(format!("{}: --volume {wanted}: there are {count}, numbered from 0", self.name())));
         }
         let geometry = source.geometry(self.volume);
-        let samples = Input { stored: source.stored_type(), range: source.range() };
         let settings = self.layers_with(chosen)?.finish().map_err(input)?;
+        // i16 samples are stored with an offset, which the setting does not have.
+        let asked = settings.samples.range.map(|range| range.map(|value| value + source.sample_type().shift()));
+        let samples = Input { stored: source.stored_type(), range: asked.unwrap_or_else(|| source.range()) };
         let scene = Scene::new(geometry, samples, settings).map_err(input)?;
         Ok((source, scene))
     }

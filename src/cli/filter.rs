@@ -7,7 +7,7 @@ use crate::picture::{self, Grey, Region};
 use crate::profile::export::pass_time_table;
 use crate::scene::Settings;
 use crate::scene::load::Layers;
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, remark, say};
 use crate::thesis_tables::growth::{self, GrowthSettings, measure, scene_of};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -117,8 +117,16 @@ impl Filter {
             let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
             renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
             let filtered = read(&mut renderer, Slot::Volume)?.values;
-            grey.with(&filtered).save(output).map_err(failed)?;
+            let made = grey.with(&filtered);
+            made.save(output).map_err(failed)?;
             say!("picture: {}", output.display());
+            if let Some(level) = one_level(&made) {
+                let why = match one_level(&grey) {
+                    Some(_) => "so is the input",
+                    None => "the filters levelled all of it",
+                };
+                remark(&format!("{}: is wholly of one level, {level}: {why}", output.display()));
+            }
             if let Some(region) = &region {
                 let table = picture::region_table(&grey.shares(), &filtered, grey.width, region, background.as_ref());
                 say!("{}", table.trim_end());
@@ -224,4 +232,10 @@ impl Filter {
 fn read(renderer: &mut Renderer, slot: Slot) -> Result<Texels, Failure> {
     let texels = renderer.read(slot).map_err(failed)?;
     texels.ok_or_else(|| failed(format!("slot '{}' is not in the plan", slot.name())))
+}
+
+/// The level of a picture that has only one.
+fn one_level(picture: &Grey) -> Option<u16> {
+    let first = *picture.values.first()?;
+    picture.values.iter().all(|value| *value == first).then_some(first)
 }

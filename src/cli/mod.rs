@@ -4,6 +4,7 @@
 
 mod filter;
 mod machine;
+mod one_colour;
 mod probe;
 mod recordings;
 mod render;

@@ -3,13 +3,14 @@
 use crate::args::{Output, check_outputs};
 use crate::files::signals::Writing;
 use crate::picture::check_target;
-use crate::probe::Geometry;
+use crate::probe::{Geometry, Grid};
+use crate::scene::insonified_box;
 use crate::source::convert::{Volume, VolumeFile, lattice};
 use crate::source::phantom::{Body, Phantom, PhantomOptions};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::PathBuf;
 
 /// The name of the output in messages.
@@ -61,6 +62,7 @@ impl Convert {
         };
         let grid = lattice(&geometry, self.spacing.unwrap_or(usual)).map_err(|e| input(format!("--spacing {e}")))?;
         self.check_outputs(&[(OUTPUT, Some(&self.output))], &*recording)?;
+        let first = geometry.clone();
         let mut volume = Volume::new(geometry, recording.stored_type());
         recording.skip_to_volume(self.volume).map_err(input)?;
         let (each, mut there, mut number) = (recording.frames_per_volume(), 0, None);
@@ -77,6 +79,9 @@ impl Convert {
         let ([x, y, z], [spacing, ..]) = (grid.size, grid.spacing);
         let missing = if there < each { format!(", {there} of {each} frames are there") } else { String::new() };
         say!("volume: {}, {x} x {y} x {z} voxels of {spacing} mm{missing}", self.output.display());
+        if !volume.meets(&grid) {
+            remark(&format!("{}: is empty: {}", self.output.display(), thinner_than(&grid, &first)));
+        }
         Ok(())
     }
 
@@ -208,4 +213,14 @@ impl MakePhantom {
         say!("sweep: {}", self.output.display());
         Ok(())
     }
+}
+
+/// Why no voxel of a grid lies in the insonified region.
+fn thinner_than(grid: &Grid, geometry: &Geometry) -> String {
+    let (low, high) = insonified_box(geometry);
+    let [x, y, z] = (high - low).to_array();
+    let [spacing, ..] = grid.spacing;
+    format!(
+        "the sector is {x:.2} x {y:.2} x {z:.2} mm, and none of the voxels, --spacing {spacing} mm apart, lies in it"
+    )
 }

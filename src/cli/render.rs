@@ -1,5 +1,6 @@
 //! `echolume render`.
 
+use super::one_colour;
 use crate::args::{InputArgs, Output, check_outputs};
 use crate::dump;
 use crate::error_report::choose::Bound;
@@ -13,7 +14,7 @@ use crate::plan::Plan;
 use crate::profile::export::pass_time_table;
 use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
-use crate::terminal::{Failure, failed, input, say};
+use crate::terminal::{Failure, failed, input, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -102,6 +103,12 @@ impl Render {
         say!("picture: {}", self.output.display());
         let measured = renderer.take_times().map_err(failed)?;
         self.judge_budget(&measured)?;
+        if let Some(colour) = one_colour::of(&picture) {
+            let shift = source.sample_type().shift();
+            let volume = renderer.read(Slot::Volume).map_err(failed)?;
+            let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, shift));
+            remark(&one_colour::line(&self.output, colour, why.as_deref()));
+        }
         if self.timings {
             say!("{}", pass_time_table(&measured, renderer.scene()).trim_end());
         }

@@ -1,11 +1,13 @@
 //! `echolume stream`.
 
+use super::one_colour;
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::files::signals::Held;
 use crate::gpu::Context;
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
+use crate::passes::Slot;
 use crate::picture;
-use crate::terminal::{Failure, failed, input, is_closed, say};
+use crate::terminal::{Failure, failed, input, is_closed, remark, say};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -85,6 +87,8 @@ impl Stream {
         let began = Instant::now();
         let (mut last_status, mut all, mut memory) = (began, Statistics::default(), None);
         let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
+        // Said of the first picture that is wholly one colour, not of every one.
+        let mut explained = false;
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
                 // A device that is lost again before its first picture is given up.
@@ -100,7 +104,10 @@ impl Stream {
             let drew = matches!(step, Step::Picture(_));
             match step {
                 Step::Picture(shown) => {
-                    self.write_picture(&shown, update, pictures)?;
+                    let file = self.write_picture(&shown, update, pictures)?;
+                    if !explained && let Some(file) = file {
+                        explained = explain_one_colour(stream, &shown, &file)?;
+                    }
                     pictures += 1;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
@@ -156,16 +163,27 @@ impl Stream {
         }
     }
 
-    /// Writes a picture, if `--out` is given.
-    fn write_picture(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<(), Failure> {
-        let Some(folder) = &self.out else { return Ok(()) };
+    /// Writes a picture, if `--out` is given, and returns its file.
+    fn write_picture(&self, shown: &FinishedPicture, update: Update, number: u64) -> Result<Option<PathBuf>, Failure> {
+        let Some(folder) = &self.out else { return Ok(None) };
         let name = match update {
             Update::Whole => format!("volume-{:06}.png", shown.volume),
             Update::Rolling => format!("picture-{number:06}.png"),
         };
         let file = folder.join(name);
-        shown.picture.as_ref().map_or(Ok(()), |picture| picture.save(&file)).map_err(failed)
+        shown.picture.as_ref().map_or(Ok(()), |picture| picture.save(&file)).map_err(failed)?;
+        Ok(Some(file))
     }
+}
+
+/// Says why a picture is wholly one colour, if it is. True if something was said.
+fn explain_one_colour(stream: &mut Live, shown: &FinishedPicture, file: &Path) -> Result<bool, Failure> {
+    let Some(colour) = shown.picture.as_ref().and_then(one_colour::of) else { return Ok(false) };
+    let Some(renderer) = stream.renderer() else { return Ok(false) };
+    let volume = renderer.read(Slot::Volume).map_err(failed)?;
+    let why = volume.map(|volume| one_colour::cause(renderer.scene(), &volume, 0.0));
+    remark(&one_colour::line(file, colour, why.as_deref()));
+    Ok(true)
 }
 
 /// Refuses a recording that would replace an existing file or the recording that is played.

@@ -28,6 +28,7 @@ pub mod raycast {
     pub mod projection;
     pub mod ray;
     pub mod surface;
+    pub mod survey;
     pub mod volume;
 }
 pub mod empty_space;

@@ -160,6 +160,14 @@ impl Volume {
         Some(sum)
     }
 
+    /// True if any voxel of a grid lies in the insonified region.
+    pub fn meets(&self, grid: &Grid) -> bool {
+        (0..grid.size[2]).into_par_iter().any(|z| {
+            let row = |y: usize| (0..grid.size[0]).any(|x| self.at(place_of(grid, [x, y, z])).is_some());
+            (0..grid.size[1]).any(row)
+        })
+    }
+
     fn indices(&self, probe: &Probe, place: DVec3) -> [f64; 3] {
         let at = probe.to_indices(place);
         [at.sample, at.line, at.slice]
@@ -179,9 +187,7 @@ impl Volume {
         for z in 0..grid.size[2] {
             slice.par_chunks_mut(grid.size[0] * sample.bytes()).enumerate().for_each(|(y, row)| {
                 for (x, voxel) in row.chunks_exact_mut(sample.bytes()).enumerate() {
-                    let place = DVec3::from(grid.origin)
-                        + DVec3::from(grid.spacing) * DVec3::from_array([x, y, z].map(|n| n as f64));
-                    store(sample, self.at(place), voxel);
+                    store(sample, self.at(place_of(grid, [x, y, z])), voxel);
                 }
             });
             file.write_all(&slice).map_err(written)?;
@@ -189,6 +195,11 @@ impl Volume {
         }
         file.finish().and_then(|()| file.rename()).map_err(written)
     }
+}
+
+/// The centre of a voxel, mm.
+fn place_of(grid: &Grid, voxel: [usize; 3]) -> DVec3 {
+    DVec3::from(grid.origin) + DVec3::from(grid.spacing) * DVec3::from_array(voxel.map(|n| n as f64))
 }
 
 /// Writes a stored value in the type of the file, rounded to nearest.

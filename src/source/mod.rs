@@ -20,6 +20,7 @@ pub mod recorder;
 pub mod recording;
 pub mod samples;
 pub mod sequence;
+mod value_range;
 
 pub use crate::files::InputError;
 pub use crate::probe::{Geometry, Grid};

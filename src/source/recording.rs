@@ -3,6 +3,7 @@
 use super::frame::{Frame, Source};
 use super::layout::{Layout, LineOrder, PixelStream, StoredGeometry};
 use super::samples::{self, Replaced, SampleType, StoredType};
+use super::value_range::ValueRange;
 use super::{describe, kretz, metaimage, recorder};
 use crate::files::InputError;
 use crate::probe::file::geometry_error;
@@ -130,7 +131,7 @@ impl Recording {
     }
 
     /// Stored values that are shown as 0 and 1: those of the probe file, otherwise 0 and 255 for u8, otherwise the smallest and largest
-    /// in the file. The second is always above the first.
+    /// in the file without far outliers. The second is always above the first.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
@@ -237,14 +238,18 @@ impl Recording {
         self.volumes.count * self.volumes.frames
     }
 
-    /// Reads all frames once for the smallest and largest value.
+    /// Reads all frames once for the smallest and largest value that is no outlier.
     fn measure(&mut self) -> Result<(), InputError> {
-        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut values = ValueRange::new(self.stored_type());
         while let Some(frame) = self.next_frame()? {
-            samples::widen(&mut range, self.stored_type(), &frame.bytes);
+            values.take(&frame.bytes);
         }
-        self.range = samples::not_empty(range);
+        let measured = values.measured();
+        self.range = measured.range;
         self.measured = true;
+        if let Some(remark) = measured.remark() {
+            tracing::warn!(file = %describe::path(&self.path), "{remark}");
+        }
         self.rewind();
         Ok(())
     }

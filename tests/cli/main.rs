@@ -10,6 +10,7 @@ mod docs;
 mod filter;
 mod frames;
 mod inputs;
+mod one_colour;
 mod oracle;
 mod outputs;
 mod service;

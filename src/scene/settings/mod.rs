@@ -23,6 +23,8 @@ pub struct Settings {
     pub layout: Layout,
     /// Size of the picture.
     pub picture: Picture,
+    /// The values of the samples of a recording.
+    pub samples: Samples,
     /// Stage 1: conditioning of polar lines.
     pub conditioning: Conditioning,
     /// Stage 1: filters of slices and storage of the volume.
@@ -123,6 +125,15 @@ impl Default for Picture {
     fn default() -> Self {
         Picture { size: [512, 512] }
     }
+}
+
+/// The values of the samples. Applies to recordings that are opened to be rendered; a stream has the range that its source states.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Samples {
+    /// The values of the file that become 0 and 1; samples beyond are clamped. Absent: those of the probe file, or 0 and 255 for 8 bits, or
+    /// the smallest and largest sample, without far outliers.
+    pub range: Option<[f64; 2]>,
 }
 
 /// Region of interest: the box that is rendered, mm. Lateral counts from the middle, depth from the probe's face, elevation from the

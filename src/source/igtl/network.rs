@@ -13,7 +13,8 @@ use crate::probe::{Geometry, Grid};
 use crate::source::frame::{Frame, Header};
 use crate::source::freehand::{self, Compounder, Lattice, Pose, TrackedFrame};
 use crate::source::live::{Event, Live};
-use crate::source::samples::{Replaced, SampleType, StoredType, not_empty, store, widen};
+use crate::source::samples::{Replaced, SampleType, StoredType, store};
+use crate::source::value_range::ValueRange;
 use glam::DAffine3;
 use std::io;
 use std::time::{Duration, Instant};
@@ -354,12 +355,12 @@ impl FreehandSweep {
             Ok(compounder) => compounder,
             Err(fault) => return faults.note(FaultKind::Volume, 1, &fault),
         };
-        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut values = ValueRange::new(self.stored);
         for BufferedFrame { pose, bytes } in &buffered {
-            widen(&mut range, self.stored, bytes);
+            values.take(bytes);
             push(&mut compounder, *pose, bytes, faults);
         }
-        self.range = if self.stored == StoredType::U8 { [0.0, 255.0] } else { not_empty(range) };
+        self.range = range_of(self.stored, values);
         self.compounder = Some(compounder);
     }
 
@@ -427,14 +428,9 @@ impl CartesianVolume {
         let whole = match volume.as_mut().filter(is_same) {
             Some(whole) => whole,
             None => {
-                let range = match stored {
-                    StoredType::U8 => [0.0, 255.0],
-                    StoredType::U16 | StoredType::F32 => {
-                        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-                        widen(&mut range, stored, &brought);
-                        not_empty(range)
-                    }
-                };
+                let mut values = ValueRange::new(stored);
+                values.take(&brought);
+                let range = range_of(stored, values);
                 volume.insert(CartesianVolume { scalar, components, stored, grid, range, bytes: vec![0; all] })
             }
         };
@@ -631,6 +627,18 @@ impl Faults {
         let why = if fault.why.is_empty() { String::new() } else { format!(": {}", fault.why) };
         Some(format!("OpenIGTLink from {}: {what}{times}{why}", self.address))
     }
+}
+
+/// The values that become 0 and 1: all that 8 bits hold, or those of the first samples that came.
+fn range_of(stored: StoredType, values: ValueRange) -> [f64; 2] {
+    if stored == StoredType::U8 {
+        return [0.0, 255.0];
+    }
+    let measured = values.measured();
+    if let Some(remark) = measured.remark() {
+        tracing::warn!("{remark}");
+    }
+    measured.range
 }
 
 #[cfg(test)]
