@@ -133,6 +133,9 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         Slot::Transfer | Slot::PreIntegrated => {
             (&["red", "green", "blue", "absorption"], "colour 0..1; absorption of one slice pixel")
         }
+        Slot::SelfAttenuated => {
+            (&["red", "green", "blue", "opacity"], "premultiplied colour and opacity of a step, 0..1")
+        }
         Slot::Tiles | Slot::Block => (&["x", "y", "z", "w"], "vectors as the shader takes them"),
         Slot::Surface => {
             (&["echo", "found", "echo_behind", "unused"], "echo 0..1 after the grey window; found: 0 or 1")

@@ -6,7 +6,8 @@
 #version 460
 #include "common.glsl"
 layout(constant_id = 3) const int EARLY_END = 1;
-layout(constant_id = 4) const int COMPOSITING = 1; // 0 a = y, 1 a = 1 - exp(-y), 2 the same between two samples
+layout(constant_id = 4) const int COMPOSITING = 1; // 0 a = y, 1 a = 1 - exp(-y), 2 the same between two samples,
+                                           // 3 light and opacity of the step between two samples
 layout(constant_id = 5) const int DEPTH_CODED = 0; // 1: colours go from near to far tint
 layout(constant_id = 6) const int ENTRIES = 256;   // of the transfer table, along each side
 layout(scalar) uniform Params {
@@ -25,7 +26,8 @@ layout(scalar) uniform Params {
 #include "ray.glsl"
 #include "sliding.glsl"
 #include "empty_space.glsl"
-// Colour and absorption over the sample value; pre-integrated: their mean between two values, one row per front value.
+// Colour and absorption over the sample value; pre-integrated: their mean between two values, one row per front value;
+// exponential: premultiplied colour and opacity of a complete step between them, then colour and absorption over the value.
 readonly buffer TransferTable { vec4 entry[]; } transfer;
 uniform writeonly image2D picture;
 #if defined(LAYER) || defined(BEHIND)
@@ -57,6 +59,23 @@ vec4 looked_up_between(float front, float back) {
     return mix(here, next, share.x);
 }
 
+// Premultiplied colour and opacity of a step of another length than the table's, y times as long as the length that opacities
+// refer to: the same integral by parts of a step that are homogeneous.
+const int PARTS = 32;
+vec4 short_step(float front, float back, float y) {
+    vec3 light = vec3(0.0);
+    float depth = 0.0;
+    for (int i = 0; i < PARTS; ++i) {
+        float e = mix(front, back, (float(i) + 0.5) / float(PARTS)) * float(ENTRIES - 1);
+        int n = min(int(e), ENTRIES - 2), at = ENTRIES * ENTRIES + n;
+        vec4 entry = mix(transfer.entry[at], transfer.entry[at + 1], e - float(n));
+        float part = entry.a * y / float(PARTS);
+        light += exp(-depth) * opacity_of(part) * entry.rgb;
+        depth += part;
+    }
+    return vec4(light, opacity_of(depth));
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(picture)))) return;
@@ -76,10 +95,11 @@ void main() {
     float hit = MISS;
     if (path > 0.0) {
         Slices slices = no_slices();
-        const float sample_at = COMPOSITING == 2 ? 0.0 : SAMPLE_AT;
+        const bool between = COMPOSITING >= 2;
+        const float sample_at = between ? 0.0 : SAMPLE_AT;
         float front = 0.0;
         bool front_inside = false;
-        if (COMPOSITING == 2) {
+        if (between) {
             vec3 texel;
             front_inside = locate(ray.origin + ray.direction * ray.enter, texel);
             if (front_inside) front = sample_along(ray, 0, sample_at, texel, slices);
@@ -92,7 +112,7 @@ void main() {
             int stop = complete + 1;
             bool front_known = false;
             if (SKIP == 1) {
-                const float place = COMPOSITING == 2 ? 1.0 : SAMPLE_AT;
+                const float place = between ? 1.0 : SAMPLE_AT;
                 RaySegment here = segment_at(ray, i, place);
                 int to = i;
                 while (here.kind == EMPTY && to < last) {
@@ -100,7 +120,7 @@ void main() {
                     here = segment_at(ray, to, place);
                 }
                 bool more = to < last;
-                if (COMPOSITING != 2) {
+                if (!between) {
                     i = to;
                 } else if (to > i) {
                     // A step also uses the sample in front of it: the first step after a visible sample is taken, and the last skipped
@@ -115,15 +135,16 @@ void main() {
                 // Midpoints of the steps, or their ends. The last step has the remaining length.
                 float from = offset_of(ray, float(i));
                 float length = min(length_of(ray, float(i)), path - from);
-                vec3 p = ray.origin + ray.direction * (ray.enter + from + (COMPOSITING == 2 ? 1.0 : 0.5) * length);
+                vec3 p = ray.origin + ray.direction * (ray.enter + from + (between ? 1.0 : 0.5) * length);
                 vec3 texel;
                 bool inside = locate(p, texel);
                 if (length <= 0.0) continue;
                 vec4 entry;
-                if (COMPOSITING == 2) {
+                if (between) {
                     float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
                     bool both = inside && front_inside;
-                    entry = looked_up_between(front, back);
+                    if (COMPOSITING == 3 && length < step_length) entry = short_step(front, back, absorption_scale * (length / step_length));
+                    else entry = looked_up_between(front, back);
                     front = back;
                     front_inside = inside;
                     if (!both) continue;
@@ -132,10 +153,12 @@ void main() {
                     entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
                 }
                 float y = entry.a * absorption_scale * (length / step_length);
-                float a = COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+                float a = COMPOSITING == 3 ? entry.a : COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
+                // The exponential rule's colour is premultiplied.
+                float emitted = COMPOSITING == 3 ? 1.0 : a;
                 if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
                 float before = opacity;
-                colour += (1.0 - opacity) * a * entry.rgb;
+                colour += (1.0 - opacity) * emitted * entry.rgb;
                 opacity += (1.0 - opacity) * a;
 #ifdef HIT
                 // Interpolated between two samples, so that the surface has no terraces.

@@ -112,12 +112,18 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "compositing" => {
             need(composites, "composites nothing")?;
-            let kinds = ["riemann", "corrected", "pre-integrated"];
+            let kinds = ["riemann", "corrected", "pre-integrated", "exponential"];
             let now = serde_word(&s.volume.compositing);
             // The table of pairs is refused for points that are very close.
             let pairs = Volume { compositing: Compositing::PreIntegrated, ..s.volume.clone() };
             let finest = if transfer::entries(&pairs).is_ok() { "pre-integrated" } else { "corrected" };
-            let possible = |k: &str| k != "pre-integrated" || finest == k;
+            let pairs_fit = finest == "pre-integrated";
+            // Exponential needs steps of one length, too.
+            let possible = |k: &str| match k {
+                "pre-integrated" => pairs_fit,
+                "exponential" => pairs_fit && !scene.spreads(),
+                _ => true,
+            };
             let others = kinds.iter().enumerate().filter(|(_, k)| **k != now && possible(k));
             let others = others.map(|(n, k)| at(k.to_string(), &[format!("volume.compositing={k}")], n as f64));
             let best = |f: f64| [format!("volume.compositing={finest}"), format!("ray.step={}", step * f)];

@@ -260,7 +260,7 @@ pub(in crate::passes) fn quiet_level(scene: &Scene) -> f64 {
 
 /// True if a step uses every value between two samples, which may be in two bricks.
 fn between_samples(scene: &Scene) -> bool {
-    scene.settings.volume.compositing == Compositing::PreIntegrated
+    matches!(scene.settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential)
 }
 
 /// Ratio by which rounding may raise a sample above its largest texel: for a weighted mean, some ulps.

@@ -1,7 +1,7 @@
 //! Tables that the CPU computes from the scene in f64, so that shaders need not compute them for every sample.
 
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
-use crate::scene::{Bricks, Reach, Scene, Side, transfer};
+use crate::scene::{Bricks, Reach, Scene, Side, self_attenuation, transfer};
 use rayon::prelude::*;
 
 fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
@@ -149,6 +149,15 @@ pub fn opaque_before(scene: &Scene) -> Vec<f32> {
 /// The same between every two sample values.
 pub fn pre_integrated_table(scene: &Scene) -> Vec<f32> {
     floats(transfer::pre_integrated(&transfer_of(scene)).into_iter().flatten())
+}
+
+/// Light and opacity of a step of the scene between every two sample values, then colour and absorption over the value.
+pub fn self_attenuated_table(scene: &Scene) -> Vec<f32> {
+    let (table, length) = (transfer_of(scene), scene.optical_step());
+    let rows = (0..table.len()).into_par_iter().flat_map_iter(|front| self_attenuation::row(&table, front, length));
+    let mut steps: Vec<f32> = rows.flatten_iter().map(|v| v as f32).collect();
+    steps.extend(floats(table.iter().flatten().copied()));
+    steps
 }
 
 fn transfer_of(scene: &Scene) -> Vec<[f64; 4]> {

@@ -191,6 +191,14 @@ slots! {
         lookup_tables::pre_integrated_table,
         By(|a, b| Slot::Transfer.differs(a, b)),
     );
+    /// Light and opacity of a complete step between every two sample values, then the transfer function for the incomplete last step of a
+    /// ray. They differ with the step's length too.
+    SelfAttenuated = D::table(
+        "self_attenuated",
+        |s| Shape::Buffer(16 * (s.transfer_entries() * (s.transfer_entries() + 1)) as u32),
+        lookup_tables::self_attenuated_table,
+        By(|a, b| Slot::Transfer.differs(a, b) || a.optical_step() != b.optical_step()),
+    );
     /// The tiles of a picture of planes: what each shows, and its lines.
     Tiles = D::table(
         "tiles",

@@ -8,6 +8,7 @@ pub mod cube;
 pub mod load;
 pub mod planes;
 mod region;
+pub mod self_attenuation;
 pub mod settings;
 pub mod transfer;
 pub mod visible_bounds;
@@ -229,6 +230,12 @@ impl Scene {
                 return refuse(field, format!("is {deviation:.1} {unit}, at most {MAX_DEVIATION} can be filtered"));
             }
         }
+        if scene.settings.volume.compositing == Compositing::Exponential && scene.composites() && scene.spreads() {
+            return refuse(
+                "ray.spread",
+                "makes steps of different lengths, and volume.compositing=exponential takes one: set ray.spread=0, or another compositing",
+            );
+        }
         scene.apron = 2.0 + scene.filter_reach();
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
@@ -361,6 +368,16 @@ impl Scene {
             let normal = DVec3::from(c.normal).normalize();
             (normal, normal.dot(DVec3::from(c.at) + DVec3::Y * offset))
         })
+    }
+
+    /// The length for which the transfer function's opacities are given: one slice pixel, mm.
+    pub fn reference_length(&self) -> f64 {
+        self.grid.pitch[0].min(self.grid.pitch[1])
+    }
+
+    /// A step of volume rendering, where steps have one length, in lengths for which opacities are given.
+    pub fn optical_step(&self) -> f64 {
+        self.step / self.reference_length()
     }
 
     /// True if samples are composited through the transfer function.

@@ -38,7 +38,8 @@ pub fn resolved(transfer: &Transfer) -> Vec<TransferPoint> {
 /// The end of a sentence: the size is out of its range, or two points are closer than one entry of the largest table or of the size set.
 pub fn entries(volume: &Volume) -> Result<usize, String> {
     let [least, most] = ENTRIES_RANGE;
-    let most = if volume.compositing == Compositing::PreIntegrated { MAX_PRE_INTEGRATED } else { most };
+    let pairs = matches!(volume.compositing, Compositing::PreIntegrated | Compositing::Exponential);
+    let most = if pairs { MAX_PRE_INTEGRATED } else { most };
     let points = resolved(&volume.transfer);
     let gaps = points.windows(2).enumerate().map(|(n, pair)| (n + 1, pair[1].at - pair[0].at));
     let (first, gap) = gaps.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((1, 1.0));

@@ -139,9 +139,13 @@ pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
 }
 
 /// Names of modes with their settings.
-const MODES: [(&str, &str); 14] = [
+const MODES: [(&str, &str); 15] = [
     ("vr", "mode = 'vr'"),
     ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
+    (
+        "vr, exponential",
+        "mode = 'vr'\nray = { step = 2.0 }\nvolume = { compositing = 'exponential', transfer = 'bone' }",
+    ),
     ("vr, first hit", "mode = 'vr'\nvolume = { shading = 'first-hit' }"),
     ("sr", "mode = 'sr'"),
     ("mixed", "mode = 'mixed'"),

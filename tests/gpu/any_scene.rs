@@ -15,7 +15,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("mode", &["vr", "sr", "mixed", "mip", "minip", "xray", "mpr", "orthogonal", "tomography", "cube"]),
     ("layout", &["single", "four"]),
     ("volume.shading", &["none", "depth-coded", "first-hit"]),
-    ("volume.compositing", &["riemann", "corrected", "pre-integrated"]),
+    ("volume.compositing", &["riemann", "corrected", "pre-integrated", "exponential"]),
     ("volume.transfer", &["grey", "bone", "warm", "[{at=0,colour=[0,0,0],opacity=0},{at=1,colour=[1,0,2],opacity=1}]"]),
     ("volume.threshold", &["0", "0.3", "1"]),
     ("volume.window", &["[0,1]", "[-3,0.2]", "[0.9,0.1]"]),

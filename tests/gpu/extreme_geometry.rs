@@ -107,6 +107,8 @@ fn probes_at_the_limits_of_what_is_built_are_drawn() {
         ("T near 180 deg, fan about the apex", fan(10.0, 10.0, 0.0, wide, 0.5)),
         ("F near 180 deg", fan(20.0, 12.0, 2.0, 1.1, wide)),
         ("T and F near 180 deg", fan(10.0, 10.0, 0.5, wide, wide)),
+        ("Ra = 10 m: f32 places are off by 0.5 um", fan(1e4, 12.0, 2.0, 6e-3, 0.6)),
+        ("Ra = 100 m: f32 places are off by 4 um", fan(1e5, 12.0, 2.0, 6e-4, 0.6)),
         ("single frame", still(plain.clone())),
         ("two of everything", two),
         (

@@ -1,6 +1,6 @@
 //! Convergence orders of the compositing rules in f64, and what degrades them.
 
-use echolume::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps};
+use echolume::error_report::convergence::{Field, Fit, Flaw, NONE, Range, errors, fit, steps, stiffness};
 use echolume::passes::raycast::composite::Rule;
 
 const STEPS: [f64; 2] = [1.0 / 32.0, 0.7];
@@ -34,12 +34,42 @@ fn every_rule_has_its_order() {
         (Rule::CorrectedLeft, 1.0),
         (Rule::Corrected, 2.0),
         (Rule::PreIntegrated, 2.0),
+        (Rule::Exponential, 2.0),
         (Rule::PreIntegratedUnshaded, 1.0),
     ];
     for (rule, order) in orders {
         let Found { fit, .. } = found(rule, Field::Open, NONE);
         assert!(is_order(&fit, order), "{rule:?}: order {:.3}, expected {order}", fit.order);
         assert!(fit.standard_error < 0.02, "{rule:?}: the points lie on no line: +-{:.3}", fit.standard_error);
+    }
+}
+
+/// The table of docs/numerics.md: run with --nocapture.
+#[test]
+fn the_order_of_a_rule_falls_where_a_step_is_opaque() {
+    let depths = [1e-3, 1e-2, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+    let curve = |rule: Rule| {
+        let points = stiffness(rule, 0.5, &depths, 64);
+        let shown: Vec<String> = points.iter().map(|p| format!("{:.2} ({:.1e})", p.order, p.error)).collect();
+        println!("| {rule:?} | {} |", shown.join(" | "));
+        points
+    };
+    println!("| kappa h | {} |", depths.map(|d| d.to_string()).join(" | "));
+    let riemann = curve(Rule::Riemann);
+    let midpoint = curve(Rule::Corrected);
+    let mean = curve(Rule::PreIntegrated);
+    let own = curve(Rule::Exponential);
+    // Thin steps: what theory says of each rule.
+    for (points, order) in [(&midpoint, 2.0), (&mean, 2.0), (&own, 2.0)] {
+        assert!((points[0].order - order).abs() < WITHIN && (points[2].order - order).abs() < WITHIN, "{points:?}");
+    }
+    assert!((riemann[4].order - 1.0).abs() < 0.5 && riemann[4].error > 10.0 * midpoint[4].error, "{riemann:?}");
+    // Opaque steps: a colour from the middle of the first step is wrong by the step, to first order; light from the face is not.
+    for points in [&midpoint, &mean] {
+        assert!((points[8].order - 1.0).abs() < WITHIN, "{points:?}");
+    }
+    for (own, other) in own.iter().zip(&midpoint).skip(6) {
+        assert!(own.error < 0.1 * other.error, "{own:?}, {other:?}");
     }
 }
 
@@ -52,7 +82,7 @@ fn left_samples_look_second_order_where_the_field_vanishes_at_both_ends() {
 
 #[test]
 fn a_dropped_last_step_spoils_order_2() {
-    for rule in [Rule::Corrected, Rule::PreIntegrated] {
+    for rule in [Rule::Corrected, Rule::PreIntegrated, Rule::Exponential] {
         let dropped = found(rule, Field::Open, Flaw { drops_last_step: true, ..NONE });
         assert!(is_order(&dropped.fit, 1.0), "{rule:?}: order {:.3}", dropped.fit.order);
     }

@@ -10,6 +10,7 @@ mod exact_ray;
 mod freehand;
 mod geometry;
 mod module_cycles;
+mod named_profiles;
 mod phantom;
 mod plan;
 mod profile;

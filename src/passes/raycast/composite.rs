@@ -14,7 +14,10 @@ pub enum Rule {
     CorrectedLeft,
     /// The same with the mean kappa, and the mean colour weighted by it, between the values at the step's two ends.
     PreIntegrated,
-    /// The same opacity, but the step's light is y times its colour, as if no part of a step lay in the shade of another (Engel,
+    /// The light and the opacity of the step's own integral between the values at its two ends: every place is dimmed by what lies in
+    /// front of it in the same step.
+    Exponential,
+    /// The opacity of `PreIntegrated`, but the step's light is y times its colour, as if no part of a step lay in the shade of another (Engel,
     /// Kraus, Ertl 2001 name this shortcut). Not offered: it costs an order.
     PreIntegratedUnshaded,
 }
@@ -25,6 +28,7 @@ impl From<Compositing> for Rule {
             Compositing::Riemann => Rule::Riemann,
             Compositing::Corrected => Rule::Corrected,
             Compositing::PreIntegrated => Rule::PreIntegrated,
+            Compositing::Exponential => Rule::Exponential,
         }
     }
 }
@@ -41,6 +45,9 @@ pub trait Medium {
     fn at(&self, place: Place) -> Option<[f64; 4]>;
     /// Mean absorption, and mean colour weighted by it, over a step along which the value goes evenly from one end to the other.
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]>;
+    /// Premultiplied red, green, blue, and the opacity, of the same step, which is `length` reference lengths long: the integral of the
+    /// light, each place dimmed by the step's own matter in front of it.
+    fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]>;
 }
 
 /// One ray's sum.
@@ -67,12 +74,9 @@ impl March {
         let (mut n, mut from) = (0.0, 0.0);
         while from < self.path {
             let to = offset(n + 1.0).min(self.path);
-            if let Some([r, g, b, kappa]) = self.contribution(medium, [from, to], n) {
-                let y = kappa * (to - from) / self.reference_length;
-                let a = if self.rule == Rule::Riemann { y.min(1.0) } else { transfer::opacity(y) };
-                let emitted = if self.rule == Rule::PreIntegratedUnshaded { y } else { a };
-                for (light, colour) in light.iter_mut().zip([r, g, b]) {
-                    *light += (1.0 - opacity) * emitted * colour;
+            if let Some((emitted, a)) = self.step(medium, [from, to], n) {
+                for (light, emitted) in light.iter_mut().zip(emitted) {
+                    *light += (1.0 - opacity) * emitted;
                 }
                 let before = opacity;
                 opacity += (1.0 - opacity) * a;
@@ -88,11 +92,26 @@ impl March {
         ([light[0], light[1], light[2], opacity], hit)
     }
 
+    /// The light that a step emits towards the eye, and its opacity.
+    fn step(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<([f64; 3], f64)> {
+        let length = (to - from) / self.reference_length;
+        if self.rule == Rule::Exponential {
+            let [r, g, b, a] =
+                medium.self_attenuated(Place { offset: from, n }, Place { offset: to, n: n + 1.0 }, length)?;
+            return Some(([r, g, b], a));
+        }
+        let [r, g, b, kappa] = self.contribution(medium, [from, to], n)?;
+        let y = kappa * length;
+        let a = if self.rule == Rule::Riemann { y.min(1.0) } else { transfer::opacity(y) };
+        let emitted = if self.rule == Rule::PreIntegratedUnshaded { y } else { a };
+        Some(([r, g, b].map(|colour| emitted * colour), a))
+    }
+
     fn contribution(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<[f64; 4]> {
         match self.rule {
             Rule::Riemann | Rule::Corrected => medium.at(Place { offset: (from + to) / 2.0, n: n + 0.5 }),
             Rule::CorrectedLeft => medium.at(Place { offset: from, n }),
-            Rule::PreIntegrated | Rule::PreIntegratedUnshaded => {
+            Rule::PreIntegrated | Rule::PreIntegratedUnshaded | Rule::Exponential => {
                 medium.between(Place { offset: from, n }, Place { offset: to, n: n + 1.0 })
             }
         }

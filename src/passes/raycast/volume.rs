@@ -4,7 +4,7 @@ use super::composite::{March, Medium, Place};
 use super::ray;
 use crate::passes::empty_space;
 use crate::passes::pass::*;
-use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour};
+use crate::scene::{Compositing, Mode, Scene, Shading, SurfaceColour, self_attenuation};
 use glam::DVec3;
 
 pub const PASS: Pass = Pass {
@@ -23,7 +23,8 @@ pub const PASS: Pass = Pass {
         let mut reads = ray::marching_reads(s, empty_space::volume_skipping(s));
         reads.push(match s.settings.volume.compositing {
             Compositing::PreIntegrated => whole("transfer", Slot::PreIntegrated),
-            _ => whole("transfer", Slot::Transfer),
+            Compositing::Exponential => whole("transfer", Slot::SelfAttenuated),
+            Compositing::Riemann | Compositing::Corrected => whole("transfer", Slot::Transfer),
         });
         let needs_distance = matches!(kind(s), Kind::Layer | Kind::Behind);
         reads.extend(needs_distance.then_some(whole("distance_map", Slot::Distance)));
@@ -41,7 +42,7 @@ pub const PASS: Pass = Pass {
         let (axis, near) = depth_axis(s);
         let near = s.limit_to_local(axis, near);
         let params = ray::params(s, s.volume_view(), s.step)
-            .f32("absorption_scale", s.step / reference_length(s))
+            .f32("absorption_scale", s.optical_step())
             .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
             .f32("hit_opacity", volume.hit)
             .vec3("near_tint", volume.near_tint)
@@ -59,6 +60,7 @@ pub const PASS: Pass = Pass {
             Compositing::Riemann => 0,
             Compositing::Corrected => 1,
             Compositing::PreIntegrated => 2,
+            Compositing::Exponential => 3,
         };
         constants.push(("EARLY_END", (s.settings.ray.early_end > 0.0) as i32));
         constants.push(("COMPOSITING", compositing));
@@ -69,13 +71,15 @@ pub const PASS: Pass = Pass {
     tolerance: Tolerance {
         absolute: 4e-3,
         relative: 0.0,
-        outliers: 2e-3,
-        why: "places are off by 1e-5 mm in f32, so by as much of a voxel's contrast a sample; an early end leaves 1/512; a \
-              sample at the very border of the sector may fall on either side",
+        outliers: 4e-3,
+        why: "places are off by 1e-5 mm in f32, so by as much of a voxel's contrast a sample, and in noise that counts where a \
+              threshold makes absorption jump; an early end leaves 1/512; a sample at the very border of the sector may fall on \
+              either side",
     },
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let table = reads.get("transfer");
+        let tables = Tables { of_steps: table, curve: curve(scene, table) };
         let size = writes.get("picture").size;
         for y in 0..size[1] {
             for x in 0..size[0] {
@@ -89,7 +93,7 @@ pub const PASS: Pass = Pass {
                     }
                     Kind::Alone | Kind::Colour | Kind::Hit => {}
                 }
-                let (colour, hit) = composite(scene, &ray, table);
+                let (colour, hit) = composite(scene, &ray, &tables);
                 writes.get_mut("picture").set([x, y, 0], &colour);
                 if kind(scene) == Kind::Hit {
                     writes.get_mut("distance_map").set([x, y, 0], &[hit]);
@@ -125,7 +129,30 @@ fn kind(scene: &Scene) -> Kind {
 
 /// The length for which the transfer function's opacities are given: one slice pixel, mm.
 pub fn reference_length(scene: &Scene) -> f64 {
-    scene.grid.pitch[0].min(scene.grid.pitch[1])
+    scene.reference_length()
+}
+
+fn is_exponential(scene: &Scene) -> bool {
+    scene.settings.volume.compositing == Compositing::Exponential
+}
+
+/// The tables of the transfer function that the pass reads.
+struct Tables<'a> {
+    /// Over the value, or between the values at both ends of a step.
+    of_steps: &'a Texels,
+    /// Over the value: what a step of another length is integrated from. Empty unless the rule is exponential.
+    curve: Vec<[f64; 4]>,
+}
+
+fn curve(scene: &Scene, table: &Texels) -> Vec<[f64; 4]> {
+    match is_exponential(scene) {
+        // It follows the table of steps.
+        true => {
+            let entries = scene.transfer_entries();
+            (0..entries).map(|n| entry(table, entries * entries + n)).collect()
+        }
+        false => Vec::new(),
+    }
 }
 
 /// Depth of a place along the view: its dot product with the first, less the second, is 0 at the box's nearest corner and 1 at
@@ -142,7 +169,7 @@ pub(crate) fn depth_axis(scene: &Scene) -> (DVec3, f64) {
 struct RayMedium<'a> {
     scene: &'a Scene,
     ray: &'a ray::Ray<'a>,
-    table: &'a Texels,
+    tables: &'a Tables<'a>,
     /// Of the table, along each side.
     entries: usize,
     depth_axis: (DVec3, f64),
@@ -164,17 +191,28 @@ impl RayMedium<'_> {
 impl Medium for RayMedium<'_> {
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let value = self.ray.sample(place.offset, place.n)?;
-        Some(self.tinted(looked_up(self.table, self.entries, value), place.offset))
+        Some(self.tinted(looked_up(self.tables.of_steps, self.entries, value), place.offset))
     }
 
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]> {
         let (front, back) = (self.ray.sample(from.offset, from.n)?, self.ray.sample(to.offset, to.n)?);
-        Some(self.tinted(looked_up_between(self.table, self.entries, front, back), to.offset))
+        Some(self.tinted(looked_up_between(self.tables.of_steps, self.entries, front, back), to.offset))
+    }
+
+    fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]> {
+        let (front, back) = (self.ray.sample(from.offset, from.n)?, self.ray.sample(to.offset, to.n)?);
+        // The table is for complete steps; the last one of a ray may be shorter.
+        let is_complete = length >= self.scene.optical_step() * (1.0 - 1e-9);
+        let light = match is_complete {
+            true => looked_up_between(self.tables.of_steps, self.entries, front, back),
+            false => self_attenuation::step(&self.tables.curve, front, back, length),
+        };
+        Some(self.tinted(light, to.offset))
     }
 }
 
 /// Red, green, blue and opacity of one ray, and the distance at which it has become as opaque as a hit is.
-fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
+fn composite(scene: &Scene, ray: &ray::Ray, tables: &Tables) -> ([f64; 4], f64) {
     let march = March {
         rule: scene.settings.volume.compositing.into(),
         path: ray.path(),
@@ -182,7 +220,7 @@ fn composite(scene: &Scene, ray: &ray::Ray, table: &Texels) -> ([f64; 4], f64) {
         early_end: scene.settings.ray.early_end,
         hit: scene.settings.volume.hit,
     };
-    let medium = RayMedium { scene, ray, table, entries: scene.transfer_entries(), depth_axis: depth_axis(scene) };
+    let medium = RayMedium { scene, ray, tables, entries: scene.transfer_entries(), depth_axis: depth_axis(scene) };
     let (colour, hit) = march.through(&medium, |n| ray.offset(n));
     (colour, hit.map_or(MISS, |offset| ray.enter + offset))
 }

@@ -164,6 +164,9 @@ pub enum Compositing {
     /// Like `corrected`, with the mean absorption between the values at both ends of the step and the mean colour weighted by it. No
     /// narrow feature of the transfer function is missed (Engel, Kraus, Ertl 2001).
     PreIntegrated,
+    /// Premultiplied colour and opacity of a step along which the value changes linearly, each place dimmed by the matter in front of it
+    /// in the same step. Not with `ray.spread`, whose steps have different lengths.
+    Exponential,
 }
 
 /// Shading of volume rendering.
