@@ -106,6 +106,11 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         | Slot::SliceB
         | Slot::SliceForward
         | Slot::SliceRows
+        | Slot::SliceStep
+        | Slot::SliceHalfStep
+        | Slot::SliceStageA
+        | Slot::SliceStageB
+        | Slot::SliceStageC
         | Slot::SharpVolume
         | Slot::Volume => (GREY, SHARE_OF_RANGE),
         Slot::TileRanges | Slot::BrickRanges => (&["smallest", "largest"], SHARE_OF_RANGE),

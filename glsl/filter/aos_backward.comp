@@ -1,6 +1,7 @@
 // Backward substitution along a row or a column: u[i] = forward[i] + shares[i] u[i+1]. The columns' result is averaged with the
-// rows' result, which ends a step of the AOS scheme.
-// variants: rows; plane COLUMNS; slice COLUMNS SLICE; picture_rows PICTURE; picture COLUMNS PICTURE
+// rows' result, which ends a step of the AOS scheme; of two half steps with Richardson's extrapolation, twice that less the
+// result of one complete step.
+// variants: rows; plane COLUMNS; slice COLUMNS SLICE; richardson_plane COLUMNS RICHARDSON; richardson_slice COLUMNS SLICE RICHARDSON; picture_rows PICTURE; picture COLUMNS PICTURE
 #version 460
 #include "aos.glsl"
 layout(scalar) uniform Params {
@@ -10,6 +11,9 @@ uniform texture2D shares;
 uniform texture2D forward;
 #ifdef COLUMNS
 uniform texture2D rows;
+#endif
+#ifdef RICHARDSON
+uniform texture2D step_result;
 #endif
 #ifdef SLICE
 uniform writeonly image3D target;
@@ -29,6 +33,9 @@ void main() {
         T result = 0.5 * (LOADED(texelFetch(rows, at, 0)) + u);
 #else
         T result = u;
+#endif
+#ifdef RICHARDSON
+        result = 2.0 * result - LOADED(texelFetch(step_result, at, 0));
 #endif
 #ifdef SLICE
         imageStore(target, ivec3(at, slice), STORED(result));

@@ -57,7 +57,7 @@ impl NamedFilter {
 #[command(
     after_help = "Filters: median (3x3); estimator (kind: median, perona-malik, gradient-inverse, nagao-matsuyama; edge); sigma \
                         (window, sigma, noise); enhanced-sigma (window, largest, sigma, noise, centre, edge); perona-malik \
-                        (scheme: explicit, aos; edge, conductance, step, repeat); blur (3x3); gaussian (lateral, depth: standard deviations, \
+                        (scheme: explicit, aos, aos-richardson, rkl1; edge, conductance, step, repeat); blur (3x3); gaussian (lateral, depth: standard deviations, \
                         pixels). Keys and defaults are those of `slices` in a scene file. One of each kind; they run in the order \
                         of stage 1, which is the order given here, whatever the order of the flags.\n\nExamples:\n  \
                         echolume filter scan.png -o smooth.png --filter sigma:window=9,sigma=0.1\n  \

@@ -236,6 +236,10 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             let others = [1.0, 1.25, 2.5, 5.0].map(|f| place(Scheme::Explicit, (f64::from(least) * f).ceil() as u32));
             let mut others = Vec::from(others);
             others.extend([1, 2, 4, 8, 16].into_iter().map(|n| place(Scheme::Aos, n)));
+            others.extend([1, 2, 4, 8].into_iter().map(|n| place(Scheme::AosRichardson, n)));
+            // A step of RKL1 has about sqrt(8 step) stages.
+            let stepped = [1, 2, 4, 8].into_iter().filter(|n| time / f64::from(*n) <= 200.0);
+            others.extend(stepped.map(|n| place(Scheme::Rkl1, n)));
             match now {
                 None => look("perona-malik", "step", others),
                 Some(_) => {

@@ -44,7 +44,7 @@ impl Chain {
     fn filters(self, scene: &Scene) -> impl Iterator<Item = (&'static Pass, Filter, u32)> {
         let is_copied = self == Chain::Slices && copied(scene).is_some();
         let filters = self.requested(scene).filter(move |_| !is_copied);
-        filters.map(|(pass, filter)| (pass, filter, (pass.repeat)(scene) / filter.dispatches))
+        filters.map(|(pass, filter)| (pass, filter, (pass.repeat)(scene) / (filter.dispatches)(scene)))
     }
 
     /// Links before a pass, and links in all.
@@ -122,7 +122,7 @@ impl Pass {
     /// What a dispatch reads and writes as a link of a chain; an observer writes slots of its own.
     pub fn link_slots(&self, scene: &Scene, args: &DispatchArgs) -> Option<(Slot, Slot)> {
         let (chain, step) = match self.link {
-            Link::Filter(filter) => (filter.chain, args.iteration / filter.dispatches),
+            Link::Filter(filter) => (filter.chain, args.iteration / (filter.dispatches)(scene)),
             Link::Observer(chain) => (chain, 0),
             Link::None | Link::AfterSlices => return None,
         };
@@ -162,7 +162,7 @@ impl Pass {
             Link::AfterSlices => {}
             Link::Filter(filter) if filter.chain == Chain::Slices => {
                 (filter.reach)(scene)?;
-                let done = Chain::Slices.position(scene, self).0 + args.iteration / filter.dispatches + 1;
+                let done = Chain::Slices.position(scene, self).0 + args.iteration / (filter.dispatches)(scene) + 1;
                 let mut before = 0;
                 for (_, filter, links) in Chain::Slices.filters(scene) {
                     let after = (before + links).saturating_sub(done.max(before));

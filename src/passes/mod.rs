@@ -12,12 +12,14 @@ pub mod texels;
 
 pub mod filter {
     pub mod aos;
+    pub mod aos_richardson;
     pub mod bilateral;
     pub mod enhanced_sigma;
     pub mod estimator;
     pub mod gaussian;
     pub mod median;
     pub mod perona_malik;
+    pub mod rkl1;
     pub mod sigma;
 }
 pub mod raycast {
@@ -50,6 +52,8 @@ pub const PASSES: &[Pass] = &[
     filter::enhanced_sigma::SLICE,
     filter::perona_malik::SLICE,
     filter::aos::SLICE,
+    filter::aos_richardson::SLICE,
+    filter::rkl1::SLICE,
     filter::gaussian::LATERAL,
     filter::gaussian::DEPTH,
     filter::gaussian::ELEVATION,

@@ -183,7 +183,7 @@ pub enum Link {
 pub struct Filter {
     pub chain: Chain,
     /// Dispatches that make one step; what they leave between them stays within the pass.
-    pub dispatches: u32,
+    pub dispatches: fn(&Scene) -> u32,
     /// How many columns and rows away one step on slices looks; none: from border to border. Filters before it make that much
     /// more than is visible.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
@@ -194,7 +194,7 @@ pub struct Filter {
 impl Filter {
     /// A filter of that chain that reads one texel and takes one dispatch per step.
     pub const fn of(chain: Chain) -> Filter {
-        Filter { chain, dispatches: 1, reach: |_| Some([0; 2]), copies: |_| false }
+        Filter { chain, dispatches: once, reach: |_| Some([0; 2]), copies: |_| false }
     }
 
     /// A filter of slices that looks that many columns and rows away.

@@ -129,6 +129,13 @@ slots! {
     SliceForward = D::image("slice_forward", one_slice, |_| Format::R32f).across_queues();
     /// A slice diffused along its rows.
     SliceRows = D::image("slice_rows", one_slice, |_| Format::R32f).across_queues();
+    /// A slice after a complete step, and after the first half of one, of AOS with Richardson's extrapolation.
+    SliceStep = D::image("slice_step", one_slice, |_| Format::R32f).across_queues();
+    SliceHalfStep = D::image("slice_half_step", one_slice, |_| Format::R32f).across_queues();
+    /// A slice after a stage of RKL1. Each stage reads the last two.
+    SliceStageA = D::image("slice_stage_a", one_slice, |_| Format::R32f).across_queues();
+    SliceStageB = D::image("slice_stage_b", one_slice, |_| Format::R32f).across_queues();
+    SliceStageC = D::image("slice_stage_c", one_slice, |_| Format::R32f).across_queues();
     /// The volume before smoothing across slices.
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// The 3D texture that rays are cast through.

@@ -63,6 +63,9 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     check_sigma("post.sigma", settings.post.sigma)?;
     check_enhanced("post.enhanced_sigma", settings.post.enhanced_sigma)?;
     check_perona_malik("post.perona_malik", settings.post.perona_malik)?;
+    if settings.post.perona_malik.is_some_and(|p| matches!(p.scheme, Scheme::AosRichardson | Scheme::Rkl1)) {
+        return refuse("post.perona_malik", "pictures take the schemes explicit and aos only");
+    }
     if settings.post.enhanced_sigma.is_some_and(|e| e.growth) {
         return refuse("post.enhanced_sigma", NO_GROWTH);
     }
@@ -283,8 +286,8 @@ fn check_distance(d: &Distance) -> Result<(), SceneError> {
         return refuse("distance.enhanced_sigma", NO_GROWTH);
     }
     match d.perona_malik {
-        Some(p) if p.scheme == Scheme::Aos => {
-            refuse("distance.perona_malik", "scheme is aos, distances take explicit only: misses tear their rows")
+        Some(p) if p.scheme != Scheme::Explicit => {
+            refuse("distance.perona_malik", "distances take scheme explicit only: misses tear the rows of others")
         }
         _ => Ok(()),
     }
@@ -316,7 +319,10 @@ fn check_perona_malik(field: &'static str, settings: Option<PeronaMalik>) -> Res
                 p.step
             ),
         ),
-        Scheme::Aos if !(p.step > 0.0 && p.step <= 1e9) => {
+        Scheme::Rkl1 if !(p.step > 0.0 && p.step <= 200.0) => {
+            refuse(field, format!("step is {}, must lie above 0 and be at most 200 for scheme 'rkl1'", p.step))
+        }
+        Scheme::Aos | Scheme::AosRichardson if !(p.step > 0.0 && p.step <= 1e9) => {
             refuse(field, format!("step is {}, must lie above 0 and be at most 1e9", p.step))
         }
         _ => Ok(()),

@@ -142,10 +142,7 @@ pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
 const MODES: [(&str, &str); 15] = [
     ("vr", "mode = 'vr'"),
     ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
-    (
-        "vr, exponential",
-        "mode = 'vr'\nray = { step = 2.0 }\nvolume = { compositing = 'exponential', transfer = 'bone' }",
-    ),
+    ("vr, exponential", "mode = 'vr'\nvolume = { compositing = 'exponential', transfer = 'bone' }"),
     ("vr, first hit", "mode = 'vr'\nvolume = { shading = 'first-hit' }"),
     ("sr", "mode = 'sr'"),
     ("mixed", "mode = 'mixed'"),
@@ -449,6 +446,18 @@ fn ray_scenes() -> Vec<SceneSpec> {
             "AOS",
             "slices = { pixels = 41, perona_malik = { scheme = 'aos', step = 2.0, repeat = 2 } }\n\
              post = { perona_malik = { scheme = 'aos', step = 5.0, repeat = 2, conductance = 'exponential' } }",
+        ),
+        (
+            "AOS, extrapolated",
+            "slices = { pixels = 31, perona_malik = { scheme = 'aos-richardson', step = 3.0, repeat = 2 } }",
+        ),
+        (
+            "RKL1",
+            "slices = { pixels = 33, perona_malik = { scheme = 'rkl1', step = 4.0, repeat = 2, conductance = 'exponential' } }",
+        ),
+        (
+            "RKL1 in one long step, between filters",
+            "slices = { pixels = 20, median = true, perona_malik = { scheme = 'rkl1', edge = inf, step = 30.0, repeat = 1 }, smooth = { depth = 1.0 } }",
         ),
         (
             "AOS in huge steps, between filters",

@@ -62,7 +62,7 @@ fn each_cause_of_a_picture_of_one_colour_is_named() {
         ),
         (BONE, &["--mode", "vr", "--set", nothing], &["volume.transfer", "transparent"]),
         (SWEEP, &["--mode", "mip", "--roi", "elevation=20:40,depth=0:0.5"], &["region of interest", "insonified"]),
-        (BONE, &["--mode", "mip", "--set", "post.contrast=0"], &["post.contrast=0"]),
+        (BONE, &["--mode", "mip", "--set", "post.brightness=-1.0"], &["post.brightness=-1"]),
     ];
     for (input, more, named) in cases {
         let err = said(&folder, input, more);

@@ -294,3 +294,104 @@ fn edges_of_0_and_infinity_and_flat_and_hot_pictures() {
         }
     }
 }
+
+/// The equation at T = 2 on the discs, by explicit steps of 1/2000 and 1/1000 extrapolated: their own first-order error would hide a second order.
+fn solved(source: &Texels) -> Texels {
+    let (fine, coarse) = (explicit(source, 0.1, 0.0005, 4000), explicit(source, 0.1, 0.001, 2000));
+    let values = fine.values.iter().zip(&coarse.values).map(|(fine, coarse)| 2.0 * fine - coarse).collect();
+    Texels { values, ..source.clone() }
+}
+
+#[test]
+fn extrapolated_aos_converges_with_second_order_and_rkl1_with_first() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let source = discs();
+    let truth = solved(&source);
+    for (scheme, pass, steps, order) in [
+        ("aos-richardson", "aos_richardson_slice", [0.125, 0.0625, 0.03125], 2.0),
+        ("rkl1", "rkl1_slice", [0.5, 0.25, 0.125], 1.0),
+    ] {
+        let errors: Vec<f64> = steps
+            .map(|step: f64| {
+                let filter =
+                    format!("perona_malik = {{ scheme = '{scheme}', step = {step}, repeat = {} }}", 2.0 / step);
+                rmse(&on_device(&mut single, &plane([64, 64], &filter), pass, &source), &truth)
+            })
+            .to_vec();
+        let orders: Vec<f64> = errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect();
+        println!("{scheme} at T = 2, steps {steps:?}: {errors:.6?}, orders {orders:.2?}");
+        assert!((orders[1] - order).abs() < 0.3, "{scheme}: {errors:?}: {orders:?}");
+    }
+}
+
+/// Row: T = 100, where explicit steps are 400. Passes are dispatches over the slice: one for each explicit step and stage of RKL1, four for a step
+/// of AOS, twelve for an extrapolated one.
+#[test]
+fn rkl1_is_nearer_than_aos_over_a_time_of_100_in_as_many_passes() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let source = discs();
+    let truth = explicit(&source, 0.1, 0.02, 5000);
+    let mut error = |scheme: &str, pass: &str, steps: u32| {
+        let filter = format!(
+            "perona_malik = {{ scheme = '{scheme}', step = {:?}, repeat = {steps} }}",
+            100.0 / f64::from(steps)
+        );
+        let scene = plane([64, 64], &filter);
+        let passes = (by_name(pass).expect("pass").repeat)(&scene);
+        let error = rmse(&on_device(&mut single, &scene, pass, &source), &truth);
+        println!("T = 100, {scheme} in {steps} steps, {passes} passes: RMSE {error:.5}");
+        (passes, error)
+    };
+    let (_, explicit) = error("explicit", "perona_malik_slice", 400);
+    for (steps, most) in [(3, 0.009), (6, 0.0045), (12, 0.002)] {
+        let (_, extrapolated) = error("aos-richardson", "aos_richardson_slice", steps);
+        assert!(extrapolated < most, "{steps} extrapolated steps: {extrapolated}");
+    }
+    for steps in [2, 4, 8, 16] {
+        let (passes, rkl1) = error("rkl1", "rkl1_slice", steps);
+        let (_, aos) = error("aos", "aos_slice", passes.div_ceil(4));
+        assert!(passes < 400 && rkl1 < aos, "{steps} steps: {rkl1}, AOS in as many passes {aos}");
+    }
+    assert!(explicit < 1e-3, "{explicit}");
+}
+
+#[test]
+fn extrapolated_aos_and_rkl1_are_stable_at_extreme_steps_and_edges() {
+    let device = Device::new();
+    let mut single = PassRunner::new(&device).expect("single");
+    let size = [61, 47];
+    let hot = texels(size, |x, y| f64::from((x, y) == (30, 20)));
+    let sources = [("noise", noise(size, 6)), ("checkerboard", checkerboard(size)), ("hot", hot)];
+    for (scheme, pass, steps) in [
+        ("aos-richardson", "aos_richardson_slice", ["0.25", "10.0", "1e3", "1e9"]),
+        ("rkl1", "rkl1_slice", ["0.25", "5.0", "50.0", "200.0"]),
+    ] {
+        for edge in ["1e-30", "0.1", "inf"] {
+            for step in steps {
+                let filter =
+                    format!("perona_malik = {{ scheme = '{scheme}', edge = {edge}, step = {step}, repeat = 2 }}");
+                let scene = plane(size, &filter);
+                for (name, source) in &sources {
+                    let got = on_device(&mut single, &scene, pass, source);
+                    let mean = |t: &Texels| t.values.iter().sum::<f64>() / t.values.len() as f64;
+                    let spread = |t: &Texels| t.values.iter().map(|v| (v - mean(t)).powi(2)).sum::<f64>().sqrt();
+                    assert!(got.values.iter().all(|v| v.is_finite()), "{name}, {filter}");
+                    assert!((mean(&got) - mean(source)).abs() < 1e-4, "{name}, {filter} drifts");
+                    assert!(spread(&got) < spread(source) * (1.0 + 1e-4) + 1e-3, "{name}, {filter} grows");
+                }
+                let flat = texels(size, |_, _| 0.37);
+                let off = largest_difference(&on_device(&mut single, &scene, pass, &flat), &flat);
+                assert!(off < 2e-5, "{filter} on a constant: {off}");
+            }
+        }
+        // The formula: the reference solves the same.
+        let filter =
+            format!("perona_malik = {{ scheme = '{scheme}', conductance = 'exponential', step = 7.0, repeat = 2 }}");
+        let (scene, source) = (plane(size, &filter), noise(size, 9));
+        let off =
+            largest_difference(&on_device(&mut single, &scene, pass, &source), &by_reference(&scene, pass, &source));
+        assert!(off < 1e-4, "{filter}: {off}");
+    }
+}

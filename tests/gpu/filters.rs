@@ -36,21 +36,22 @@ fn filtered(
 ) -> Texels {
     let pass = by_name(name).expect("pass");
     assert!(pass.is_needed(scene), "{name}: {:?}", pass.needed(scene));
-    let mut held = Arrays::default();
-    held.insert("source", source.clone());
+    let mut held: BTreeMap<Slot, Texels> = BTreeMap::new();
+    let mut result = source.clone();
     for iteration in 0..(pass.repeat)(scene) {
         let args = DispatchArgs { iteration, ..DispatchArgs::default() };
-        let written = run(pass, &args, &held);
+        let mut inputs = Arrays::default();
+        for bind in pass.reads(scene, &args) {
+            // Only the source of the first step was not written by a dispatch.
+            inputs.insert(bind.name, held.get(&bind.slot).unwrap_or(source).clone());
+        }
+        let written = run(pass, &args, &inputs);
         for bind in pass.writes(scene, &args) {
-            let name = match (bind.name, bind.slot) {
-                (_, Slot::SliceRows | Slot::PictureRows) => "rows",
-                ("target", _) => "source",
-                (name, _) => name,
-            };
-            held.insert(name, written.get(bind.name).clone());
+            result = written.get(bind.name).clone();
+            held.insert(bind.slot, result.clone());
         }
     }
-    held.get("source").clone()
+    result
 }
 
 pub fn on_device(single: &mut PassRunner, scene: &Scene, name: &str, source: &Texels) -> Texels {

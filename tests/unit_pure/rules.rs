@@ -196,6 +196,8 @@ fn scenes() -> Vec<Scene> {
         "slices = { enhanced_sigma = {} }",
         "slices = { perona_malik = {} }",
         "slices = { perona_malik = { scheme = 'aos', repeat = 2 } }\npost = { perona_malik = { scheme = 'aos' } }",
+        "slices = { perona_malik = { scheme = 'aos-richardson', repeat = 2 } }",
+        "slices = { perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 2 } }",
         "slices = { smooth = { lateral = 1.0 } }",
         "ray = { rays = 2 }",
         "ray = { sampling = 'quads' }",

@@ -9,9 +9,9 @@ use crate::passes::pass::*;
 use crate::scene::{PeronaMalik, Scheme};
 
 /// Dispatches of one step: rows forward and backward, columns forward and backward.
-const DISPATCHES: u32 = 4;
+pub(super) const DISPATCHES: u32 = 4;
 
-const TOLERANCE: Tolerance = Tolerance {
+pub(super) const TOLERANCE: Tolerance = Tolerance {
     absolute: 3e-5,
     relative: 3e-6,
     outliers: 0.0,
@@ -23,7 +23,7 @@ pub const SLICE: Pass = Pass {
     name: "aos_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter { dispatches: DISPATCHES, ..Filter::of_slices(|_| None) }),
+    link: Link::Filter(Filter { dispatches: |_| DISPATCHES, ..Filter::of_slices(|_| None) }),
     shader: |_, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.plane",
         (0, Sweep::Backward) => "filter/aos_backward.rows",
@@ -45,7 +45,7 @@ pub const PICTURE: Pass = Pass {
     name: "aos_picture",
     stage: Stage::Postprocess,
     frequency: Frequency::Picture,
-    link: Link::Filter(Filter { dispatches: DISPATCHES, ..Filter::of(Chain::Pictures) }),
+    link: Link::Filter(Filter { dispatches: |_| DISPATCHES, ..Filter::of(Chain::Pictures) }),
     shader: |_, t| match turn_of(t) {
         (_, Sweep::Forward) => "filter/aos_forward.picture",
         (0, Sweep::Backward) => "filter/aos_backward.picture_rows",
@@ -63,30 +63,31 @@ pub const PICTURE: Pass = Pass {
 };
 
 /// The slots between the sweeps.
-struct Between {
+pub(super) struct Between {
     shares: Slot,
     forward: Slot,
     rows: Slot,
 }
 
-const SLICE_SLOTS: Between = Between { shares: Slot::SliceShares, forward: Slot::SliceForward, rows: Slot::SliceRows };
+pub(super) const SLICE_SLOTS: Between =
+    Between { shares: Slot::SliceShares, forward: Slot::SliceForward, rows: Slot::SliceRows };
 const PICTURE_SLOTS: Between =
     Between { shares: Slot::PictureShares, forward: Slot::PictureForward, rows: Slot::PictureRows };
 
 #[derive(Clone, Copy, PartialEq)]
-enum Sweep {
+pub(super) enum Sweep {
     Forward,
     Backward,
 }
 
 /// The axis (0 along rows, 1 along columns) and the direction of a dispatch.
-fn turn_of(args: &DispatchArgs) -> (usize, Sweep) {
+pub(super) fn turn_of(args: &DispatchArgs) -> (usize, Sweep) {
     let sweep = if args.iteration.is_multiple_of(2) { Sweep::Forward } else { Sweep::Backward };
     ((args.iteration % DISPATCHES / 2) as usize, sweep)
 }
 
 impl Between {
-    fn reads(&self, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
+    pub(super) fn reads(&self, source: Slot, args: &DispatchArgs) -> Vec<Bind> {
         let swept = || vec![whole("shares", self.shares), whole("forward", self.forward)];
         match turn_of(args) {
             (_, Sweep::Forward) => vec![whole("source", source)],
@@ -95,7 +96,7 @@ impl Between {
         }
     }
 
-    fn writes(&self, target: Bind, args: &DispatchArgs) -> Vec<Bind> {
+    pub(super) fn writes(&self, target: Bind, args: &DispatchArgs) -> Vec<Bind> {
         match turn_of(args) {
             (_, Sweep::Forward) => vec![whole("shares", self.shares), whole("forward", self.forward)],
             (0, Sweep::Backward) => vec![whole("target", self.rows)],
@@ -104,11 +105,11 @@ impl Between {
     }
 }
 
-fn lines(size: [u32; 2], args: &DispatchArgs) -> [u32; 3] {
+pub(super) fn lines(size: [u32; 2], args: &DispatchArgs) -> [u32; 3] {
     [size[1 - turn_of(args).0], 1, 1]
 }
 
-fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
+pub(super) fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
     let p = settings.unwrap_or_default();
     match turn_of(args).1 {
         Sweep::Forward => Params::default().f32("edge", storable_edge(p.edge)).f32("tau", p.step),
@@ -116,14 +117,14 @@ fn params(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Params {
     }
 }
 
-fn constants(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
+pub(super) fn constants(settings: Option<PeronaMalik>, args: &DispatchArgs) -> Vec<(&'static str, i32)> {
     let (axis, sweep) = turn_of(args);
     let mut constants = vec![("AXIS", axis as i32)];
     constants.extend((sweep == Sweep::Forward).then(|| constant(settings)));
     constants
 }
 
-fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
+pub(super) fn reference(settings: Option<PeronaMalik>, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
     let p = settings.unwrap_or_default();
     let (axis, sweep) = turn_of(args);
     let size = reads.get(if sweep == Sweep::Forward { "source" } else { "shares" }).size;

@@ -223,7 +223,7 @@ pub struct PeronaMalik {
     pub edge: f64,
     /// Conductance function.
     pub conductance: Conductance,
-    /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4; tau of AOS, unlimited.
+    /// Diffusion time of one step, pixels^2: lambda of the explicit scheme, at most 1/4; tau of AOS, unlimited; of RKL1 at most 200.
     pub step: f64,
     /// Number of steps, 1..=1000.
     pub repeat: u32,
@@ -244,11 +244,17 @@ impl PeronaMalik {
         let carried = if self.scheme == Scheme::Explicit { spread.min(steps) } else { spread };
         carried.min(64.0)
     }
+
+    /// Stages s of a step of RKL1: the smallest odd number, at least 3, for which (s^2 + s)/2 times the explicit scheme's limit of 1/4 is not
+    /// exceeded (Meyer, Balsara and Aslam 2014). Odd numbers damp the highest frequencies.
+    pub fn stages(&self) -> u32 {
+        (1..).map(|n| 2 * n + 1).find(|s| f64::from(s * s + s) / 8.0 >= self.step.min(200.0)).unwrap_or(3)
+    }
 }
 
 /// Time stepping of the diffusion equation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Forward Euler: one dispatch per step.
     #[default]
@@ -256,6 +262,12 @@ pub enum Scheme {
     /// Additive operator splitting (Weickert, ter Haar Romeny and Viergever 1998): semi-implicit, stable at any step, inaccurate at large
     /// ones; four dispatches per step.
     Aos,
+    /// AOS with Richardson's extrapolation: twice the result of two half steps, less that of one step. Second order; stable, but values may
+    /// leave the range of their neighbours. Slices only; twelve dispatches per step.
+    AosRichardson,
+    /// Runge-Kutta-Legendre super time steps of first order (RKL1; Meyer, Balsara and Aslam 2014): explicit stages, as many as the step needs
+    /// to be stable, about sqrt(8 step). Slices only; a dispatch per stage.
+    Rkl1,
 }
 
 /// Conductance as a function of the difference g of two neighbours.

@@ -1,0 +1,46 @@
+// One stage of a step of anisotropic diffusion by the Runge-Kutta-Legendre method of first order (Meyer, Balsara and Aslam 2014):
+// y[j] = mu y[j-1] + nu y[j-2] + share M(y[j-1]), M the flow from the four neighbours. Nothing flows across the border.
+// variants: first; plane LATER; slice LATER SLICE
+#version 460
+#include "common.glsl"
+layout(constant_id = 0) const int CONDUCTANCE = 0; // 0 quotient, 1 exponential
+layout(scalar) uniform Params {
+    float edge; // k, 1e-30..1e30
+    float mu;
+    float nu;
+    float share;
+    int slice;
+};
+#define T float
+#include "diffusion.glsl"
+uniform texture2D last; // y[j-1]
+#ifdef LATER
+uniform texture2D before; // y[j-2]
+#endif
+#ifdef SLICE
+uniform writeonly image3D target;
+#else
+uniform writeonly image2D target;
+#endif
+
+void main() {
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy), size = textureSize(last, 0);
+    if (any(greaterThanEqual(at, size))) return;
+    float here = texelFetch(last, at, 0).x;
+    float flow = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 next = at + ivec2((i & 1) * (i - 2), (1 - (i & 1)) * (i - 1));
+        if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next, size))) continue;
+        float away = texelFetch(last, next, 0).x - here;
+        flow += across(away) * away;
+    }
+    float result = mu * here + share * flow;
+#ifdef LATER
+    result += nu * texelFetch(before, at, 0).x;
+#endif
+#ifdef SLICE
+    imageStore(target, ivec3(at, slice), vec4(result, 0.0, 0.0, 0.0));
+#else
+    imageStore(target, at, vec4(result, 0.0, 0.0, 0.0));
+#endif
+}
