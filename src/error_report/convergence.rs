@@ -216,8 +216,13 @@ impl Medium for FieldAlongRay {
             GAUSS.iter().map(|[node, w]| w * kappa(low + (high - low) * node)).sum::<f64>() * (high - low) * length
         };
         let (mut sums, mut behind) = ([0.0; 4], 0.0);
-        for part in 0..PARTS {
-            let [low, high] = [part, part + 1].map(|n| f64::from(n) / f64::from(PARTS));
+        let parts = (PARTS_A_DEPTH * depth(0.0, 1.0)).ceil().max(PARTS);
+        for part in 0..parts as u64 {
+            // What lies deeper than that emits nothing that f64 sees.
+            if behind > 40.0 {
+                break;
+            }
+            let [low, high] = [part, part + 1].map(|n| n as f64 / parts);
             for [node, weight] in GAUSS {
                 let share = low + (high - low) * node;
                 let light = weight * (high - low) * length * kappa(share) * (-behind - depth(low, share)).exp();
@@ -226,13 +231,14 @@ impl Medium for FieldAlongRay {
             }
             behind += depth(low, high);
         }
-        sums[3] = transfer::opacity(behind);
+        sums[3] = transfer::opacity(depth(0.0, 1.0));
         Some(sums)
     }
 }
 
-/// Parts of a step for the quadrature of its light.
-const PARTS: u32 = 8;
+/// Least parts of a step for the quadrature of its light, and parts of an optical depth of 1.
+const PARTS: f64 = 8.0;
+const PARTS_A_DEPTH: f64 = 4.0;
 
 /// Light of a ray (red, green, blue) by integrating dC/ds = exp(-K) kappa c, dK/ds = kappa with the classical Runge-Kutta method of
 /// order 4, in steps of at most `step` voxels, up to an optical depth of 40.

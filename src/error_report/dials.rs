@@ -45,7 +45,7 @@ impl Dial {
 }
 
 /// Names of all dials.
-pub(crate) const NAMES: &[&str] = &[
+pub const NAMES: &[&str] = &[
     "step",
     "compositing",
     "format",
