@@ -324,7 +324,8 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
             // Assigning the rule too keeps the two dials from being combined: the table of pairs has a limit of its own.
             let rule = serde_word(&s.volume.compositing);
             let set = |n: usize| [format!("volume.entries={n}"), format!("volume.compositing={rule}")];
-            let most = if s.volume.compositing == Compositing::PreIntegrated { 1024 } else { 4096 };
+            let pairs = matches!(s.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential);
+            let most = if pairs { 1024 } else { 4096 };
             // Sizes that the points of the transfer function allow.
             let allowed = |n: &usize| {
                 let volume = Volume { entries: u32::try_from(*n).ok(), ..s.volume.clone() };
