@@ -253,7 +253,7 @@ mod tests {
         // No table meets these; four entries lie between two points.
         assert_eq!(entries(&spike(0.001_357_913)), Ok(2947));
         let said = entries(&spike(1e-5)).expect_err("too narrow for any table");
-        assert!(said.contains("points 1 and 2") && said.contains("1.00e-5") && said.contains("4096"), "{said}");
+        assert!(said.contains("points 2 and 3") && said.contains("1.00e-5") && said.contains("4096"), "{said}");
         let set = |count: u32, half: f64| entries(&Volume { entries: Some(count), ..spike(half) });
         assert_eq!((set(16, 0.1), set(2001, 0.001)), (Ok(16), Ok(2001)));
         assert!(set(256, 0.001).expect_err("set too small").contains("volume.entries"));
