@@ -1,0 +1,299 @@
+//! A choice keeps its bound: on random scenes, chosen settings are rendered once more and compared with a reference that the chooser
+//! does not use.
+
+use crate::common::scenes::FLOATS;
+use crate::scenes::*;
+use echolume::error_report::choose::Bound;
+use echolume::error_report::dials::{NAMES, dial};
+use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
+use echolume::error_report::{Measure, Time, metrics};
+use echolume::exact_ray::picture::{self, Effort};
+use echolume::passes::{Slot, Texels};
+use echolume::probe::{Array, Axis, Geometry, Grid, Indices, Motion, Probe};
+use echolume::reference;
+use echolume::scene::Scene;
+use echolume::scene::load::Layers;
+use echolume::source::Frame;
+use echolume::{Renderer, RendererOptions};
+
+/// Runs of which the 95th percentile is taken.
+const RUNS: u32 = 20;
+
+/// Numbers in 0..1 (xorshift64*, Vigna 2016).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+        all[(self.unit() * all.len() as f64) as usize]
+    }
+}
+
+struct Case {
+    geometry: Geometry,
+    layers: Layers,
+    frames: Vec<Frame>,
+}
+
+impl Case {
+    /// Geometry, body, mode, transfer function and camera at random.
+    fn random(number: u64) -> Case {
+        let mut random = Random(0x9e37_79b9_7f4a_7c15 ^ (number + 1).wrapping_mul(0xd134_2543_de82_ef95));
+        let r = &mut random;
+        let [lines, samples, slices] =
+            [r.within(30.0, 60.0), r.within(60.0, 110.0), r.within(9.0, 19.0)].map(|n| n as usize);
+        let geometry = match r.one_of(&[0, 1, 2]) {
+            0 => Geometry::Sweep(Probe {
+                lines: Axis::centred(r.within(0.015, 0.025), lines),
+                sample_pitch: r.within(0.4, 0.6),
+                samples,
+                slices: Axis::centred(r.within(0.02, 0.06), slices),
+                ..probe()
+            }),
+            1 => Geometry::Sweep(Probe {
+                array: Array::Linear,
+                motion: Motion::Translated,
+                lines: Axis::centred(r.within(0.5, 0.8), lines),
+                sample_pitch: r.within(0.4, 0.6),
+                samples,
+                slices: Axis::centred(r.within(0.8, 2.0), slices),
+                ..probe()
+            }),
+            _ => Geometry::Cartesian(Grid {
+                size: [lines, samples, slices],
+                spacing: [r.within(0.5, 0.8), r.within(0.4, 0.6), r.within(0.8, 2.0)],
+                origin: [0.0; 3],
+            }),
+        };
+        let mut layers = Layers::default();
+        let mode = r.one_of(&["vr", "vr", "vr", "mip", "mean", "sr"]);
+        let low = r.within(0.05, 0.3);
+        let colour = |r: &mut Random| format!("[{:.2},{:.2},{:.2}]", r.unit(), r.unit(), r.unit());
+        let transfer = format!(
+            "volume.transfer=[{{at={low:.3},colour={},opacity=0.0}},{{at={:.3},colour={},opacity={:.3}}},{{at=0.95,colour={},opacity={:.3}}}]",
+            colour(r),
+            low + r.within(0.1, 0.4),
+            colour(r),
+            r.within(0.01, 0.4),
+            colour(r),
+            r.within(0.05, 0.6)
+        );
+        let sets = [
+            format!("mode={mode}"),
+            "picture.size=[48,40]".into(),
+            format!("slices.pixels={}", r.one_of(&[48, 64, 80])),
+            transfer,
+            format!("camera.azimuth={:.1}", r.within(-70.0, 70.0)),
+            format!("camera.elevation={:.1}", r.within(-30.0, 30.0)),
+            format!("camera.zoom={:.2}", r.within(0.8, 2.0)),
+            format!("camera.field_of_view={}", r.one_of(&[0, 0, 30])),
+            format!("surface.threshold={:.2}", r.within(0.08, 0.2)),
+            // The rough search is another detector; exact rays have none.
+            "surface.rough=1".into(),
+        ];
+        sets.iter().for_each(|set| layers.set(set).expect("setting"));
+        let (rough, tilt) = ([r.within(0.1, 0.4), r.within(0.1, 0.4)], r.within(-0.3, 0.3));
+        let frames = match &geometry {
+            Geometry::Sweep(probe) => frames(probe, rough, tilt),
+            Geometry::Cartesian(grid) => voxels(grid, rough, tilt),
+        };
+        Case { geometry, layers, frames }
+    }
+
+    fn scene(&self, set: &[String]) -> Scene {
+        let mut layers = self.layers.clone();
+        set.iter().for_each(|assignment| layers.set(assignment).expect("an assignment of a choice"));
+        Scene::new(self.geometry.clone(), FLOATS, layers.finish().expect("settings")).expect("scene")
+    }
+}
+
+/// A bumpy wall at the depth `middle`, mm, with a bright layer behind it.
+fn echo(p: glam::DVec3, middle: f64, rough: [f64; 2], tilt: f64) -> f32 {
+    let wall = middle + tilt * p.x + 1.5 * (rough[0] * p.x).sin() * (rough[1] * p.z).cos();
+    let behind = (-((p.y - wall - 6.0) / 2.0).powi(2)).exp();
+    (0.1 + 0.5 * ((p.y - wall) / 3.0 + 0.5).clamp(0.0, 1.0) + 0.3 * behind) as f32
+}
+
+fn frames(probe: &Probe, rough: [f64; 2], tilt: f64) -> Vec<Frame> {
+    let [samples, lines] = [probe.samples, probe.lines.len()];
+    let place = |sample: usize, line: usize, slice: usize| {
+        probe.to_space(Indices { sample: sample as f64, line: line as f64, slice: slice as f64 })
+    };
+    let middle = place(samples / 2, lines / 2, probe.slices.len() / 2).y;
+    let frame = |slice: usize| {
+        let all = (0..lines).flat_map(|line| (0..samples).map(move |sample| (sample, line)));
+        all.flat_map(|(sample, line)| echo(place(sample, line, slice), middle, rough, tilt).to_le_bytes()).collect()
+    };
+    (0..probe.slices.len()).map(|slice| numbered(slice, frame(slice))).collect()
+}
+
+fn voxels(grid: &Grid, rough: [f64; 2], tilt: f64) -> Vec<Frame> {
+    let [w, h, d] = grid.size;
+    let at = |x: usize, y: usize, z: usize| {
+        glam::DVec3::new(
+            x as f64 * grid.spacing[0] + grid.origin[0],
+            y as f64 * grid.spacing[1] + grid.origin[1],
+            z as f64 * grid.spacing[2] + grid.origin[2],
+        )
+    };
+    let middle = at(0, h / 2, 0).y;
+    let frame = |z: usize| {
+        let all = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+        all.flat_map(|(x, y)| echo(at(x, y, z), middle, rough, tilt).to_le_bytes()).collect()
+    };
+    (0..d).map(|z| numbered(z, frame(z))).collect()
+}
+
+fn numbered(slice: usize, bytes: Vec<u8>) -> Frame {
+    Frame { volume: 0, number: slice as u32, slice, backward: false, time: None, bytes }
+}
+
+/// What came of a bound.
+enum Outcome {
+    /// The choice, and whether an independent measurement found the bound kept.
+    Held { kept: bool, description: String },
+    /// Nothing that was measured keeps it.
+    None(String),
+}
+
+impl Case {
+    /// Chooses for a bound at random. A time is remeasured, and counts, if `timed`.
+    fn choose(&self, number: u64, repeats: u32, timed: bool) -> Outcome {
+        let context = device();
+        let scene = self.scene(&[]);
+        let dials: Vec<_> =
+            NAMES.iter().filter_map(|name| dial(name, &scene).ok()).filter(|d| d.is_numerical()).collect();
+        let measurement = ErrorMeasurement {
+            context: &context,
+            layers: &self.layers,
+            scene: &scene,
+            frames: &self.frames,
+            input: "a random wall",
+            repeats,
+            reference: ReferenceChoice::Auto,
+        };
+        let mut random = Random(number.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x1234_5678);
+        let finest = measurement.finest().expect("the finest picture");
+        let as_it_is = measurement.report(&dials[..1], &finest, None, |_, _| {}).expect("report");
+        let first = &as_it_is.choices[0];
+        let time = first.times.map_or(0.0, |times| times.total.median);
+        let bound = match timed && number % 2 == 1 {
+            true => Bound::Time(time * random.within(0.9, 2.5)),
+            false => Bound::Error(first.errors.rmse.max(1e-6) * 10f64.powf(random.within(-0.6, 1.0))),
+        };
+        let report = measurement.report(&dials, &finest, Some(bound), |_, _| {}).expect("report");
+        match measurement.choose(&finest, &report, Measure::Rmse, bound, RUNS) {
+            Err(MeasureError::NoChoice(why)) => Outcome::None(why),
+            Err(other) => panic!("case {number}: {other}"),
+            Ok(verified) => {
+                let (kept, found) = match bound {
+                    Bound::Error(limit) => {
+                        let error = self.error(&verified.choice.set);
+                        (error <= limit, format!("RMSE {error:.2e} of {limit:.2e}"))
+                    }
+                    Bound::Time(limit) => {
+                        let time = self.time(&verified.choice.set);
+                        (time <= limit, format!("{:.3} ms of {:.3}", time * 1e-6, limit * 1e-6))
+                    }
+                };
+                Outcome::Held { kept, description: format!("({}) {found}", verified.choice.set.join(" ")) }
+            }
+        }
+    }
+
+    /// RMSE of a picture of some settings, rendered on a device of its own, against exact rays through the volume that stage 1 of the
+    /// unchanged scene gives in f64.
+    fn error(&self, set: &[String]) -> f64 {
+        let context = device();
+        let floats = |mut scene: Scene| {
+            scene.settings.post.floats = true;
+            scene
+        };
+        let mut renderer =
+            Renderer::new(&context, floats(self.scene(set)), &RendererOptions::default()).expect("renderer");
+        for frame in &self.frames {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+        }
+        renderer.show(0).expect("show");
+        renderer.picture().expect("picture");
+        let rendered = renderer.read(Slot::Picture).expect("read").expect("a picture");
+        let scene = floats(self.scene(&[]));
+        let mut effort = Effort::default();
+        let mut slots =
+            reference::render_with(&scene, &reference::decoded(&scene, &self.frames), &mut |pass, reads, writes| {
+                picture::replace(&scene, pass, reads, writes, &mut effort)
+            });
+        let expected: Texels = slots.remove(&Slot::Picture).expect("a picture");
+        metrics::pictures(&rendered, &expected).expect("pictures of one size").rmse
+    }
+
+    /// 95th percentile of the time of a volume and its picture, in turn with the scene as it is, ns.
+    fn time(&self, set: &[String]) -> f64 {
+        let context = device();
+        let renderer =
+            |set: &[String]| Renderer::new(&context, self.scene(set), &RendererOptions::default()).expect("renderer");
+        let (mut own, mut other) = (renderer(set), renderer(&[]));
+        let run = |renderer: &mut Renderer| -> f64 {
+            for frame in &self.frames {
+                renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+            }
+            renderer.show(0).expect("show");
+            renderer.picture().expect("picture");
+            renderer.take_times().expect("times").iter().map(|t| t.total).sum()
+        };
+        // The first run compiles shaders.
+        (run(&mut own), run(&mut other));
+        let times: Vec<f64> = (0..RUNS).map(|_| (run(&mut other), run(&mut own)).1).collect();
+        Time::of(&times).expect("runs").p95
+    }
+}
+
+/// Prevents a choice by errors that were added: on their own scene such choices broke their bound. Times are left to the test below.
+#[test]
+fn a_choice_keeps_its_error_on_random_scenes() {
+    let _alone = alone();
+    let mut held = 0;
+    for number in [0, 2, 4] {
+        match Case::random(number).choose(number, 1, false) {
+            Outcome::Held { kept, description } => {
+                println!("case {number}: {description}");
+                assert!(kept, "case {number}: {description}");
+                held += 1;
+            }
+            Outcome::None(why) => println!("case {number}: {why}"),
+        }
+    }
+    assert!(held >= 2, "{held} of 3");
+}
+
+/// A hundred scenes, with errors and times: a quarter of an hour on a quiet machine. `tools/test choices --ignored --nocapture`
+#[test]
+#[ignore = "takes a quarter of an hour, and a quiet machine"]
+fn choices_hold_on_a_hundred_random_scenes() {
+    let _alone = alone();
+    let (mut held, mut broken) = (0, Vec::new());
+    for number in 0..100 {
+        match Case::random(number).choose(number, 3, true) {
+            Outcome::Held { kept, description } => {
+                println!("case {number}: {} {description}", if kept { "holds" } else { "BROKEN" });
+                held += 1;
+                if !kept {
+                    broken.push(number);
+                }
+            }
+            Outcome::None(why) => println!("case {number}: none: {why}"),
+        }
+    }
+    println!("says \"holds\" on {held} of 100; it does not on {broken:?}");
+    assert!(held >= 80 && broken.is_empty(), "{held}, {broken:?}");
+}
