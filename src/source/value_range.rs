@@ -143,7 +143,8 @@ mod tests {
     fn envelope(i: u32) -> f32 {
         let u = (f64::from(i) * 0.618_033_988_75).fract();
         let speckle = (-2.0 * (1.0 - u).ln()).sqrt();
-        (speckle * if i % 50 == 0 { 10f64.powf(3.5 * (f64::from(i) * 0.754_877_666).fract()) } else { 1.0 }) as f32
+        (speckle * if i.is_multiple_of(50) { 10f64.powf(3.5 * (f64::from(i) * 0.754_877_666).fract()) } else { 1.0 })
+            as f32
     }
 
     #[test]
@@ -174,7 +175,7 @@ mod tests {
         for outlier in [1e30, f32::MAX, -32768.0, -1e30] {
             // Most of a volume may be background.
             for background in [1, 8] {
-                let value = |i: u32| if i % background == 0 { echo(i) } else { 0.0 };
+                let value = |i: u32| if i.is_multiple_of(background) { echo(i) } else { 0.0 };
                 let found = measured((0..20_000).map(|i| if i % 50 == 7 { outlier } else { value(i) }));
                 assert_eq!((found.beyond, found.of), (400, 20_000), "{outlier}");
                 let [low, high] = found.range;
