@@ -252,7 +252,8 @@ impl Case {
             renderer.take_times().expect("times").iter().map(|t| t.total).sum()
         };
         // The first run compiles shaders.
-        (run(&mut own), run(&mut other));
+        run(&mut own);
+        run(&mut other);
         let times: Vec<f64> = (0..RUNS).map(|_| (run(&mut other), run(&mut own)).1).collect();
         Time::of(&times).expect("runs").p95
     }
