@@ -256,8 +256,9 @@ fn ray_scenes() -> Vec<SceneSpec> {
             return;
         }
         for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }", BEHIND] {
-            if mode == BEHIND && toml.contains("surface") {
-                continue; // has its own table
+            // A scene of its own for the maps of a fan, and only where the table of surfaces is free.
+            if mode == BEHIND && (!name.starts_with("fan") || toml.contains("surface")) {
+                continue;
             }
             let toml = format!("mode = {mode}\n{toml}");
             scenes.push(SceneSpec::new(&format!("{name}, {mode}"), geometry, input, toml));

@@ -11,7 +11,7 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 12] = [
+const SCENES: [&str; 14] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'mip'",
@@ -24,6 +24,8 @@ const SCENES: [&str; 12] = [
     "mode = 'sr'\nslices = { enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, growth = true }, perona_malik = { repeat = 2 } }\n\
      distance = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }\npost = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }",
     "mode = 'sr'\nslices = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }\npost = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }",
+    "mode = 'sr'\nslices = { perona_malik = { scheme = 'aos-richardson', step = 2.0, repeat = 1 } }",
+    "mode = 'sr'\nslices = { perona_malik = { scheme = 'rkl1', step = 2.0, repeat = 1 } }",
     ALL_FILTERS,
 ];
 

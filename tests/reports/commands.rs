@@ -62,7 +62,7 @@ fn a_report_is_written_plotted_and_advises() {
     let (dir, json) = (folder.path("out"), folder.path("out/error.json"));
     let dials = ["--dial", "step", "--dial", "format", "--repeat", "2", "--mode", "vr", "--set=ray.step=0.5"];
     let out = done(&[&["report", "error"], &SMALL[..], &dials[..], &["-o", &dir, "--under-error", "0.05"]].concat());
-    for word in ["f64 reference", "r16f", "floor", "* the scene as it is", "takes"] {
+    for word in ["f64 reference", "r16f", "floor", "* the scene as it is", "holds RMSE 5.000e-2"] {
         assert!(out.contains(word), "{word} is missing from\n{out}");
     }
     for file in ["error.json", "error.csv", "error.svg", "error.png"] {
@@ -70,7 +70,7 @@ fn a_report_is_written_plotted_and_advises() {
     }
     // The same again without measuring.
     let again = done(&["report", "error", "--from", &json, "--under-time", "10s"]);
-    assert!(again.contains("r16f") && again.contains("takes"), "{again}");
+    assert!(again.contains("r16f") && again.contains("and not again"), "{again}");
     refused(&["report", "error", "--from", &json, "--under-error", "1e-12"], 1, &["1"]);
     refused(&["report", "error", "--from", &json, "--under-time", "fast"], 2, &["fast", "16ms"]);
     refused(&[&["report", "error"], &SMALL[..], &["--dial", "colour"]].concat(), 2, &["colour", "step"]);

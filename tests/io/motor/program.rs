@@ -53,7 +53,7 @@ fn the_fault_matrix() {
         ("mute", "300", 1, &["open: no reply", "power, the cable", "told to stop but has not confirmed"], true),
         ("mute@0.3", "500", 1, &["sweep: no reply to", "told to stop but has not confirmed"], true),
         ("checksum", "300", 1, &["open: the reply", "wrong checksum", "has not confirmed"], true),
-        ("checksum@0.3", "500", 1, &["sweep: the reply", "wrong checksum", "--baud", "has not confirmed"], true),
+        ("checksum@0.3", "2000", 1, &["sweep: the reply", "wrong checksum", "--baud", "has not confirmed"], true),
         ("limit-switch", "2000", 1, &["sweep: the right limit switch is closed", "The motor was stopped"], true),
         ("limit-switch@0.7", "2000", 1, &["sweep: the right limit switch is closed at", "was stopped"], true),
         ("stall", "2000", 1, &["home: the motor has stalled at", "free the array", "The motor was stopped"], true),
