@@ -94,6 +94,12 @@ pub const SCENES: &[Stated] = &[
         ],
         &["estimator_slice", "aos_slice", "aos_picture"],
     ),
+    sweep(
+        "aos_richardson",
+        &["slices.perona_malik={ scheme = 'aos-richardson', step = 5.0, repeat = 1 }"],
+        &["aos_richardson_slice"],
+    ),
+    sweep("rkl1", &["slices.perona_malik={ scheme = 'rkl1', step = 5.0, repeat = 1 }"], &["rkl1_slice"]),
     sweep("adaptive detector", &["surface.detector=adaptive"], &["raycast_surface"]),
     sweep("lasting detector", &["surface.detector=lasting"], &["raycast_surface"]),
     sweep("exact sampling", &["ray.sampling=exact"], &["raycast_surface"]),
