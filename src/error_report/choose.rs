@@ -11,8 +11,9 @@ use std::fmt::Write as _;
 
 /// Relative difference below which two predicted times count as equal. It bounds the number of proposals.
 const SAME_TIME: f64 = 1e-4;
-/// Share of the time bound that the 95th percentile of a choice leaves free: another run is slower.
-pub const TIME_MARGIN: f64 = 0.1;
+/// By how much longer the 95th percentile of a choice must still fit: another run is slower. With a tenth, 3 of 39 choices on random scenes
+/// took longer when they were measured once more (lavapipe, two cores).
+pub const TIME_MARGIN: f64 = 0.25;
 
 /// A bound that a choice keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
