@@ -2,7 +2,7 @@
 
 use crate::scenes::*;
 use echolume::error_report::dials::dial;
-use echolume::error_report::measure::{ErrorMeasurement, ReferenceChoice};
+use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
 use echolume::error_report::{Measure, Reference, Report};
 use echolume::scene::Scene;
 use echolume::scene::load::Layers;
@@ -26,7 +26,8 @@ fn resolved(layers: &Layers) -> Scene {
     scene_of(layers.clone().finish().expect("settings"))
 }
 
-fn report(more: &[&str], names: &[&str], reference: ReferenceChoice) -> Report {
+/// The dials of these names, measured by so many runs.
+fn measured(more: &[&str], names: &[&str], repeats: u32, reference: ReferenceChoice) -> Result<Report, MeasureError> {
     let (layers, frames) = (layers(more), frames());
     let scene = resolved(&layers);
     let dials: Vec<_> = names.iter().map(|n| dial(n, &scene).expect("dial")).collect();
@@ -37,11 +38,15 @@ fn report(more: &[&str], names: &[&str], reference: ReferenceChoice) -> Report {
         scene: &scene,
         frames: &frames,
         input: "a bumpy wall",
-        repeats: 3,
+        repeats,
         reference,
     };
-    let finest = measurement.finest().expect("the finest picture");
-    measurement.report(&dials, &finest, None, |_, _| {}).expect("report")
+    let finest = measurement.finest()?;
+    measurement.report(&dials, &finest, None, |_, _| {})
+}
+
+fn report(more: &[&str], names: &[&str], reference: ReferenceChoice) -> Report {
+    measured(more, names, 3, reference).expect("report")
 }
 
 #[test]
@@ -149,22 +154,7 @@ fn a_narrow_spike_of_the_transfer_function_is_drawn_and_its_error_is_seen() {
 fn a_reference_without_hits_is_refused_by_name() {
     let _alone = alone();
     let refused = |more: &[&str], name: &str, reference: ReferenceChoice| {
-        let (layers, frames) = (layers(more), frames());
-        let scene = resolved(&layers);
-        let context = device();
-        let measurement = ErrorMeasurement {
-            context: &context,
-            layers: &layers,
-            scene: &scene,
-            frames: &frames,
-            input: "a bumpy wall",
-            repeats: 1,
-            reference,
-        };
-        let dials = [dial(name, &scene).expect("dial")];
-        let finest = measurement.finest();
-        let found = finest.and_then(|finest| measurement.report(&dials, &finest, None, |_, _| {}));
-        found.expect_err("nothing to compare with").to_string()
+        measured(more, &[name], 1, reference).expect_err("nothing to compare with").to_string()
     };
     let said = refused(&["volume.transfer=[{at=0,colour=[1,1,1],opacity=0.0}]"], "brick", ReferenceChoice::Auto);
     assert!(
