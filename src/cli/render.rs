@@ -68,6 +68,11 @@ pub struct Render {
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
+        let targets: [Output; 2] = [("-o", Some(&self.output)), ("--error-map", self.error_map.as_deref())];
+        if !self.explain {
+            // Before the report is read: what a wrong target is refused for does not depend on what the report says.
+            check_outputs(&targets, self.report.as_deref())?;
+        }
         let (mut source, scene) = self.open()?;
         if self.explain {
             let scene = self.input.resolve_sampling(scene);
@@ -76,9 +81,7 @@ impl Render {
             return Ok(());
         }
 
-        let targets: [Output; 2] = [("-o", Some(&self.output)), ("--error-map", self.error_map.as_deref())];
         self.input.check_outputs(&targets, &*source)?;
-        check_outputs(&targets, self.report.as_deref())?;
         let finer = self.finer(&scene)?;
         if let Some(folder) = &self.dump {
             std::fs::create_dir_all(folder)
