@@ -118,13 +118,13 @@ impl ErrorReport {
             repeats,
             reference,
         };
-        let places: usize = dials.iter().map(|d| d.places.len() + 1).sum();
-        let bar = indicatif::ProgressBar::new((places + 1 + measure::MAX_COMBINATIONS) as u64);
+        let settings: usize = dials.iter().map(|d| d.settings.len() + 1).sum();
+        let bar = indicatif::ProgressBar::new((settings + 1 + measure::MAX_COMBINATIONS) as u64);
         bar.set_style(indicatif::ProgressStyle::default_bar().template("{bar:30} {pos}/{len} {msg}").map_err(failed)?);
         bar.set_message("the scene's finest picture");
         let finest = measurement.finest().map_err(failed)?;
-        let report = measurement.report(&dials, &finest, bounds.first().copied(), |dial, place| {
-            bar.set_message(format!("{dial}: {place}"));
+        let report = measurement.report(&dials, &finest, bounds.first().copied(), |dial, setting| {
+            bar.set_message(format!("{dial}: {setting}"));
             bar.inc(1);
         });
         bar.finish_and_clear();

@@ -6,7 +6,7 @@ use crate::scene::{Compositing, Edge, Mode, PeronaMalik, Sampling, Scene, Scheme
 
 /// One setting of a dial.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct DialSetting {
     /// Short label for plots.
     pub label: String,
     /// `key=value` as `--set` takes them; empty for the scene itself.
@@ -21,7 +21,7 @@ pub struct Dial {
     pub name: &'static str,
     pub unit: &'static str,
     /// The settings to measure. The first is the scene itself.
-    pub places: Vec<Place>,
+    pub settings: Vec<DialSetting>,
     /// True if the settings differ in look: what is measured is then no error, but the difference from the scene as it is.
     pub is_look: bool,
     /// Assignments that give the reference. Empty for a look.
@@ -73,38 +73,38 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
     let marches = !scene.is_flat() && s.mode != Mode::Cube;
     let composites = scene.composites();
     let need = |there: bool, why: &str| if there { Ok(()) } else { Err(why.to_string()) };
-    let made = |name, unit, default: Place, others: Vec<Place>, best: &[String], nearly: &[String]| Dial {
+    let made = |name, unit, default: DialSetting, others: Vec<DialSetting>, best: &[String], nearly: &[String]| Dial {
         name,
         unit,
-        places: std::iter::once(default).chain(others).collect(),
+        settings: std::iter::once(default).chain(others).collect(),
         is_look: false,
         best: best.to_vec(),
         nearly: nearly.to_vec(),
     };
-    let look = |name, unit, others: Vec<Place>| {
-        let as_it_is = Place { label: "as it is".into(), set: Vec::new(), value: 0.0 };
+    let look = |name, unit, others: Vec<DialSetting>| {
+        let as_it_is = DialSetting { label: "as it is".into(), set: Vec::new(), value: 0.0 };
         Dial { is_look: true, ..made(name, unit, as_it_is, others, &[], &[]) }
     };
-    let is = |label: String, value: f64| Place { label, set: Vec::new(), value };
-    let at = |label: String, set: &[String], value: f64| Place { label, set: set.to_vec(), value };
+    let is = |label: String, value: f64| DialSetting { label, set: Vec::new(), value };
+    let at = |label: String, set: &[String], value: f64| DialSetting { label, set: set.to_vec(), value };
     let dial = match name {
         "step" => {
             need(marches, "casts no ray")?;
             // From an eighth to four times the step; the reference is four times finer than the finest.
-            let places = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
+            let settings = [4.0, 2.83, 2.0, 1.41, 0.707, 0.5, 0.354, 0.25, 0.177, 0.125];
             // Steps with the same samples of the surface detector give the same picture.
             let ring_half = |f: f64| match (s.mode, s.surface.edge) {
                 (Mode::Surface, None | Some(Edge::Length(_))) if !composites => scene.ring.half_at(f * step),
                 _ => 0,
             };
             let mut halves = vec![ring_half(1.0)];
-            let places = places.into_iter().filter(|f| {
+            let settings = settings.into_iter().filter(|f| {
                 let half = ring_half(*f);
                 let is_new = half == 0 || !halves.contains(&half);
                 halves.push(half);
                 is_new
             });
-            let others: Vec<_> = places
+            let others: Vec<_> = settings
                 .map(|f| at(format!("{:.3} mm", f * step), &[format!("ray.step={}", f * step)], f * step))
                 .collect();
             let fine = |f: f64| [format!("ray.step={}", step * f)];

@@ -25,7 +25,7 @@ pub enum MeasureError {
     #[error("{0}")]
     Gpu(#[from] GpuError),
     #[error("dial {dial} at {set}: {fault}")]
-    Place { dial: &'static str, set: String, fault: String },
+    Setting { dial: &'static str, set: String, fault: String },
     #[error("{0}")]
     NoChoice(String),
     #[error("dial {dial}: {fault}")]
@@ -303,15 +303,15 @@ impl ErrorMeasurement<'_> {
         }
         let mut points = Vec::new();
         let (mut default, mut default_runs) = (self.running(self.scene)?, Vec::new());
-        for (n, place) in dial.places.iter().enumerate() {
-            progress(dial.name, &place.label);
-            let (rendering, runs) = self.in_turn(&self.scene_at(dial, &place.set)?, &mut default, self.repeats)?;
+        for (n, setting) in dial.settings.iter().enumerate() {
+            progress(dial.name, &setting.label);
+            let (rendering, runs) = self.in_turn(&self.scene_at(dial, &setting.set)?, &mut default, self.repeats)?;
             default_runs.extend(&runs.default);
             points.push(Point {
-                label: place.label.clone(),
-                set: place.set.clone(),
-                value: place.value,
-                errors: compare(dial.name, &place.set, &rendering, &expected)?,
+                label: setting.label.clone(),
+                set: setting.set.clone(),
+                value: setting.value,
+                errors: compare(dial.name, &setting.set, &rendering, &expected)?,
                 times: Times::of(&runs.own),
                 ratios: runs.ratios(),
                 is_default: n == 0,
@@ -402,7 +402,7 @@ impl ErrorMeasurement<'_> {
     }
 
     fn scene_with(&self, dial: &'static str, set: &[String]) -> Result<Scene, MeasureError> {
-        let fault = |fault: String| MeasureError::Place { dial, set: set.join(" "), fault };
+        let fault = |fault: String| MeasureError::Setting { dial, set: set.join(" "), fault };
         let layered = || -> Result<_, LoadError> {
             let mut layers = self.layers.clone();
             set.iter().try_for_each(|assignment| layers.set(assignment))?;
@@ -504,7 +504,7 @@ fn compare(
     rendering: &Rendering,
     reference: &Rendering,
 ) -> Result<Errors, MeasureError> {
-    let fault = |fault: String| MeasureError::Place { dial, set: set.join(" "), fault };
+    let fault = |fault: String| MeasureError::Setting { dial, set: set.join(" "), fault };
     let picture = enlarged(&rendering.picture, reference.picture.size);
     let mut errors = Errors::from(metrics::pictures(&picture, &reference.picture).map_err(fault)?);
     let maps = rendering.distance.as_ref().zip(reference.distance.as_ref());
