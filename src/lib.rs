@@ -173,6 +173,8 @@ pub mod barriers;
 #[forbid(unsafe_code)]
 pub mod bounds;
 #[forbid(unsafe_code)]
+mod canvas;
+#[forbid(unsafe_code)]
 pub mod cli;
 #[forbid(unsafe_code)]
 pub mod dump;
@@ -182,6 +184,8 @@ pub mod error_report;
 pub mod exact_ray;
 #[forbid(unsafe_code)]
 pub mod files;
+#[forbid(unsafe_code)]
+pub mod filter_report;
 #[allow(unsafe_code)]
 pub mod gpu;
 #[forbid(unsafe_code)]

@@ -231,7 +231,7 @@ impl Level {
     }
 
     /// Contrast-to-noise ratio against another region: |m1 - m2| / sqrt(s1^2 + s2^2); None without noise.
-    fn cnr(&self, other: &Level) -> Option<f64> {
+    pub fn cnr(&self, other: &Level) -> Option<f64> {
         let noise = self.deviation.hypot(other.deviation);
         (noise > 0.0).then(|| (self.mean - other.mean).abs() / noise)
     }

@@ -1,7 +1,7 @@
 //! The phantom: what a live view without a probe waits for.
 
 use criterion::{Criterion, SamplingMode, Throughput};
-use echolume::source::phantom::{Body, Phantom, PhantomOptions};
+use echolume::source::phantom::{Body, Phantom, PhantomOptions, Speckle};
 
 pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
     let mut group = criterion.benchmark_group("phantom");
@@ -10,7 +10,7 @@ pub fn bench(criterion: &mut Criterion) -> Result<(), String> {
     for (name, options) in [
         ("head, two frames", PhantomOptions { frames: 2, ..PhantomOptions::default() }),
         ("head, a volume of 37 frames", PhantomOptions::default()),
-        ("head without speckle", PhantomOptions { speckle: false, ..PhantomOptions::default() }),
+        ("head without speckle", PhantomOptions { speckle: Speckle::None, ..PhantomOptions::default() }),
         ("wires", PhantomOptions { body: Body::Wires, ..PhantomOptions::default() }),
     ] {
         let samples = options.frames * options.lines * options.samples;

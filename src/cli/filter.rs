@@ -210,12 +210,19 @@ impl Filter {
         }
         let is_one = given("window") || given("largest");
         let windows = if is_one { vec![[asked.window, asked.largest]] } else { growth::WINDOWS.to_vec() };
-        let rows = sigmas.iter().flat_map(|sigma| windows.iter().map(move |windows| (*sigma, *windows)));
-        rows.map(|(sigma, [window, largest])| {
-            let set = format!("{{window={window},largest={largest},sigma={sigma:?},growth=true}}");
-            Ok((sigma, [window, largest], self.settings(&[format!("slices.enhanced_sigma={set}")])?))
-        })
-        .collect()
+        let centres = match asked.centre {
+            Some(centre) if given("centre") => vec![centre],
+            _ => growth::CENTRES.to_vec(),
+        };
+        let mut rows = Vec::new();
+        for (centre, sigma) in centres.iter().flat_map(|centre| sigmas.iter().map(move |sigma| (*centre, *sigma))) {
+            for [window, largest] in &windows {
+                let keys = format!("window={window},largest={largest},sigma={sigma:?},centre='{}'", centre.name());
+                let settings = self.settings(&[format!("slices.enhanced_sigma={{{keys},growth=true}}")])?;
+                rows.push((centre, sigma, [*window, *largest], settings));
+            }
+        }
+        Ok(rows)
     }
 
     fn print_growth(&self, context: &Arc<Context>, grey: &Grey, asked: Vec<GrowthSettings>) -> Result<(), Failure> {

@@ -16,7 +16,7 @@ mod view_config;
 
 use crate::kiosk::log_rotation::{self, RotatingLog};
 use crate::terminal::{self, Failure, failed, input};
-use crate::{bounds, error_report, profile, thesis_tables, verify};
+use crate::{bounds, error_report, filter_report, profile, thesis_tables, verify};
 use clap::{Parser, Subcommand};
 use std::io::Write;
 use std::path::PathBuf;
@@ -61,7 +61,7 @@ enum Command {
     Profile(Box<profile::command::Profile>),
     /// Test whether this device and its driver render correctly
     Verify(verify::command::Verify),
-    /// Report error against run time for each dial, proven bounds of a picture, or the tables of the thesis
+    /// Report error against run time for each dial, proven bounds of a picture, filters compared, or the tables of the thesis
     Report(Report),
     /// Write a synthetic sweep: a fetal head, or a body with an exact answer
     Phantom(recordings::MakePhantom),
@@ -89,7 +89,9 @@ enum ReportKind {
     Error(Box<error_report::command::ErrorReport>),
     /// Enclose every ray of volume rendering by proven bounds, on the CPU
     Bounds(Box<bounds::command::BoundsReport>),
-    /// Measure the thesis' tables of times under its conditions, and print them with its figures
+    /// Compare the 2D filters of slices: noise, contrast, edges, error and time
+    Filters(filter_report::command::FilterReport),
+    /// Measure the thesis' tables of times in our reading of its conditions, and print them with its figures
     Tables(thesis_tables::command::ThesisTables),
 }
 
@@ -98,6 +100,7 @@ impl Report {
         match &self.kind {
             ReportKind::Error(error) => error.run(),
             ReportKind::Bounds(bounds) => bounds.run(),
+            ReportKind::Filters(filters) => filters.run(),
             ReportKind::Tables(tables) => tables.run(),
         }
     }

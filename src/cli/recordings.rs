@@ -6,7 +6,7 @@ use crate::picture::check_target;
 use crate::probe::{Geometry, Grid};
 use crate::scene::insonified_box;
 use crate::source::convert::{Volume, VolumeFile, lattice};
-use crate::source::phantom::{Body, Phantom, PhantomOptions};
+use crate::source::phantom::{Body, Phantom, PhantomOptions, Speckle};
 use crate::source::recorder::{Header, Writer};
 use crate::source::sequence::{self, Sequence};
 use crate::source::{self, Source};
@@ -191,9 +191,12 @@ pub struct MakePhantom {
     /// Share of the frame pitch that the motor travels during one frame, 0..1 [default: 0, with --both-ways 0.5]
     #[arg(long, value_name = "SHARE")]
     speed_ratio: Option<f64>,
-    /// Write the echogenicity without speckle
+    /// Write the echogenicity, without speckle and without the blur of the probe
     #[arg(long)]
     no_speckle: bool,
+    /// Write the mean over all speckle, which a filter of speckle should find
+    #[arg(long, conflicts_with = "no_speckle")]
+    mean_speckle: bool,
 }
 
 impl MakePhantom {
@@ -203,7 +206,11 @@ impl MakePhantom {
             body: self.body.parse::<Body>().map_err(input)?,
             volumes: self.volumes,
             both_ways: self.both_ways,
-            speckle: !self.no_speckle,
+            speckle: match (self.no_speckle, self.mean_speckle) {
+                (true, _) => Speckle::None,
+                (_, true) => Speckle::Mean,
+                _ => Speckle::Random,
+            },
             speed_ratio: self.speed_ratio.unwrap_or(if self.both_ways { 0.5 } else { 0.0 }),
             ..PhantomOptions::default()
         };

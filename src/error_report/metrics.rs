@@ -68,7 +68,7 @@ pub fn pictures(measured: &Texels, reference: &Texels) -> Result<PictureError, S
     let grey =
         |rgb: &[f64]| rgb.chunks_exact(3).map(|p| (0..3).map(|c| LUMINANCE[c] * p[c]).sum()).collect::<Vec<f64>>();
     let psnr = (rmse > 0.0).then(|| -20.0 * rmse.log10());
-    Ok(PictureError { rmse, max, psnr, ssim: ssim(&grey(&a), &grey(&b), measured.size) })
+    Ok(PictureError { rmse, max, psnr, ssim: similarity(&grey(&a), &grey(&b), measured.size) })
 }
 
 /// Compares distance maps in mm.
@@ -147,8 +147,9 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     low + (high - low) * at.fract()
 }
 
-/// Mean SSIM (Wang et al. 2004, equation 13), weighted by the Gaussian window, averaged over all windows within the picture.
-fn ssim(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
+/// Mean structural similarity of two planes with values in 0..1 (SSIM; Wang et al. 2004, equation 13), weighted by the Gaussian window, averaged
+/// over all windows within the picture; None if it is smaller than the window.
+pub(crate) fn similarity(a: &[f64], b: &[f64], [width, height, _]: [usize; 3]) -> Option<f64> {
     if width < WINDOW || height < WINDOW {
         return None;
     }

@@ -2,12 +2,9 @@
 //! the time that its dial changes, of the picture or of the volume, both logarithmic; every point is named.
 
 use super::{Dial, Measure, Reference, Report, Sizes, Time, Times, choose};
+use crate::canvas::{self, Canvas, Drawing, Drawn, Frame, GRID, INK};
 use crate::picture::Picture;
-use plotters::coord::Shift;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{FontStyle, register_font};
-use std::sync::LazyLock;
 
 /// Colours by Okabe and Ito, distinguishable with any colour vision; without yellow, which is hard to see on white.
 const COLOURS: [RGBColor; 7] = [
@@ -28,9 +25,6 @@ const PANEL: [u32; 2] = [400, 300];
 const MIN_SIZE: [u32; 2] = [640, 400];
 /// Maximum width and height, pixels.
 const MAX_SIZE: u32 = 4096;
-/// In SVG the text is at the right height; the bitmap rendering of plotters places it too high.
-const LINES: Medium = Medium { scale: 1, raised: 0.0 };
-const PIXELS: Medium = Medium { scale: 3, raised: 0.12 };
 
 /// The diagram as SVG, `size` in pixels.
 ///
@@ -38,11 +32,7 @@ const PIXELS: Medium = Medium { scale: 3, raised: 0.12 };
 /// One line: no point has a time and such an error, or the size is not within 640x400..4096x4096.
 pub fn svg(report: &Report, measure: Measure, size: [u32; 2]) -> Result<String, String> {
     check(size)?;
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, size.into()).into_drawing_area();
-    draw(&area, LINES, report, measure)?;
-    drop(area);
-    Ok(text)
+    canvas::svg(size, &Diagram { report, measure })
 }
 
 /// The diagram as a picture, `size` in pixels.
@@ -51,31 +41,7 @@ pub fn svg(report: &Report, measure: Measure, size: [u32; 2]) -> Result<String, 
 /// As [`svg`].
 pub fn picture(report: &Report, measure: Measure, size: [u32; 2]) -> Result<Picture, String> {
     check(size)?;
-    let fine = size.map(|n| n * PIXELS.scale);
-    let mut rgb = vec![255; 3 * fine[0] as usize * fine[1] as usize];
-    let area = BitMapBackend::with_buffer(&mut rgb, fine.into()).into_drawing_area();
-    draw(&area, PIXELS, report, measure)?;
-    drop(area);
-    let [width, height] = size;
-    Ok(Picture { width, height, rgba: averaged(&rgb, size, PIXELS.scale as usize) })
-}
-
-/// Downsamples by averaging squares of `edge` pixels; opaque.
-fn averaged(rgb: &[u8], [width, height]: [u32; 2], edge: usize) -> Vec<u8> {
-    let (width, height) = (width as usize, height as usize);
-    let mut rgba = Vec::with_capacity(4 * width * height);
-    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        let mut sums = [0; 3];
-        for row in y * edge..(y + 1) * edge {
-            let first = 3 * edge * (row * width + x);
-            for p in rgb[first..first + 3 * edge].chunks_exact(3) {
-                (0..3).for_each(|c| sums[c] += usize::from(p[c]));
-            }
-        }
-        rgba.extend(sums.map(|s| (s / (edge * edge)) as u8));
-        rgba.push(255);
-    }
-    rgba
+    canvas::picture(size, &Diagram { report, measure })
 }
 
 fn check([width, height]: [u32; 2]) -> Result<(), String> {
@@ -184,22 +150,30 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
     }
 }
 
-fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, medium: Medium, report: &Report, measure: Measure) -> Drawn {
-    let all = panels(report, measure);
-    if all.is_empty() {
-        return Err(format!("plot: no setting has a time and an {}", measure.name()));
+/// The report as a diagram.
+struct Diagram<'a> {
+    report: &'a Report,
+    measure: Measure,
+}
+
+impl Drawing for Diagram<'_> {
+    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<B>) -> Drawn {
+        let Diagram { report, measure } = *self;
+        let all = panels(report, measure);
+        if all.is_empty() {
+            return Err(format!("plot: no setting has a time and an {}", measure.name()));
+        }
+        let [width, height] = canvas.size();
+        head(canvas, report, measure, width)?;
+        let columns = ((width / f64::from(PANEL[0])).floor() as usize).clamp(1, all.len());
+        let rows = all.len().div_ceil(columns);
+        let [across, down] = [width / columns as f64, (height - HEAD) / rows as f64];
+        for (i, panel) in all.iter().enumerate() {
+            let (left, top) = ((i % columns) as f64 * across, HEAD + (i / columns) as f64 * down);
+            panel.draw(canvas, [left + 56.0, top + 40.0, left + across - 14.0, top + down - 44.0])?;
+        }
+        Ok(())
     }
-    let canvas = Canvas::new(area, medium)?;
-    let [width, height] = canvas.size();
-    head(&canvas, report, measure, width)?;
-    let columns = ((width / f64::from(PANEL[0])).floor() as usize).clamp(1, all.len());
-    let rows = all.len().div_ceil(columns);
-    let [across, down] = [width / columns as f64, (height - HEAD) / rows as f64];
-    for (i, panel) in all.iter().enumerate() {
-        let (left, top) = ((i % columns) as f64 * across, HEAD + (i / columns) as f64 * down);
-        panel.draw(&canvas, [left + 56.0, top + 40.0, left + across - 14.0, top + down - 44.0])?;
-    }
-    Ok(())
 }
 
 impl Panel {
@@ -309,128 +283,6 @@ fn colour(dial: usize) -> RGBColor {
 fn darker(RGBColor(r, g, b): RGBColor) -> RGBColor {
     let [r, g, b] = [r, g, b].map(|c| (f64::from(c) * 0.7) as u8);
     RGBColor(r, g, b)
-}
-
-/// The font family that an SVG names. The embedded DejaVu Sans Condensed is registered under the same name; it measures text and
-/// draws it in PNGs, since a bare system has no font.
-const FONT: &str = "DejaVu Sans Condensed, DejaVu Sans, sans-serif";
-
-static FONT_REGISTERED: LazyLock<bool> =
-    LazyLock::new(|| register_font(FONT, FontStyle::Normal, dejavu::sans_condensed::regular()).is_ok());
-
-const INK: RGBColor = RGBColor(40, 40, 40);
-const GRID: [RGBColor; 2] = [RGBColor(208, 208, 208), RGBColor(236, 236, 236)];
-
-type Drawn = Result<(), String>;
-
-/// Left, top, right, bottom, pixels.
-type Frame = [f64; 4];
-
-/// The kind of output.
-#[derive(Clone, Copy, Debug)]
-struct Medium {
-    /// Supersampling factor along each edge, for smooth text and slanted lines.
-    pub scale: u32,
-    /// How far plotters places text too high, as a share of its size.
-    pub raised: f64,
-}
-
-/// The diagram being drawn. Positions and sizes are in output pixels.
-struct Canvas<'a, B: DrawingBackend> {
-    area: &'a DrawingArea<B, Shift>,
-    medium: Medium,
-}
-
-impl<'a, B: DrawingBackend> Canvas<'a, B> {
-    /// # Errors
-    /// One line: the embedded font or the drawing failed.
-    pub fn new(area: &'a DrawingArea<B, Shift>, medium: Medium) -> Result<Self, String> {
-        if !*FONT_REGISTERED {
-            return Err("plot: the embedded font cannot be read".into());
-        }
-        area.fill(&WHITE).map_err(|e| fault(&e))?;
-        Ok(Canvas { area, medium })
-    }
-
-    pub fn size(&self) -> [f64; 2] {
-        let (w, h) = self.area.dim_in_pixel();
-        [w, h].map(|n| f64::from(n / self.medium.scale))
-    }
-
-    fn pixel(&self, [x, y]: [f64; 2]) -> (i32, i32) {
-        let at = |v: f64| (v * f64::from(self.medium.scale)).round() as i32;
-        (at(x), at(y))
-    }
-
-    fn styled(&self, style: impl Into<ShapeStyle>) -> ShapeStyle {
-        let style = style.into();
-        ShapeStyle { stroke_width: style.stroke_width * self.medium.scale, ..style }
-    }
-
-    pub fn line(&self, points: &[[f64; 2]], style: impl Into<ShapeStyle>) -> Drawn {
-        let points: Vec<_> = points.iter().map(|p| self.pixel(*p)).collect();
-        self.area.draw(&PathElement::new(points, self.styled(style))).map_err(|e| fault(&e))
-    }
-
-    pub(crate) fn boxed(&self, [left, top, right, bottom]: Frame, style: impl Into<ShapeStyle>) -> Drawn {
-        let corners = [self.pixel([left, top]), self.pixel([right, bottom])];
-        self.area.draw(&Rectangle::new(corners, self.styled(style))).map_err(|e| fault(&e))
-    }
-
-    pub fn ring(&self, at: [f64; 2], radius: i32, style: impl Into<ShapeStyle>) -> Drawn {
-        self.area
-            .draw(&Circle::new(self.pixel(at), radius * self.medium.scale as i32, self.styled(style)))
-            .map_err(|e| fault(&e))
-    }
-
-    /// One of five shapes that differ without colour, about 9 pixels across.
-    pub(crate) fn mark(&self, at: [f64; 2], shape: usize, colour: RGBColor) -> Drawn {
-        let polygon = |corners: &[[f64; 2]]| {
-            let points: Vec<_> = corners.iter().map(|c| self.pixel([at[0] + c[0], at[1] + c[1]])).collect();
-            self.area.draw(&Polygon::new(points, colour.filled())).map_err(|e| fault(&e))
-        };
-        match shape % 5 {
-            0 => self.ring(at, 4, colour.filled()),
-            1 => polygon(&[[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0]]),
-            2 => polygon(&[[0.0, -6.0], [5.0, 4.0], [-5.0, 4.0]]),
-            3 => polygon(&[[0.0, -6.0], [6.0, 0.0], [0.0, 6.0], [-6.0, 0.0]]),
-            _ => polygon(&[[0.0, 6.0], [5.0, -4.0], [-5.0, -4.0]]),
-        }
-    }
-
-    /// Text at its anchor: `across` and `down` are 0 for left and top, 1 for the middle, 2 for right and bottom.
-    pub fn text(&self, text: &str, at: [f64; 2], size: u32, colour: RGBColor, [across, down]: [usize; 2]) -> Drawn {
-        let h = [HPos::Left, HPos::Center, HPos::Right][across.min(2)];
-        let v = [VPos::Top, VPos::Center, VPos::Bottom][down.min(2)];
-        let style = (FONT, size * self.medium.scale).into_font().color(&colour).pos(Pos::new(h, v));
-        let at = self.pixel([at[0], at[1] + self.medium.raised * f64::from(size)]);
-        self.area.draw(&Text::new(text.to_string(), at, style)).map_err(|e| fault(&e))
-    }
-
-    /// Width and height of a text, pixels.
-    pub fn measure(&self, text: &str, size: u32) -> Result<[f64; 2], String> {
-        let style = (FONT, size * self.medium.scale).into_font().color(&INK);
-        let (w, h) = self.area.estimate_text_size(text, &style).map_err(|e| fault(&e))?;
-        Ok([w, h].map(|n| f64::from(n) / f64::from(self.medium.scale)))
-    }
-
-    /// The text, cut with an ellipsis if it is wider than `max_width` pixels.
-    pub fn cut(&self, text: &str, size: u32, max_width: f64) -> Result<String, String> {
-        let mut cut = text.to_string();
-        while self.measure(&cut, size)?[0] > max_width && cut.chars().count() > 1 {
-            cut = cut
-                .trim_end_matches('…')
-                .chars()
-                .collect::<Vec<_>>()
-                .split_last()
-                .map_or(String::new(), |(_, kept)| kept.iter().collect::<String>() + "…");
-        }
-        Ok(cut)
-    }
-}
-
-fn fault(e: &dyn std::fmt::Display) -> String {
-    format!("plot: cannot be drawn: {e}")
 }
 
 /// Two logarithmic axes in a frame.

@@ -1,14 +1,11 @@
 //! The thesis' tables as Markdown and as CSV.
 
-use super::growth::{Grown, Growth};
+use super::growth::{Grown, Growth, THESIS};
 use super::{Conditions, DEPTH, FAN_ANGLE, Report, Row, SAMPLES, SECTOR_ANGLE, SOUND_SPEED, Spread, Table};
 use crate::profile::export::acquisition_floor;
+use crate::scene::Estimator;
+use crate::text::{csv_quoted, markdown_table, markdown_text};
 use std::fmt::Write as _;
-
-/// A CSV field in quotes.
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
-}
 
 /// Tables 3-6 as CSV, one line per row; a missing time is an empty field.
 pub(crate) fn tables_csv(report: &Report) -> String {
@@ -31,27 +28,28 @@ fn csv_row(report: &Report, table: &Table, row: &Row, usual: bool) -> String {
         let spread = Spread::new(ns);
         [spread.map(|s| s.median), spread.map(|s| s.min), spread.map(|s| s.max)].map(number)
     };
-    let mut fields = vec![table.number.to_string(), table.varied.into(), quoted(&row.label), usual.to_string()];
+    let mut fields = vec![table.number.to_string(), table.varied.into(), csv_quoted(&row.label), usual.to_string()];
     fields.extend(three(&row.times.picture));
     fields.extend([number(table.ratio(row)), row.thesis.ms.to_string(), number(table.thesis_ratio(row))]);
     fields.extend(three(&row.times.preprocess));
     fields.extend([row.reached.map(|r| r.depth), row.reached.map(|r| r.share)].map(number));
     fields.extend([report.repeats, c.frames, c.lines, SAMPLES].map(|n| n.to_string()));
     fields.extend([c.volume.to_string(), c.filter_3d.name(), c.filter_2d.to_string()]);
-    fields.extend([&report.device.name, &report.device.driver, &report.date].map(|t| quoted(t)));
+    fields.extend([&report.device.name, &report.device.driver, &report.date].map(|t| csv_quoted(t)));
     fields.join(",") + "\n"
 }
 
 /// Tables 7-9 as CSV, one line per picture, sigma, starting window and step of growth; shares in 0..1.
 pub(crate) fn growth_csv(grown: &[Grown]) -> String {
-    let mut text = String::from("picture,sigma,window,largest,grew,share\n");
+    let mut text = String::from("picture,centre,sigma,window,largest,grew,share\n");
     for picture in grown {
         for row in &picture.rows {
             for n in 0..row.counts.len() {
                 let share = row.share(n).unwrap_or(0.0);
                 let [window, largest] = row.windows;
-                let name = quoted(&picture.picture);
-                let _ = writeln!(text, "{name},{},{window},{largest},{},{share:.6}", row.sigma, 2 * n);
+                let name = csv_quoted(&picture.picture);
+                let (centre, sigma) = (row.centre.name(), row.sigma);
+                let _ = writeln!(text, "{name},{centre},{sigma},{window},{largest},{},{share:.6}", 2 * n);
             }
         }
     }
@@ -70,44 +68,12 @@ fn ms(value: f64) -> String {
     format!("{value:.3}")
 }
 
-/// Text without Markdown table markup and terminal control characters.
-fn plain(text: &str) -> String {
-    text.chars()
-        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
-        .collect::<String>()
-        .replace('|', "\\|")
-}
-
-/// A Markdown table with aligned pipes: the first column left-aligned, the others right-aligned.
-fn piped(rows: &[Vec<String>]) -> String {
-    let columns = rows.first().map_or(0, Vec::len);
-    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0).max(3);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for (n, row) in rows.iter().enumerate() {
-        for (c, (cell, width)) in row.iter().zip(&widths).enumerate() {
-            let _ = if c == 0 { write!(text, "| {cell:<width$} ") } else { write!(text, "| {cell:>width$} ") };
-        }
-        text.push_str("|\n");
-        if n == 0 {
-            for (c, width) in widths.iter().enumerate() {
-                let _ = match c {
-                    0 => write!(text, "|{}", "-".repeat(width + 2)),
-                    _ => write!(text, "|{}:", "-".repeat(width + 1)),
-                };
-            }
-            text.push_str("|\n");
-        }
-    }
-    text
-}
-
 /// The report as Markdown: conditions, Tables 3-6 with the figures of the thesis, notes, and Tables 7-9 of every picture.
 pub fn markdown(report: &Report) -> String {
     let mut text = String::from("# Tables of the thesis on this device\n\n");
     conditions(&mut text, report);
     for table in &report.tables {
-        let _ = write!(text, "\n## Table {}: {}\n\n{}", table.number, table.varied, piped(&rows(table)));
+        let _ = write!(text, "\n## Table {}: {}\n\n{}", table.number, table.varied, markdown_table(&rows(table)));
     }
     text.push('\n');
     for note in notes(report) {
@@ -126,12 +92,12 @@ fn conditions(text: &mut String, report: &Report) {
     let _ = writeln!(
         text,
         "- device: {}{software}, {}, Vulkan {}{}; {}; {}",
-        plain(&device.name),
-        plain(&device.driver),
-        plain(&device.api),
-        plain(&clocks),
-        plain(&report.program),
-        plain(&report.date)
+        markdown_text(&device.name),
+        markdown_text(&device.driver),
+        markdown_text(&device.api),
+        markdown_text(&clocks),
+        markdown_text(&report.program),
+        markdown_text(&report.date)
     );
     if report.quick {
         let _ = writeln!(
@@ -233,11 +199,15 @@ fn notes(report: &Report) -> Vec<String> {
 }
 
 fn growth(text: &mut String, grown: &Grown) {
-    let _ = writeln!(text, "\n## Tables 7-9: growth of the enhanced sigma filter's windows, {}", plain(&grown.picture));
-    let mut sigmas: Vec<f64> = grown.rows.iter().map(|r| r.sigma).collect();
-    sigmas.dedup();
-    for sigma in sigmas {
-        let of: Vec<&Growth> = grown.rows.iter().filter(|r| r.sigma == sigma).collect();
+    let _ = writeln!(
+        text,
+        "\n## Tables 7-9: growth of the enhanced sigma filter's windows, {}",
+        markdown_text(&grown.picture)
+    );
+    let mut tables: Vec<(Estimator, f64)> = grown.rows.iter().map(|r| (r.centre, r.sigma)).collect();
+    tables.dedup();
+    for (centre, sigma) in tables {
+        let of: Vec<&Growth> = grown.rows.iter().filter(|r| (r.centre, r.sigma) == (centre, sigma)).collect();
         let columns = of.iter().map(|r| r.counts.len()).max().unwrap_or(0);
         let mut rows = vec![vec!["window".to_string(), "largest".to_string()]];
         rows[0].extend((0..columns).map(|n| format!("+{}, %", 2 * n)));
@@ -246,8 +216,20 @@ fn growth(text: &mut String, grown: &Grown) {
             cells.extend((0..columns).map(|n| row.share(n).map_or(String::new(), |s| format!("{:.2}", 100.0 * s))));
             rows.push(cells);
         }
-        let _ = write!(text, "\nsigma {sigma}\n\n{}", piped(&rows));
+        let _ = write!(text, "\ncentre {}, sigma {sigma}\n\n{}", centre.name(), markdown_table(&rows));
     }
+    let _ = writeln!(text, "\nThe thesis, on pictures of its own:\n");
+    let mut rows = vec![["table", "window", "+0, %", "+2, %", "+4, %"].map(str::to_string).to_vec()];
+    for (table, window, shares) in THESIS {
+        let mut cells = vec![table.to_string(), window.to_string()];
+        cells.extend(shares.map(|s| format!("{s:.2}")));
+        rows.push(cells);
+    }
+    text.push_str(&markdown_table(&rows));
+    text.push_str(
+        "\nThe shares are of the picture, not of the filter: a window grows where fewer pixels than it has lie within 2 sigma of the \
+         centre, so they follow from how much of the picture is edge or speckle, and from the ratio of its noise to sigma.\n",
+    );
 }
 
 #[cfg(test)]
@@ -294,10 +276,14 @@ mod tests {
 
     #[test]
     fn growth_has_a_table_a_sigma() {
-        let rows = [0.03, 0.1].map(|sigma| Growth::new(sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
+        let rows = [0.03, 0.1].map(|sigma| Growth::new(Estimator::Median, sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
         let grown = vec![Grown { picture: "a|b.png".into(), rows: rows.to_vec() }];
         let text = markdown(&Report { grown, ..report() });
-        assert!(text.contains("windows, a\\|b.png\n\nsigma 0.03\n") && text.contains("\nsigma 0.1\n"), "{text}");
+        assert!(
+            text.contains("windows, a\\|b.png\n\ncentre median, sigma 0.03\n")
+                && text.contains("\ncentre median, sigma 0.1\n"),
+            "{text}"
+        );
         assert_eq!(
             text.lines().filter(|l| l.starts_with("| 3      |       7 | 25.00 | 25.00 | 50.00 |")).count(),
             2,
@@ -331,10 +317,10 @@ mod tests {
 
     #[test]
     fn growth_has_a_line_a_step() {
-        let rows = [0.03, 0.1].map(|sigma| Growth::new(sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
+        let rows = [0.03, 0.1].map(|sigma| Growth::new(Estimator::Median, sigma, [3, 7], &[0.0, 1.0, 2.0, 2.0]));
         let grown = vec![Grown { picture: "a|b.png".into(), rows: rows.to_vec() }];
         let csv = growth_csv(&grown);
         assert_eq!(csv.lines().count(), 1 + 2 * 3);
-        assert!(csv.contains("\"a|b.png\",0.03,3,7,4,0.500000\n"), "{csv}");
+        assert!(csv.contains("\"a|b.png\",median,0.03,3,7,4,0.500000\n"), "{csv}");
     }
 }

@@ -5,19 +5,31 @@ use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::Slot;
 use crate::picture::Grey;
 use crate::probe::{Geometry, Grid};
-use crate::scene::{EnhancedSigma, Input, Mode, Scene, SceneError, Settings, VolumeFormat};
+use crate::scene::{EnhancedSigma, Estimator, Input, Mode, Scene, SceneError, Settings, VolumeFormat};
 use crate::source::StoredType;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// Starting and largest windows of Tables 7-9, pixels.
-pub const WINDOWS: [[u32; 2]; 6] = [[3, 17], [5, 19], [7, 19], [9, 21], [11, 21], [13, 23]];
+/// Starting and largest windows of Tables 7-9, pixels: as far as their columns go. 7x7 reaches 21 in Table 8 and 19 in the others.
+pub const WINDOWS: [[u32; 2]; 6] = [[3, 17], [5, 19], [7, 21], [9, 21], [11, 21], [13, 23]];
+/// Estimators of the centre: the thesis ties Fig. 48, and so Table 7, to the median (5.7), and planes to Perona-Malik (5.5). Tables 8 and 9
+/// do not say.
+pub const CENTRES: [Estimator; 2] = [Estimator::Median, Estimator::PeronaMalik];
+
+/// Shares of the thesis, percent: table, starting window, and the pixels whose window grew by +0, +2 and +4.
+pub(crate) const THESIS: [(&str, u32, [f64; 3]); 4] = [
+    ("Table 7 (Fig. 48)", 3, [79.30, 20.51, 0.04]),
+    ("Table 7 (Fig. 48)", 7, [37.02, 57.88, 2.20]),
+    ("Table 9 (liver, Fig. 50)", 3, [77.95, 21.83, 0.20]),
+    ("Table 9 (liver, Fig. 50)", 7, [41.5, 50.1, 4.9]),
+];
 /// Standard deviations of the noise for which the thesis measures, 0..1.
 pub const SIGMAS: [f64; 3] = [0.03, 0.1, 0.17];
 
 /// Growth of the windows on one picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Growth {
+    pub centre: Estimator,
     pub sigma: f64,
     /// Starting and largest window, pixels.
     pub windows: [u32; 2],
@@ -27,13 +39,13 @@ pub struct Growth {
 
 impl Growth {
     /// From the number of rings by which the window of each pixel grew.
-    pub fn new(sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
+    pub fn new(centre: Estimator, sigma: f64, windows: [u32; 2], rings: &[f64]) -> Growth {
         let max_rings = (windows[1] - windows[0]) / 2;
         let mut counts = vec![0; max_rings as usize + 1];
         for ring in rings {
             counts[(ring.round().max(0.0) as usize).min(max_rings as usize)] += 1;
         }
-        Growth { sigma, windows, counts }
+        Growth { centre, sigma, windows, counts }
     }
 
     /// Share of the pixels whose window grew by n rings, 0..1; None if it cannot grow that far.
@@ -49,13 +61,13 @@ fn columns(rows: &[Growth]) -> usize {
 
 /// A table for a terminal, one line per starting window, in percent.
 pub fn table(rows: &[Growth]) -> String {
-    let mut text = format!("{:>6} {:>7} {:>7}", "sigma", "window", "largest");
+    let mut text = format!("{:<11} {:>6} {:>7} {:>7}", "centre", "sigma", "window", "largest");
     for n in 0..columns(rows) {
         let _ = write!(text, " {:>7}", format!("+{}", 2 * n));
     }
     text.push('\n');
     for row in rows {
-        let _ = write!(text, "{:>6} {:>7} {:>7}", row.sigma, row.windows[0], row.windows[1]);
+        let _ = write!(text, "{:<11} {:>6} {:>7} {:>7}", row.centre.name(), row.sigma, row.windows[0], row.windows[1]);
         for n in 0..columns(rows) {
             let share = row.share(n).map_or(String::new(), |s| format!("{:.2} %", 100.0 * s));
             let _ = write!(text, " {share:>7}");
@@ -69,11 +81,11 @@ pub fn table(rows: &[Growth]) -> String {
 
 /// The same as CSV with shares in 0..1; a window that cannot grow that far has an empty field.
 pub fn csv(rows: &[Growth]) -> String {
-    let mut text = "sigma,window,largest".to_string();
+    let mut text = "centre,sigma,window,largest".to_string();
     (0..columns(rows)).for_each(|n| text.push_str(&format!(",grew {}", 2 * n)));
     text.push('\n');
     for row in rows {
-        let _ = write!(text, "{},{},{}", row.sigma, row.windows[0], row.windows[1]);
+        let _ = write!(text, "{},{},{},{}", row.centre.name(), row.sigma, row.windows[0], row.windows[1]);
         for n in 0..columns(rows) {
             let _ = write!(text, ",{}", row.share(n).map_or(String::new(), |s| format!("{s:.6}")));
         }
@@ -90,8 +102,8 @@ pub struct Grown {
     pub rows: Vec<Growth>,
 }
 
-/// One row to measure: sigma, starting and largest window, and its settings.
-pub type GrowthSettings = (f64, [u32; 2], Settings);
+/// One row to measure: centre, sigma, starting and largest window, and its settings.
+pub type GrowthSettings = (Estimator, f64, [u32; 2], Settings);
 
 /// Why growth cannot be measured.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +130,7 @@ pub fn scene_of(grey: &Grey, settings: Settings) -> Result<Scene, SceneError> {
 /// A window is out of range, or the device cannot hold the picture.
 pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -> Result<Vec<Growth>, GrowthError> {
     let (mut grown, mut renderer) = (Vec::new(), None);
-    for (sigma, windows, settings) in rows {
+    for (centre, sigma, windows, settings) in rows {
         let scene = scene_of(grey, settings)?;
         let renderer: &mut Renderer = match &mut renderer {
             None => renderer.insert(Renderer::new(context, scene, &RendererOptions::default())?),
@@ -130,28 +142,31 @@ pub fn measure(context: &Arc<Context>, grey: &Grey, rows: Vec<GrowthSettings>) -
         renderer.frame(0, &grey.bytes(), 0)?;
         let rings = renderer.read(Slot::Growth)?;
         let rings = rings.ok_or_else(|| GpuError::Broken("slot 'growth' is not in the plan".into()))?;
-        grown.push(Growth::new(sigma, windows, &rings.values));
+        grown.push(Growth::new(centre, sigma, windows, &rings.values));
     }
     Ok(grown)
 }
 
-/// Measures Tables 7-9 on a picture, as `echolume filter --growth-table` does: centres by Perona-Malik as for planes (thesis 5.5).
+/// Measures Tables 7-9 on a picture, as `echolume filter --growth-table` does, with both centres.
 ///
 /// # Errors
 /// A window is out of range, or the device cannot hold the picture.
 pub fn growth(context: &Arc<Context>, picture: &str, grey: &Grey) -> Result<Grown, GrowthError> {
-    let windows = |sigma: f64| WINDOWS.into_iter().map(move |w| (sigma, w, growth_settings(sigma, w)));
-    let rows = measure(context, grey, SIGMAS.into_iter().flat_map(windows).collect())?;
-    Ok(Grown { picture: picture.into(), rows })
+    let mut rows = Vec::new();
+    for (centre, sigma) in CENTRES.into_iter().flat_map(|centre| SIGMAS.map(|sigma| (centre, sigma))) {
+        rows.extend(WINDOWS.map(|windows| (centre, sigma, windows, growth_settings(centre, sigma, windows))));
+    }
+    Ok(Grown { picture: picture.into(), rows: measure(context, grey, rows)? })
 }
 
 /// The settings of a row of Tables 7-9.
-pub fn growth_settings(sigma: f64, [window, largest]: [u32; 2]) -> Settings {
+pub fn growth_settings(centre: Estimator, sigma: f64, [window, largest]: [u32; 2]) -> Settings {
     let mut settings = Settings { mode: Mode::Plane, ..Settings::default() };
     settings.picture.size = [1, 1];
     settings.slices.format = VolumeFormat::R32f;
+    let centre = Some(centre);
     settings.slices.enhanced_sigma =
-        Some(EnhancedSigma { window, largest, sigma, growth: true, ..EnhancedSigma::default() });
+        Some(EnhancedSigma { window, largest, sigma, centre, growth: true, ..EnhancedSigma::default() });
     settings
 }
 
@@ -161,13 +176,14 @@ mod tests {
 
     #[test]
     fn shares_are_of_all_pixels_and_a_window_that_cannot_grow_has_none() {
-        let wide = Growth::new(0.1, [3, 7], &[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 0.0]);
+        let wide = Growth::new(Estimator::Median, 0.1, [3, 7], &[0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 0.0, 0.0]);
         assert_eq!(wide.counts, [5, 1, 2]);
-        let narrow = Growth::new(0.1, [5, 7], &[1.0, 0.0]);
+        let narrow = Growth::new(Estimator::PeronaMalik, 0.1, [5, 7], &[1.0, 0.0]);
         let csv = csv(&[wide.clone(), narrow.clone()]);
         assert_eq!(
             csv,
-            "sigma,window,largest,grew 0,grew 2,grew 4\n0.1,3,7,0.625000,0.125000,0.250000\n0.1,5,7,0.500000,0.500000,\n"
+            "centre,sigma,window,largest,grew 0,grew 2,grew 4\nmedian,0.1,3,7,0.625000,0.125000,0.250000\n\
+             perona-malik,0.1,5,7,0.500000,0.500000,\n"
         );
         let table = table(&[wide, narrow]);
         assert!(table.contains("62.50 %") && table.lines().count() == 3, "{table}");

@@ -1,7 +1,8 @@
 //! The sliders of the view: one table with their names, ranges and the settings that they change.
 
 use crate::scene::{
-    Bilateral, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin, Smooth, Transfer,
+    Bilateral, EnhancedSigma, Layout, MAX_DEVIATION, Mode, Occlusion, Scene, Settings, Shading, Shadow, Sigma, Skin,
+    Smooth, Transfer,
 };
 
 /// A group of sliders in the panel.
@@ -266,6 +267,11 @@ pub const SLIDERS: &[Slider] = &[
         |s| s.slices.sigma.map_or(0.0, |f| f.sigma),
         |s, v| s.slices.sigma = sigma(s.slices.sigma, v),
     ),
+    slider("Speckle, enhanced", "", Filters, [0.0, 0.5], 0.01).reruns().of(
+        always,
+        |s| s.slices.enhanced_sigma.map_or(0.0, |f| f.sigma),
+        |s, v| s.slices.enhanced_sigma = enhanced_sigma(s.slices.enhanced_sigma, v),
+    ),
     slider("Picture speckle", "", Filters, [0.0, 0.5], 0.01).of(
         always,
         |s| s.post.sigma.map_or(0.0, |f| f.sigma),
@@ -342,6 +348,10 @@ fn with_strength<T: Copy + Default>(effect: Option<T>, value: f64, strength: fn(
 
 fn sigma(filter: Option<Sigma>, value: f64) -> Option<Sigma> {
     (value > 0.0).then(|| Sigma { sigma: value, ..filter.unwrap_or_default() })
+}
+
+fn enhanced_sigma(filter: Option<EnhancedSigma>, value: f64) -> Option<EnhancedSigma> {
+    (value > 0.0).then(|| EnhancedSigma { sigma: value, ..filter.unwrap_or_default() })
 }
 
 fn window(s: &Settings) -> [f64; 2] {

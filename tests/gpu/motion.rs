@@ -219,10 +219,16 @@ fn a_ball_swept_both_ways_does_not_move() {
 /// The ball of the phantom, swept in both directions with a moving motor: the two distance maps, in one view.
 #[test]
 fn the_phantom_does_not_move_between_forward_and_backward_sweeps() {
-    use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Truth};
+    use echolume::source::phantom::{Body, Phantom, PhantomOptions as Made, Speckle, Truth};
     let device = Device::new();
-    let made =
-        Made { body: Body::Sphere, volumes: 2, both_ways: true, speckle: false, speed_ratio: 0.9, ..Made::default() };
+    let made = Made {
+        body: Body::Sphere,
+        volumes: 2,
+        both_ways: true,
+        speckle: Speckle::None,
+        speed_ratio: 0.9,
+        ..Made::default()
+    };
     let phantom = Phantom::new(made).expect("phantom");
     let Truth::Sphere { centre, radius, .. } = phantom.truth() else { panic!("a sphere") };
     let depth = centre.y - phantom.probe(0).array_radius();

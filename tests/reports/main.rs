@@ -5,6 +5,7 @@ mod commands;
 #[path = "../common/mod.rs"]
 mod common;
 mod error_report;
+mod filters;
 mod profile;
 mod scenes;
 mod thesis_tables;

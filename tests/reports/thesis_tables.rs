@@ -8,7 +8,7 @@ use echolume::picture::Grey;
 use echolume::plan::Plan;
 use echolume::reference;
 use echolume::scene::{MAX_WINDOW, Scene};
-use echolume::thesis_tables::growth::{Growth, SIGMAS, WINDOWS, growth, growth_settings};
+use echolume::thesis_tables::growth::{CENTRES, Growth, SIGMAS, WINDOWS, growth, growth_settings};
 use echolume::thesis_tables::measure::{BALL_RADIUS, TableOptions, run, scene, surface_depth, sweep_frames};
 use echolume::thesis_tables::{Conditions, Filter3d, export, tables};
 
@@ -132,16 +132,18 @@ fn growth_is_the_reference_s() {
     let values = (0..32).flat_map(|y| (0..40).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect();
     let grey = Grey { width: 40, height: 32, sixteen: false, values, from_colour: false };
     let grown = growth(&device(), "edge.png", &grey).expect("growth");
-    let asked: Vec<_> = grown.rows.iter().map(|r| (r.sigma, r.windows)).collect();
-    let expected: Vec<_> = SIGMAS.iter().flat_map(|s| WINDOWS.iter().map(move |w| (*s, *w))).collect();
+    let asked: Vec<_> = grown.rows.iter().map(|r| (r.centre, r.sigma, r.windows)).collect();
+    let pairs = || SIGMAS.iter().flat_map(|s| WINDOWS.iter().map(move |w| (*s, *w)));
+    let expected: Vec<_> = CENTRES.iter().flat_map(|c| pairs().map(move |(s, w)| (*c, s, w))).collect();
     assert_eq!(asked, expected);
     assert!(WINDOWS.iter().flatten().all(|w| *w <= MAX_WINDOW));
     let frame = Texels { size: [40, 32, 1], channels: 1, values: grey.shares() };
     for row in &grown.rows {
         let scene =
-            echolume::thesis_tables::growth::scene_of(&grey, growth_settings(row.sigma, row.windows)).expect("scene");
+            echolume::thesis_tables::growth::scene_of(&grey, growth_settings(row.centre, row.sigma, row.windows))
+                .expect("scene");
         let slots = reference::render(&scene, std::slice::from_ref(&frame));
-        let reference = Growth::new(row.sigma, row.windows, &slots[&Slot::Growth].values);
+        let reference = Growth::new(row.centre, row.sigma, row.windows, &slots[&Slot::Growth].values);
         // A pixel whose count depends on rounding may stop a ring earlier or later.
         let moved: u64 = row.counts.iter().zip(&reference.counts).map(|(a, b)| a.abs_diff(*b)).sum();
         assert!(moved <= 2 * 40 * 32 / 200, "{row:?} {reference:?}");

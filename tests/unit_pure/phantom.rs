@@ -3,7 +3,7 @@
 
 use crate::common::files::Folder;
 use echolume::probe::{Advance, Geometry, Indices, Probe};
-use echolume::source::phantom::{Body, DYNAMIC_RANGE, Phantom, PhantomOptions, Truth};
+use echolume::source::phantom::{Body, DYNAMIC_RANGE, Phantom, PhantomOptions, Speckle, Truth};
 use echolume::source::{Frame, Recording};
 use std::fs;
 
@@ -37,7 +37,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
         let first = bytes(small(body));
         assert!(first == bytes(small(body)), "{body}");
         assert!(first != bytes(PhantomOptions { seed: 2, ..small(body) }), "{body}");
-        let bare = |seed| bytes(PhantomOptions { seed, speckle: false, ..small(body) });
+        let bare = |seed| bytes(PhantomOptions { seed, speckle: Speckle::None, ..small(body) });
         assert!(bare(1) == bare(2), "{body}: the seed is the speckle's alone");
     }
 }
@@ -82,7 +82,8 @@ const ROUNDING: f64 = 0.501;
 #[test]
 fn greys_without_speckle_are_the_formula_on_every_sample_both_ways() {
     for body in [Body::Sphere, Body::Step, Body::Wires, Body::Constant, Body::Ramp] {
-        let options = PhantomOptions { speckle: false, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
+        let options =
+            PhantomOptions { speckle: Speckle::None, volumes: 2, both_ways: true, speed_ratio: 0.5, ..small(body) };
         let phantom = phantom(options);
         let truth = phantom.truth();
         let mut shown = [255.0f64, 0.0];
@@ -142,7 +143,7 @@ fn speckle_leaves_the_body_where_it_is() {
 /// The head moves: volumes differ by more than their speckle seeds, and differ without speckle too.
 #[test]
 fn the_head_is_bright_in_dark_fluid_and_moves() {
-    let phantom = phantom(PhantomOptions { speckle: false, volumes: 6, ..small(Body::Head) });
+    let phantom = phantom(PhantomOptions { speckle: Speckle::None, volumes: 6, ..small(Body::Head) });
     let grey_at = |volume: usize, place: [f64; 3]| {
         let probe = phantom.probe(volume);
         let at = probe.to_indices(place.into());
@@ -255,4 +256,42 @@ fn impossible_sweeps_and_files_are_refused_in_one_line() {
     let long = phantom(PhantomOptions { volumes: 10_000, ..ok });
     assert!(long.write(&folder.join("long.mha")).unwrap_err().to_string().contains("volumes"));
     assert!(folder.names().iter().eq(["folder.mha"]), "something half done is left: {:?}", folder.names());
+}
+
+#[test]
+fn the_mean_over_all_speckle_is_the_mean_of_many_realisations() {
+    const SEEDS: u64 = 150;
+    for body in [Body::Head, Body::Wires] {
+        let sweep =
+            |seed, speckle| bytes(PhantomOptions { seed, speckle, frames: 3, lines: 32, samples: 128, ..small(body) });
+        let mean = sweep(1, Speckle::Mean);
+        let mut sums = vec![[0.0; 2]; mean.len()];
+        for seed in 0..SEEDS {
+            for (sum, grey) in sums.iter_mut().zip(sweep(seed, Speckle::Random)) {
+                sum[0] += f64::from(grey);
+                sum[1] += f64::from(grey).powi(2);
+            }
+        }
+        let count = SEEDS as f64;
+        // Differences in standard errors, with half a grey value for the rounding of the mean and for what is cut off above.
+        let mut excess: Vec<f64> = Vec::new();
+        let mut total = 0.0;
+        for (mean, [sum, squares]) in mean.iter().zip(&sums) {
+            let found = sum / count;
+            let error = ((squares / count - found * found).max(0.0) / count).sqrt();
+            excess.push((f64::from(*mean) - found).abs() / (error + 0.5));
+            total += f64::from(*mean) - found;
+        }
+        excess.sort_by(f64::total_cmp);
+        let p99 = excess[excess.len() * 99 / 100];
+        println!(
+            "{body}: 99 % within {p99:.2} standard errors, mean difference {:.3} grey values",
+            total / mean.len() as f64
+        );
+        // Of a normal distribution 99 % lie within 2.6.
+        assert!(p99 < 3.0, "{body}: {p99}");
+        assert!((total / mean.len() as f64).abs() < 0.3, "{body}");
+        // It is not simply the echogenicity.
+        assert!(mean != sweep(1, Speckle::None), "{body}");
+    }
 }

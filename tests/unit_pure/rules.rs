@@ -59,6 +59,8 @@ fn no_layer_uses_a_layer_above_it() {
         ("src/profile", &["crate::verify", "crate::error_report", "ash::vk"]),
         ("src/error_report", &["crate::verify", "ash::vk"]),
         ("src/thesis_tables", &["crate::verify", "ash::vk"]),
+        ("src/filter_report", &["crate::verify", "ash::vk"]),
+        ("src/canvas.rs", &["crate::gpu", "crate::error_report", "crate::filter_report", "ash::vk"]),
         ("src/reference", &["crate::gpu", "ash::vk"]),
         ("src/bounds", &["crate::gpu", "crate::plan", "crate::error_report", "ash::vk"]),
         ("src/exact_ray", &["crate::gpu", "crate::plan", "crate::reference", "crate::error_report", "ash::vk"]),

@@ -212,6 +212,18 @@ pub enum Estimator {
     NagaoMatsuyama,
 }
 
+impl Estimator {
+    /// The name in settings and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Estimator::Median => "median",
+            Estimator::PeronaMalik => "perona-malik",
+            Estimator::GradientInverse => "gradient-inverse",
+            Estimator::NagaoMatsuyama => "nagao-matsuyama",
+        }
+    }
+}
+
 /// Anisotropic diffusion with four neighbours (Perona and Malik 1990; thesis 5-9..5-12).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
@@ -270,7 +282,8 @@ pub enum Scheme {
     Rkl1,
 }
 
-/// Conductance as a function of the difference g of two neighbours.
+/// Conductance as a function of the difference g of two neighbours: the two of Perona and Malik (1990, section V), which the thesis takes
+/// over (5.4.2). What each favours is the paper's word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Conductance {

@@ -40,6 +40,27 @@ const SOUND_SPEED: f64 = 1540.0;
 /// Most samples of one volume. Its complex field takes eight bytes a sample.
 const MAX_VOLUME_SAMPLES: usize = 1 << 25;
 
+/// What becomes of the unresolved scatterers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speckle {
+    /// One realisation, as a probe sees it.
+    Random,
+    /// The mean grey value over all realisations, blurred by the probe: what a filter of speckle should find.
+    Mean,
+    /// None: samples are the exact echogenicity, without the blur of the probe.
+    None,
+}
+
+impl Speckle {
+    fn name(self) -> &'static str {
+        match self {
+            Speckle::Random => "true",
+            Speckle::Mean => "mean",
+            Speckle::None => "false",
+        }
+    }
+}
+
 /// What to simulate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhantomOptions {
@@ -50,8 +71,7 @@ pub struct PhantomOptions {
     pub volumes: usize,
     /// Every second volume is swept backwards.
     pub both_ways: bool,
-    /// Adds speckle. Without it samples are the exact echogenicity.
-    pub speckle: bool,
+    pub speckle: Speckle,
     /// Fraction of the distance to the next frame that the motor travels while one frame is acquired, 0..=1.
     pub speed_ratio: f64,
     /// Frames a volume, 2..=1024.
@@ -69,7 +89,7 @@ impl Default for PhantomOptions {
             body: Body::Head,
             volumes: 1,
             both_ways: false,
-            speckle: true,
+            speckle: Speckle::Random,
             speed_ratio: 0.0,
             frames: 37,
             lines: 128,
@@ -173,8 +193,9 @@ impl Phantom {
         // Scatterers at rest give the same speckle in every volume. Those of a moving body do not.
         let noise_of_volume = if self.options.body == Body::Head { volume as u64 } else { 0 };
         let slices: Vec<Vec<u8>> = match self.options.speckle {
-            true => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
-            false => echoes.par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect(),
+            Speckle::Random => speckle::slices(&echoes, &probe, self.options.seed, noise_of_volume),
+            Speckle::Mean => speckle::mean_slices(&echoes, &probe),
+            Speckle::None => echoes.par_iter().map(|slice| slice.iter().map(|e| grey(e.bare())).collect()).collect(),
         };
         let mut made: Vec<Frame> = slices
             .into_iter()
@@ -249,7 +270,9 @@ fn probe_file(phantom: &Phantom) -> String {
     let options = phantom.options();
     let mut text = format!(
         "# Probe of a phantom sweep: body {}, seed {}, speckle {}. Lengths in mm, angles in degrees.\n",
-        options.body, options.seed, options.speckle
+        options.body,
+        options.seed,
+        options.speckle.name()
     );
     let probe = phantom.probe(0);
     // Writing to a String cannot fail.

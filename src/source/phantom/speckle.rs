@@ -117,21 +117,88 @@ pub(super) fn slices(echoes: &[Vec<Echo>], probe: &Probe, seed: u64, volume: u64
         .enumerate()
         .map(|(slice, echoes)| blur.apply(scattered(echoes, stream(seed, volume, slice as u64))))
         .collect();
-    let reach = (3.0 * ELEVATION).ceil() as isize;
     (0..fields.len())
         .into_par_iter()
         .map(|slice| {
-            let near = (-reach..=reach)
-                .filter_map(|k| fields.get(slice.checked_add_signed(k)?).map(|f| (f, bell(k as f32, ELEVATION))));
+            let near = across_slices(slice, fields.len());
             // At the ends of the fan the existing frames carry all the power.
             let power: f32 = near.clone().map(|(_, w)| w * w).sum();
             let mut sum = Field::silent(echoes[slice].len());
-            for (field, weight) in near {
-                sum.add(field, weight / power.sqrt());
+            for (other, weight) in near {
+                sum.add(&fields[other], weight / power.sqrt());
             }
             sum.re.iter().zip(&sum.im).map(|(re, im)| grey(10.0 * (re * re + im * im + 1e-20).log10())).collect()
         })
         .collect()
+}
+
+/// Grey values of all slices of a volume as their mean over all speckle, in geometric order like `echoes`: the frame that a filter of speckle
+/// should find. The power of the scatterers is blurred by the square of the point-spread function, the specular echo by the function itself.
+pub(super) fn mean_slices(echoes: &[Vec<Echo>], probe: &Probe) -> Vec<Vec<u8>> {
+    let blur = Blur::new(probe);
+    let squared = blur.squared();
+    // Amplitude of the specular echo, power of the scatterers.
+    let parts: Vec<[Vec<f32>; 2]> = echoes
+        .par_iter()
+        .map(|echoes| {
+            let is_mirror = |e: &Echo| e.mirror > Echo::SILENT.mirror;
+            let mirror = echoes.iter().map(|e| if is_mirror(e) { root(e.mirror) * MIRROR } else { 0.0 });
+            let power = echoes.iter().map(|e| root(e.diffuse).powi(2));
+            [blur.both_ways(&mirror.collect::<Vec<_>>()), squared.both_ways(&power.collect::<Vec<_>>())]
+        })
+        .collect();
+    (0..parts.len())
+        .into_par_iter()
+        .map(|slice| {
+            let near = || across_slices(slice, parts.len());
+            let power: f32 = near().map(|(_, w)| w * w).sum();
+            let mean = |i: usize| {
+                let mirror: f32 = near().map(|(k, w)| w * parts[k][0][i]).sum();
+                let scattered: f32 = near().map(|(k, w)| w * w * parts[k][1][i]).sum();
+                mean_grey(f64::from(scattered / power), f64::from(mirror * mirror / power))
+            };
+            (0..echoes[slice].len()).map(mean).collect()
+        })
+        .collect()
+}
+
+/// Mean grey value of an echo of which the scatterers and the specular part have these mean powers, re full scale.
+///
+/// Without a specular part the power is exponential with the mean d, and the mean of max(0, ln(p / p0)) is E1(p0 / d), where p0 is the foot of
+/// the dynamic range. With a specular part m it is Rician, and the mean of ln p is ln m + E1(m / d). Each of them is
+/// a lower bound; the other is lower still where it does not hold.
+fn mean_grey(scattered: f64, mirror: f64) -> u8 {
+    let foot = 10f64.powf(-DYNAMIC_RANGE / 10.0);
+    let alone = if scattered > 0.0 { exponential_integral(foot / scattered) } else { 0.0 };
+    let ratio = if scattered > 0.0 { exponential_integral(mirror / scattered) } else { 0.0 };
+    let both = if mirror > 0.0 { (mirror / foot).ln() + ratio } else { 0.0 };
+    (255.0 * alone.max(both) * 10.0 / std::f64::consts::LN_10 / DYNAMIC_RANGE).round() as u8
+}
+
+/// E1(x), the integral of e^-t / t from x > 0 to infinity, to 1e-12: the power series below 1, above it the continued fraction
+/// (Abramowitz and Stegun 5.1.11 and 5.1.22).
+fn exponential_integral(x: f64) -> f64 {
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    if x < 1.0 {
+        let (mut sum, mut power) = (-EULER - x.ln(), 1.0);
+        for k in 1..=20 {
+            power *= -x / f64::from(k);
+            sum -= power / f64::from(k);
+        }
+        return sum;
+    }
+    // From its tail, which is far beyond the precision from x = 1 on.
+    let tail = (1..=200).rev().fold(0.0, |tail, k| f64::from(k) / (1.0 + f64::from(k) / (x + tail)));
+    (-x).exp() / (x + tail)
+}
+
+/// The slices that the point-spread function of a slice reaches, with their weights.
+fn across_slices(slice: usize, count: usize) -> impl Iterator<Item = (usize, f32)> + Clone {
+    let reach = (3.0 * ELEVATION).ceil() as isize;
+    (-reach..=reach).filter_map(move |k| {
+        let other = slice.checked_add_signed(k).filter(|other| *other < count)?;
+        Some((other, bell(k as f32, ELEVATION)))
+    })
 }
 
 /// Noise of unit power times the square root of the echogenicity, plus the specular echo in phase.
@@ -202,8 +269,17 @@ impl Blur {
     }
 
     fn apply(&self, field: Field) -> Field {
-        let pass = |part: Vec<f32>| self.across(&self.along(&part));
-        Field { re: pass(field.re), im: pass(field.im) }
+        Field { re: self.both_ways(&field.re), im: self.both_ways(&field.im) }
+    }
+
+    fn both_ways(&self, part: &[f32]) -> Vec<f32> {
+        self.across(&self.along(part))
+    }
+
+    /// The square of the point-spread function, which blurs power.
+    fn squared(&self) -> Blur {
+        let square = |weights: &Vec<f32>| weights.iter().map(|w| w * w).collect();
+        Blur { samples: self.samples, axial: square(&self.axial), lateral: self.lateral.iter().map(square).collect() }
     }
 
     /// Along the lines.
@@ -271,4 +347,21 @@ fn gaussian_pair(stream: u64, counter: u64) -> (f32, f32) {
     let radius = (-2.0 * share.ln()).sqrt();
     let (sin, cos) = (phase * std::f32::consts::TAU).sin_cos();
     (radius * cos, radius * sin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponential_integral_has_its_tabulated_values() {
+        // Abramowitz and Stegun, tables 5.1 and 5.2; the last by its asymptotic series.
+        let table =
+            [(0.01, 4.037_929_576_538), (0.1, 1.822_923_958_419), (1.0, 0.219_383_934_396), (5.0, 1.148_295_591_3e-3)];
+        for (x, value) in table {
+            assert!((exponential_integral(x) / value - 1.0).abs() < 1e-10, "E1({x}) = {}", exponential_integral(x));
+        }
+        // Both forms meet.
+        assert!((exponential_integral(1.0 - 1e-9) - exponential_integral(1.0 + 1e-9)).abs() < 1e-8);
+    }
 }

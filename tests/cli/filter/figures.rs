@@ -94,8 +94,9 @@ fn reference(
 }
 
 /// The rows of a growth table: sigma, window, largest, and shares.
+/// The numbers of each line; a word is NaN.
 fn rows(csv: &str) -> Vec<Vec<f64>> {
-    let numbers = |l: &str| l.split(',').filter(|f| !f.is_empty()).map(|f| f.parse().expect("a number")).collect();
+    let numbers = |l: &str| l.split(',').filter(|f| !f.is_empty()).map(|f| f.parse().unwrap_or(f64::NAN)).collect();
     csv.lines().skip(1).map(numbers).collect()
 }
 
@@ -115,8 +116,8 @@ fn the_growth_table_is_that_of_the_filter() {
         &csv,
     ]);
     let table = rows(&fs::read_to_string(&csv).expect("the table"));
-    assert_eq!((table.len(), &table[0][..3]), (1, &[0.01, 3.0, 17.0][..]));
-    let shares = &table[0][3..];
+    assert_eq!((table.len(), &table[0][1..4]), (1, &[0.01, 3.0, 17.0][..]));
+    let shares = &table[0][4..];
     assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-5, "{shares:?}");
     // 92 rows of 100 grow by 3 rings; the second, third and fourth from an edge by 6, 5 and 4; the outermost, whose window starts
     // with 6 pixels, by 4. The outermost columns have another median.
@@ -129,23 +130,34 @@ fn the_growth_table_is_that_of_the_filter() {
     let noisy = folder.write("noisy.pgm", pgm(48, 40, false, |x, y| 100 + (noise(x, y) >> 10)));
     let said = done(&[&noisy, "--growth-table", "--csv", &csv]);
     let table = rows(&fs::read_to_string(&csv).expect("the table"));
-    let windows: Vec<[f64; 2]> = table[..6].iter().map(|r| [r[1], r[2]]).collect();
-    assert_eq!(windows, [[3., 17.], [5., 19.], [7., 19.], [9., 21.], [11., 21.], [13., 23.]], "Tables 7-9");
-    let sigmas: Vec<f64> = table.iter().step_by(6).map(|r| r[0]).collect();
-    assert_eq!((table.len(), sigmas), (18, vec![0.03, 0.1, 0.17]));
-    assert_eq!(said.lines().filter(|l| l.contains(" %")).count(), 18);
+    let windows: Vec<[f64; 2]> = table[..6].iter().map(|r| [r[2], r[3]]).collect();
+    assert_eq!(windows, [[3., 17.], [5., 19.], [7., 21.], [9., 21.], [11., 21.], [13., 23.]], "Tables 7-9");
+    let sigmas: Vec<f64> = table.iter().step_by(6).map(|r| r[1]).collect();
+    assert_eq!((table.len(), sigmas), (36, vec![0.03, 0.1, 0.17, 0.03, 0.1, 0.17]));
+    let centres: Vec<String> = fs::read_to_string(&csv)
+        .expect("the table")
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').next().unwrap_or("").into())
+        .collect();
+    assert!(
+        centres[..18].iter().all(|c| c == "median") && centres[18..].iter().all(|c| c == "perona-malik"),
+        "{centres:?}"
+    );
+    assert_eq!(said.lines().filter(|l| l.contains(" %")).count(), 36);
     let given = Grey::load(noisy.as_ref()).expect("input");
     let mut grown = 0.0;
-    for row in &table {
-        let [sigma, window, largest] = [row[0], row[1], row[2]];
-        let slices =
-            format!("enhanced_sigma = {{ window = {window}, largest = {largest}, sigma = {sigma}, growth = true }}");
+    for (row, centre) in table.iter().zip(&centres) {
+        let [sigma, window, largest] = [row[1], row[2], row[3]];
+        let keys =
+            format!("window = {window}, largest = {largest}, sigma = {sigma}, centre = '{centre}', growth = true");
+        let slices = format!("enhanced_sigma = {{ {keys} }}");
         let rings = &reference(&given, &slices)[&echolume::passes::Slot::Growth].values;
-        for (n, share) in row[3..].iter().enumerate() {
+        for (n, share) in row[4..].iter().enumerate() {
             let expected = rings.iter().filter(|r| **r == n as f64).count() as f64 / rings.len() as f64;
             assert!((share - expected).abs() < 4.0 / rings.len() as f64, "{row:?}: +{} is {expected}", 2 * n);
         }
-        grown += 1.0 - row[3];
+        grown += 1.0 - row[4];
     }
     assert!(grown > 0.5, "no window grows: {grown}");
 }
