@@ -109,9 +109,30 @@ Ray ray_of(ivec2 pixel) {
     return ray;
 }
 
-// Texture indices (column, row, slice) of a point in space; false outside the insonified region. No trigonometry: the look-up
-// table takes the tangent of half the angle about the wobble axis, z / (rho + y).
-bool locate(vec3 p, out vec3 texel) {
+// Limits of a place's coordinates in the sector: range, line, entry of the sweep table, slice. An index that rounding puts just
+// beyond the outermost frame is still inside.
+struct Sector {
+    vec4 low;
+    vec4 high;
+};
+
+Sector sector() {
+    float entries = 0.0, slices = 0.0;
+#ifdef SWEPT
+    entries = float(sweep_lut.entry.length() - 1);
+#ifdef NON_UNIFORM
+    slices = float(slice_table.entry.length() - 1);
+#else
+    slices = float(volume_last.z);
+#endif
+#endif
+    return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
+}
+
+// Texture indices (column, row, slice) of a point in space, and its coordinates in the sector; false outside the insonified
+// region. No trigonometry: the look-up table takes the tangent of half the angle about the wobble axis, z / (rho + y).
+bool locate(vec3 p, out vec3 texel, out vec4 place) {
+    place = vec4(0.0);
     if (SWEEP == 0) {
         texel = vec3((p.xy - grid_origin) * grid_density, (p.z - slice_origin) * slice_density);
         return true;
@@ -128,12 +149,10 @@ bool locate(vec3 p, out vec3 texel) {
         range = sqrt(x * x + y * y);
         line = x / max(range + y, 1e-20);
     }
-    bool inside = range >= range_low && range <= range_high && line >= line_low && line <= line_high;
-    float k = 0.0;
+    float e = 0.0, k = 0.0;
 #ifdef SWEPT
-    float e = (position - sweep_low) * sweep_density;
+    e = (position - sweep_low) * sweep_density;
     int last = sweep_lut.entry.length() - 1;
-    inside = inside && e >= 0.0 && e <= float(last);
     int i = clamp(int(e), 0, last - 1);
     k = mix(sweep_lut.entry[i], sweep_lut.entry[i + 1], clamp(e - float(i), 0.0, 1.0));
 #ifdef INTRA_FRAME_MOTION
@@ -153,16 +172,28 @@ bool locate(vec3 p, out vec3 texel) {
     float here = slice_table.entry[s].x + slice_table.entry[s].y * share;
     float next = slice_table.entry[s + 1].x + slice_table.entry[s + 1].y * share;
     k = float(s) + (k - here) / (next - here);
-    float final_slice = float(slices - 1);
 #else
     k -= advance * share;
-    float final_slice = float(volume_last.z);
 #endif
-    // An index that rounding puts just beyond the outermost frame is still inside.
-    inside = inside && k >= -1e-4 && k <= final_slice + 1e-4;
 #endif
     texel = vec3((vec2(x, y) - grid_origin) * grid_density, k);
-    return inside;
+    place = vec4(range, line, e, k);
+    Sector limits = sector();
+    return all(greaterThanEqual(place, limits.low)) && all(lessThanEqual(place, limits.high));
+}
+
+bool locate(vec3 p, out vec3 texel) {
+    vec4 place;
+    return locate(p, texel, place);
+}
+
+// Share of a step that is inside the sector, between the coordinates of an end inside and of one outside: along a step each
+// coordinate changes nearly evenly.
+float share_inside(vec4 inner, vec4 outer) {
+    Sector s = sector();
+    vec4 border = clamp(outer, s.low, s.high);
+    vec4 shares = mix(vec4(1.0), (border - inner) / (outer - inner), notEqual(outer, border));
+    return clamp(min(min(shares.x, shares.y), min(shares.z, shares.w)), 0.0, 1.0);
 }
 
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }

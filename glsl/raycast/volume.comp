@@ -98,10 +98,11 @@ void main() {
         const bool between = COMPOSITING >= 2;
         const float sample_at = between ? 0.0 : SAMPLE_AT;
         float front = 0.0;
+        vec4 front_place = vec4(0.0);
         bool front_inside = false;
         if (between) {
             vec3 texel;
-            front_inside = locate(ray.origin + ray.direction * ray.enter, texel);
+            front_inside = locate(ray.origin + ray.direction * ray.enter, texel, front_place);
             if (front_inside) front = sample_along(ray, 0, sample_at, texel, slices);
         }
         // One more than there are where their number comes from a logarithm, which rounding may lower.
@@ -111,10 +112,10 @@ void main() {
         for (int i = 0; i <= complete;) {
             int stop = complete + 1;
             bool front_known = false;
+            int to = i;
             if (SKIP == 1) {
                 const float place = between ? 1.0 : SAMPLE_AT;
                 RaySegment here = segment_at(ray, i, place);
-                int to = i;
                 while (here.kind == EMPTY && to < last) {
                     to = min(here.stop, last);
                     here = segment_at(ray, to, place);
@@ -137,17 +138,26 @@ void main() {
                 float length = min(length_of(ray, float(i)), path - from);
                 vec3 p = ray.origin + ray.direction * (ray.enter + from + (between ? 1.0 : 0.5) * length);
                 vec3 texel;
-                bool inside = locate(p, texel);
+                vec4 place;
+                bool inside = locate(p, texel, place);
                 if (length <= 0.0) continue;
                 vec4 entry;
                 if (between) {
                     float back = inside ? sample_along(ray, i + 1, sample_at, texel, slices) : 0.0;
-                    bool both = inside && front_inside;
-                    if (COMPOSITING == 3 && length < step_length) entry = short_step(front, back, absorption_scale * (length / step_length));
-                    else entry = looked_up_between(front, back);
+                    bool any_inside = inside || front_inside;
+                    // A step over the sector's border is as long as its part inside, and has the value of the end inside.
+                    if (SWEEP > 0 && inside != front_inside) {
+                        float share = inside ? share_inside(place, front_place) : share_inside(front_place, place);
+                        if (inside) from += length * (1.0 - share);
+                        length *= share;
+                    }
+                    float near = front_inside ? front : back, far = inside ? back : front;
+                    if (COMPOSITING == 3 && length < step_length) entry = short_step(near, far, absorption_scale * (length / step_length));
+                    else entry = looked_up_between(near, far);
                     front = back;
+                    front_place = place;
                     front_inside = inside;
-                    if (!both) continue;
+                    if (!any_inside) continue;
                 } else {
                     if (!inside) continue;
                     entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
@@ -168,7 +178,8 @@ void main() {
 #endif
                 if (EARLY_END == 1 && opacity >= opaque_enough) complete = stop = -1;
             }
-            if (front_known) front_inside = false;
+            // What is skipped next ends with a sample that this ray has not taken yet.
+            if (front_known && i < to) front_inside = false;
         }
     }
     imageStore(picture, pixel, vec4(colour, opacity));

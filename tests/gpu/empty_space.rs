@@ -1,10 +1,12 @@
 //! Empty-space skipping: rays that skip bricks make the same picture, bit for bit, as rays that take every sample; and bricks are skipped.
 
 use crate::common::gpu::*;
-use echolume::gpu::Renderer;
+use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Advance, Geometry, Probe};
-use echolume::scene::Scene;
+use echolume::scene::load::Layers;
+use echolume::scene::{Input, Scene};
+use echolume::source::Recording;
 use glam::DVec3;
 
 /// A shell with a knob on it in dark fluid, with speckle on both and a wall before them.
@@ -158,4 +160,34 @@ fn empty_space_skipping_changes_no_bit_in_any_mode() {
     println!("{tried} pictures, {leapt_far} with long leaps over a fifth of all bricks or more");
     // The smallest and the largest sample on a ray are found by ranges: 4 of 22 modes. A single frame has few bricks.
     assert!(2 * leapt_far > tried, "only {leapt_far} of {tried}");
+}
+
+/// The bone with steps of three voxels, so that a ray may leave an empty brick after one step: the next step begins with that sample.
+#[test]
+fn a_step_behind_a_single_skipped_one_has_its_front_sample() {
+    let device = Device::new();
+    let picture = |compositing: &str, brick: u32| {
+        let mut recording = Recording::open(&data("bone-l14/bone.mha"), None).expect("recording");
+        let input = Input { stored: recording.stored_type(), range: recording.range() };
+        let mut layers = Layers::default();
+        layers.preset("bone").expect("preset");
+        for set in ["mode=vr", "picture.size=[160,160]", "ray.step=0.9", "volume.threshold=0.4"] {
+            layers.set(set).expect("set");
+        }
+        layers.set(&format!("volume.compositing={compositing}")).expect("set");
+        layers.set(&format!("ray.brick={brick}")).expect("set");
+        let scene = Scene::new(recording.geometry(0), input, layers.finish().expect("settings")).expect("scene");
+        let mut renderer = Renderer::new(&device, scene, &RendererOptions::default()).expect("renderer");
+        while let Some(frame) = recording.next_frame().expect("frame") {
+            renderer.frame(frame.slice as u32, &frame.bytes, 0).expect("frame");
+        }
+        renderer.show(0).expect("show");
+        results(&mut renderer)
+    };
+    for compositing in ["pre-integrated", "exponential"] {
+        let expected = picture(compositing, 0);
+        for brick in [4, 9] {
+            assert!(expected == picture(compositing, brick), "{compositing}, bricks of {brick}: the picture differs");
+        }
+    }
 }

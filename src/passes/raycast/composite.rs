@@ -42,6 +42,11 @@ pub struct Place {
 
 /// What a ray goes through: red, green, blue, and the absorption over one reference length; none where nothing is.
 pub trait Medium {
+    /// The part of a step, from offset to offset, that is inside the medium; none if neither end is. A part that begins or ends within the
+    /// step has one value, that of the step's end inside.
+    fn part_inside(&self, step: [f64; 2]) -> Option<[f64; 2]> {
+        Some(step)
+    }
     fn at(&self, place: Place) -> Option<[f64; 4]>;
     /// Mean absorption, and mean colour weighted by it, over a step along which the value goes evenly from one end to the other.
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]>;
@@ -74,7 +79,7 @@ impl March {
         let (mut n, mut from) = (0.0, 0.0);
         while from < self.path {
             let to = offset(n + 1.0).min(self.path);
-            if let Some((emitted, a)) = self.step(medium, [from, to], n) {
+            if let Some(Step { part: [from, to], emitted, opacity: a }) = self.step(medium, [from, to], n) {
                 for (light, emitted) in light.iter_mut().zip(emitted) {
                     *light += (1.0 - opacity) * emitted;
                 }
@@ -92,28 +97,46 @@ impl March {
         ([light[0], light[1], light[2], opacity], hit)
     }
 
-    /// The light that a step emits towards the eye, and its opacity.
-    fn step(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<([f64; 3], f64)> {
-        let length = (to - from) / self.reference_length;
-        if self.rule == Rule::Exponential {
-            let [r, g, b, a] =
-                medium.self_attenuated(Place { offset: from, n }, Place { offset: to, n: n + 1.0 }, length)?;
-            return Some(([r, g, b], a));
-        }
-        let [r, g, b, kappa] = self.contribution(medium, [from, to], n)?;
-        let y = kappa * length;
-        let a = if self.rule == Rule::Riemann { y.min(1.0) } else { transfer::opacity(y) };
-        let emitted = if self.rule == Rule::PreIntegratedUnshaded { y } else { a };
-        Some(([r, g, b].map(|colour| emitted * colour), a))
-    }
-
-    fn contribution(&self, medium: &impl Medium, [from, to]: [f64; 2], n: f64) -> Option<[f64; 4]> {
-        match self.rule {
-            Rule::Riemann | Rule::Corrected => medium.at(Place { offset: (from + to) / 2.0, n: n + 0.5 }),
-            Rule::CorrectedLeft => medium.at(Place { offset: from, n }),
+    /// What a step adds to the ray.
+    fn step(&self, medium: &impl Medium, step: [f64; 2], n: f64) -> Option<Step> {
+        let ends = [Place { offset: step[0], n }, Place { offset: step[1], n: n + 1.0 }];
+        let middle = Place { offset: (step[0] + step[1]) / 2.0, n: n + 0.5 };
+        // Rules of one sample take its whole step; those of two, what is inside of it.
+        let (part, [front, back]) = match self.rule {
+            Rule::Riemann | Rule::Corrected | Rule::CorrectedLeft => (step, ends),
             Rule::PreIntegrated | Rule::PreIntegratedUnshaded | Rule::Exponential => {
-                medium.between(Place { offset: from, n }, Place { offset: to, n: n + 1.0 })
+                let part = medium.part_inside(step)?;
+                (
+                    part,
+                    [
+                        if part[0] > step[0] { ends[1] } else { ends[0] },
+                        if part[1] < step[1] { ends[0] } else { ends[1] },
+                    ],
+                )
             }
-        }
+        };
+        let length = (part[1] - part[0]) / self.reference_length;
+        let [r, g, b, kappa] = match self.rule {
+            Rule::Riemann | Rule::Corrected => medium.at(middle)?,
+            Rule::CorrectedLeft => medium.at(front)?,
+            Rule::PreIntegrated | Rule::PreIntegratedUnshaded => medium.between(front, back)?,
+            Rule::Exponential => {
+                let [r, g, b, opacity] = medium.self_attenuated(front, back, length)?;
+                return Some(Step { part, emitted: [r, g, b], opacity });
+            }
+        };
+        let y = kappa * length;
+        let opacity = if self.rule == Rule::Riemann { y.min(1.0) } else { transfer::opacity(y) };
+        let emitted = if self.rule == Rule::PreIntegratedUnshaded { y } else { opacity };
+        Some(Step { part, emitted: [r, g, b].map(|colour| emitted * colour), opacity })
     }
+}
+
+/// What one step adds to a ray.
+struct Step {
+    /// Where in the step it is: offsets.
+    part: [f64; 2],
+    /// Red, green and blue that leave the step towards the eye.
+    emitted: [f64; 3],
+    opacity: f64,
 }

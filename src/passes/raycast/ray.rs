@@ -226,6 +226,11 @@ impl<'a> Ray<'a> {
         self.origin + self.direction * (self.enter + offset)
     }
 
+    /// Whether a place that many mm behind the entry is in the insonified region.
+    pub fn is_inside(&self, offset: f64) -> bool {
+        texel(self.scene, self.place(offset)).is_some()
+    }
+
     /// The windowed sample at an offset, which is that of step `n`; none outside the insonified region. With the sliding
     /// filter it is the weighted mean of the samples of a cube around it that are inside.
     pub fn sample(&self, offset: f64, n: f64) -> Option<f64> {

@@ -189,6 +189,23 @@ impl RayMedium<'_> {
 }
 
 impl Medium for RayMedium<'_> {
+    fn part_inside(&self, step: [f64; 2]) -> Option<[f64; 2]> {
+        let is_inside = |offset: f64| self.ray.is_inside(offset);
+        match step.map(is_inside) {
+            [true, true] => Some(step),
+            [false, false] => None,
+            [front_inside, _] => {
+                // The sector's border, by bisection.
+                let [mut low, mut high] = step;
+                for _ in 0..40 {
+                    let middle = (low + high) / 2.0;
+                    *(if is_inside(middle) == front_inside { &mut low } else { &mut high }) = middle;
+                }
+                Some(if front_inside { [step[0], low] } else { [high, step[1]] })
+            }
+        }
+    }
+
     fn at(&self, place: Place) -> Option<[f64; 4]> {
         let value = self.ray.sample(place.offset, place.n)?;
         Some(self.tinted(looked_up(self.tables.of_steps, self.entries, value), place.offset))
