@@ -121,8 +121,8 @@ fn fit(scene: &Scene, distances: &Texels, head: &Head, mirror: DVec2) -> Fit {
 }
 
 /// Prevents a detector, a sweep map or a filter that finds a plausible surface in the wrong place. The surface is
-/// about 1 mm before the truth: the pulse and the Gaussian are that long, and 45 dB of compression make their fronts
-/// bright.
+/// about 1 mm before the truth: a wide beam meets the near side of a tilted surface first, and the pulse has a length
+/// (docs/validation.md).
 #[test]
 fn the_wobblers_head_is_found_where_it_was_simulated_and_not_mirrored() {
     let device = Device::new();
