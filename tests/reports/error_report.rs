@@ -3,7 +3,7 @@
 use crate::scenes::*;
 use echolume::error_report::dials::dial;
 use echolume::error_report::measure::{ErrorMeasurement, MeasureError, ReferenceChoice};
-use echolume::error_report::{Measure, Reference, Report};
+use echolume::error_report::{Measure, Point, Reference, Report};
 use echolume::scene::Scene;
 use echolume::scene::load::Layers;
 
@@ -77,8 +77,14 @@ fn errors_of_a_surface_fall_with_the_step_too() {
     // The default is the coarsest: a longer step is no other for the detector.
     assert!(points.len() >= 6 && dial.points.iter().position(|p| p.is_default) == Some(0), "{points:?}");
     assert!(dial.points.iter().all(|p| p.value <= dial.points[0].value), "{points:?}");
-    // The wall has bumps as narrow as the edge: single rays jump between two surfaces.
-    assert!(points[0].1 < 0.1 && points[0].1 > 5.0 * points[points.len() - 1].1, "{points:?}");
+    // The wall has bumps as narrow as the edge: single rays jump between two surfaces, and one of them alone is an RMSE of 0.02.
+    assert!(points[0].1 < 0.1 && points[0].1 > 3.0 * points[points.len() - 1].1, "{points:?}");
+    // The place of the others has an error that falls with the step: 0.07 to under 0.001 mm.
+    let place = |p: &Point| p.errors.mm.as_ref().and_then(|mm| mm.error.as_ref()).expect("surfaces").median;
+    let finest = dial.points.iter().min_by(|a, b| a.value.total_cmp(&b.value)).expect("points");
+    let (first, last) = (place(&dial.points[0]), place(finest));
+    println!("median of the place: {first} to {last} mm");
+    assert!(first > 30.0 * last, "{first} to {last} mm");
 }
 
 /// Prevents a filter that nobody asked for as the reference of the others: then the scene's own filter has the largest "error".
@@ -163,6 +169,6 @@ fn a_reference_without_hits_is_refused_by_name() {
     );
     let said = refused(&["mode=sr", "surface.threshold=0.95", "surface.rough=1"], "brick", ReferenceChoice::Exact);
     assert!(said.contains("surface.threshold=0.95") && !said.contains('\n'), "{said}");
-    let said = refused(&["mode=sr"], "step", ReferenceChoice::Exact);
+    let said = refused(&["mode=sr", "surface.rough=2"], "step", ReferenceChoice::Exact);
     assert!(said.contains("no exact reference") && said.contains("surface.rough=1"), "{said}");
 }

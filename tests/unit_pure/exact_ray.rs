@@ -292,7 +292,7 @@ fn projections_and_surfaces_of_a_real_sweep_are_the_limits_of_their_samples() {
     for (mode, limit) in [("mip", 4e-3), ("minip", 4e-3), ("xray", 2e-3), ("sr", 0.0)] {
         let settings = format!(
             "mode = '{mode}'\nslices = {{ pixels = 48 }}\nray = {{ step = 0.05 }}\n\
-             surface = {{ threshold = 0.08, rough = 1, edge = 3.0 }}"
+             surface = {{ threshold = 0.08, edge = 3.0 }}"
         );
         let (scene, frames) = wobbler_scene(&settings);
         let (scene, frames) = (&scene, &frames);

@@ -243,7 +243,8 @@ pub struct Surface {
     pub threshold: f64,
     /// Threshold of the rough detector. Absent: that of the fine one.
     pub rough_threshold: Option<f64>,
-    /// Step of the rough detector in fine steps, 1..=8; 1 disables it.
+    /// Step of the rough detector in fine steps, 1..=8; 1 disables it. It passes over specks and some noise, and misses walls that are weak or
+    /// thinner than its ring. The thesis has one of 2.
     pub rough: u32,
     /// Sign of the edge.
     pub sign: Sign,
@@ -267,7 +268,7 @@ impl Default for Surface {
             edge: None,
             threshold: 0.1,
             rough_threshold: None,
-            rough: 2,
+            rough: 1,
             sign: Sign::Bright,
             place: Place::Peak,
             number: 1,
