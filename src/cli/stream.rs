@@ -139,7 +139,7 @@ impl Stream {
                 break None;
             }
         };
-        all.add(&stream.take_statistics().map_err(fault)?);
+        all.add(&stream.take_final_statistics().map_err(fault)?);
         say!("in all    {}", all.line(stream.acquisition_time()));
         let counts = all.volumes;
         say!(

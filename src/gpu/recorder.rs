@@ -23,6 +23,8 @@ use std::sync::atomic::Ordering;
 const PARAMS_BYTES: u64 = 64 << 10;
 /// Capacity for time stamps.
 const STAMPS: u32 = 128;
+/// Maximum number of submissions of a command buffer whose time stamps wait to be read.
+const MAX_UNREAD: usize = 64;
 
 /// A dispatch of a pass, and everything it runs on.
 #[derive(Clone, Copy)]
@@ -52,6 +54,12 @@ pub struct Recorder {
     /// For a device without push descriptors.
     sets: DescriptorSets,
     pub stamps: Option<Stamps>,
+    /// Time stamps of earlier submissions that are done but not read.
+    unread: Vec<Stamps>,
+    /// Time stamps that were read, for later submissions.
+    spare: Vec<Stamps>,
+    /// Invocations are counted.
+    statistics: bool,
     /// The value of the timeline at which the last submission is done.
     done_at: u64,
     /// The last submission whose times were added.
@@ -86,6 +94,9 @@ impl Recorder {
             params_used: 0,
             sets: DescriptorSets::new(context),
             stamps,
+            unread: Vec::new(),
+            spare: Vec::new(),
+            statistics,
             done_at: 0,
             collected_to: 0,
             label,
@@ -128,17 +139,42 @@ impl Recorder {
         flush(&self.context.device, self.commands, vk::AccessFlags2::NONE);
     }
 
-    /// Adds the times of the last submission, once, when it is done.
+    /// Adds the times of the last submission, and of those that were set aside, once, when they are done.
     pub fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
+        let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
+        while let Some(stamps) = self.unread.first() {
+            timings.add(&stamps.read()?, bits, period);
+            self.spare.push(self.unread.remove(0));
+        }
         if self.collected_to == self.done_at {
             return Ok(());
         }
         self.wait(timelines)?;
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
-            let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
             timings.add(&stamps.read()?, bits, period);
         }
+        Ok(())
+    }
+
+    /// Waits for the last submission, and keeps its time stamps for a later [`Recorder::collect`]. Where too many wait already, its work is
+    /// counted as not timed.
+    pub fn set_aside(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
+        self.wait(timelines)?;
+        if self.collected_to == self.done_at {
+            return Ok(());
+        }
+        self.collected_to = self.done_at;
+        let Some(stamps) = &self.stamps else { return Ok(()) };
+        if self.unread.len() >= MAX_UNREAD {
+            timings.leave_out(stamps.count());
+            return Ok(());
+        }
+        let next = match self.spare.pop() {
+            Some(next) => Some(next),
+            None => Stamps::new(&self.context, self.queue, STAMPS, self.statistics)?,
+        };
+        self.unread.extend(std::mem::replace(&mut self.stamps, next));
         Ok(())
     }
 

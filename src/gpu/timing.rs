@@ -116,6 +116,11 @@ impl Stamps {
         unsafe { device.cmd_write_timestamp2(commands, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, at) };
     }
 
+    /// Number of pieces of work that were stamped.
+    pub(super) fn count(&self) -> u64 {
+        self.between.len() as u64
+    }
+
     /// The measured work. The device must be done with the command buffer.
     pub fn read(&self) -> Result<Vec<Stamp>, GpuError> {
         let ticks = self.results(self.pool, self.between.len() as u32 + 1)?;
@@ -156,6 +161,8 @@ impl Drop for Stamps {
 /// Times measured since they were last taken.
 pub struct Timings {
     times: Vec<PassTime>,
+    /// Passes and copies that could not be timed.
+    untimed: u64,
     spans: Option<SpanLog>,
 }
 
@@ -175,7 +182,7 @@ impl Timings {
             began: Instant::now(),
             anchor: (0, 0.0),
         });
-        Timings { times: Vec::new(), spans }
+        Timings { times: Vec::new(), untimed: 0, spans }
     }
 
     /// Runs host work, and records its span if spans are enabled.
@@ -208,6 +215,16 @@ impl Timings {
                 spans.list.push(Span { name, on_device: true, begin, end: begin + ns, invocations });
             }
         }
+    }
+
+    /// Counts work that cannot be timed.
+    pub fn leave_out(&mut self, count: u64) {
+        self.untimed += count;
+    }
+
+    /// Number of passes and copies since the last call that could not be timed.
+    pub fn take_untimed(&mut self) -> u64 {
+        std::mem::take(&mut self.untimed)
     }
 
     pub fn take_times(&mut self) -> Vec<PassTime> {
@@ -266,7 +283,7 @@ mod tests {
 
     #[test]
     fn runs_of_one_pass_are_added_up() {
-        let mut timings = Timings { times: Vec::new(), spans: None };
+        let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None };
         let stamp = |name, from, to| Stamp { name, from, to, invocations: None };
         timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
         timings.add(&[stamp("a", 5, 8)], 64, 1.0);

@@ -25,6 +25,8 @@ pub struct Statistics {
     /// From the arrival of each frame to the end of the first picture that shows it, us.
     pub latency: Histogram<u64>,
     pub passes: Vec<PassTime>,
+    /// Passes and copies that could not be timed.
+    pub untimed: u64,
 }
 
 impl Default for Statistics {
@@ -40,6 +42,7 @@ impl Default for Statistics {
             volumes: VolumeCounts::default(),
             latency,
             passes: Vec::new(),
+            untimed: 0,
         }
     }
 }
@@ -86,6 +89,7 @@ impl Statistics {
         self.volumes.left_out += later.volumes.left_out;
         // Cannot fail: both histograms have the same bounds.
         let _ = self.latency.add(&later.latency);
+        self.untimed += later.untimed;
         for pass in &later.passes {
             match self.passes.iter_mut().find(|p| p.name == pass.name) {
                 Some(sum) => {
@@ -134,6 +138,9 @@ impl Statistics {
         if !shown.is_empty() {
             let _ = write!(line, "  {}", shown.join(", "));
         }
+        if self.untimed > 0 {
+            let _ = write!(line, ", {} passes not timed", self.untimed);
+        }
         line
     }
 }
@@ -163,7 +170,11 @@ mod tests {
         ] {
             assert!(line.contains(part), "{part}: {line}");
         }
-        assert!(!line.contains("lost") && !line.contains('\n'), "{line}");
+        assert!(!line.contains("lost") && !line.contains("not timed") && !line.contains('\n'), "{line}");
+        let mut all = statistics.clone();
+        all.untimed = 3;
+        all.add(&Statistics { untimed: 2, ..Default::default() });
+        assert!(all.line(None).ends_with("scan_convert 1.00 ms x 74, 5 passes not timed"), "{}", all.line(None));
     }
 
     #[test]

@@ -459,6 +459,7 @@ impl Stream {
         self.statistics.time = self.began.elapsed();
         self.statistics.lost = self.feed.lost();
         self.statistics.passes = self.session.as_mut().map_or(Vec::new(), |session| session.renderer.times_so_far());
+        self.statistics.untimed = self.session.as_mut().map_or(0, |session| session.renderer.take_untimed());
         self.statistics.volumes = self.pool().map_or(VolumeCounts::default(), VolumePool::counts);
         Ok(self.statistics.clone())
     }
@@ -469,6 +470,14 @@ impl Stream {
         let since = total.since(&self.reported);
         self.statistics.latency.reset();
         self.reported = total;
+        Ok(since)
+    }
+
+    /// As [`Stream::take_statistics`], after all work in flight: every pass of every frame is timed or counted as not timed.
+    pub fn take_final_statistics(&mut self) -> Result<Statistics, StreamError> {
+        let passes = self.session.as_mut().map_or(Ok(Vec::new()), |session| session.renderer.take_times())?;
+        let mut since = self.take_statistics()?;
+        since.passes = passes;
         Ok(since)
     }
 

@@ -169,6 +169,26 @@ fn a_complete_volume_never_mixes_frames_of_two() {
     }
 }
 
+/// Prevents times that leave out the frames which arrive while a picture is drawn, without a word.
+#[test]
+fn every_pass_of_every_frame_is_timed_or_counted() {
+    let device = Device::new();
+    for (update, images) in [(Update::Whole, 3), (Update::Rolling, 2)] {
+        let options = live::StreamOptions { update, images, ..live::StreamOptions::default() };
+        let settings = settings("mode = 'mip'\nslices.median = true");
+        let frames = (0..12).flat_map(speckled);
+        let mut stream = stream(&device, events(header(0.3), frames), settings, options);
+        run(&mut stream, |_, _| {});
+        let statistics = stream.take_final_statistics().expect("statistics");
+        let runs = |name: &str| statistics.passes.iter().find(|p| p.name == name).map_or(0, |p| p.runs);
+        assert_eq!((statistics.frames, statistics.untimed), (108, 0));
+        for name in ["upload", "scan_convert", "median_slice"] {
+            assert_eq!(runs(name), 108, "{update:?}: {name}");
+        }
+        assert_eq!(u64::from(runs("raycast_projection")), statistics.pictures, "{update:?}");
+    }
+}
+
 /// Prevents work that grows with time: once all sweep directions have occurred, frames and pictures need no device memory, no
 /// pipeline and no wait for the device to be idle.
 #[test]
@@ -203,7 +223,7 @@ fn a_rolling_volume_shows_each_frame_and_ends_as_the_complete_one() {
     for queues in 1..=3 {
         let playing = Playing::new(queues);
         let device = &playing.device;
-        let toml = "mode = 'vr'\nslices.smooth = { elevation = 1.0 }";
+        let toml = "mode = 'vr'\nray.brick = 8\nslices.smooth = { elevation = 1.0 }";
         let options =
             live::StreamOptions { update: Update::Rolling, queues: Some(queues), ..live::StreamOptions::default() };
         let mut last = None;

@@ -17,6 +17,14 @@ impl InFlight {
         self.recorder.collect(timelines, timings)
     }
 
+    /// Waits until the entry is free, and keeps its time stamps for [`InFlight::collect`].
+    fn set_aside(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
+        if let Some(copier) = &mut self.copier {
+            copier.set_aside(timelines, timings)?;
+        }
+        self.recorder.set_aside(timelines, timings)
+    }
+
     /// Copies the staging buffer into an image, in a submission of its own if there is a queue for copies. The recorder of the
     /// frame is open afterwards.
     fn copy(
@@ -116,9 +124,9 @@ impl Renderer {
     fn wait_for_ring(&mut self) -> Result<(), GpuError> {
         let entry = &mut self.ring[self.ring_index];
         // Reading time stamps makes lavapipe wait for the complete device (Mesa 22.3, `lvp_GetQueryPoolResults`), also for a picture in
-        // flight. The times of this entry are then left out; frames between pictures give enough of them.
+        // flight. Those of this entry are then read when no picture is in flight.
         match self.drawing && self.context.candidate.is_software() {
-            true => entry.first().wait(&self.timelines),
+            true => entry.set_aside(&self.timelines, &mut self.timings),
             false => entry.collect(&self.timelines, &mut self.timings),
         }
     }

@@ -451,6 +451,11 @@ impl Renderer {
         Ok(self.timings.take_times())
     }
 
+    /// Number of passes and copies since the last call that could not be timed: too many frames arrived while a picture was drawn.
+    pub fn take_untimed(&mut self) -> u64 {
+        self.timings.take_untimed()
+    }
+
     /// As [`Renderer::take_times`], without waiting for work in flight.
     pub fn times_so_far(&mut self) -> Vec<PassTime> {
         self.timings.take_times()
