@@ -98,7 +98,11 @@ impl Plan {
             }
         }
         if self.slots.contains(&Slot::Volume) {
+            let _ = writeln!(text, "slices: {}", self.slice_path(scene));
             let _ = writeln!(text, "samples of the volume: {}", scene.sampling.words());
+            if let Some(choice) = scene.brick_choice() {
+                let _ = writeln!(text, "{choice}");
+            }
         }
         let (bounds, [columns, rows, slices]) = (&scene.visible_bounds, scene.volume_size());
         let span = |axis: usize| format!("{}..{}", bounds.low[axis], bounds.high[axis]);
@@ -118,6 +122,15 @@ impl Plan {
         }
         let _ = writeln!(text, "    {:<15} {:>12} bytes", "total", self.bytes(scene));
         text
+    }
+
+    /// How slices get into the 3D image.
+    fn slice_path(&self, scene: &Scene) -> String {
+        if chain::copied(scene).is_some() {
+            return "copied into the 3D image as they arrive, by no pass".into();
+        }
+        let last = self.steps_of(Frequency::Frame).last().map_or("no pass", |(_, step)| step.pass.name);
+        format!("{last}, the last pass of a frame, writes them into the 3D image")
     }
 
     /// What has to run again after a change from `old` to `new`; `self` is the plan of `new`. This does not depend on the meaning of

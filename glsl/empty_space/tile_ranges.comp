@@ -4,13 +4,13 @@
 #include "common.glsl"
 layout(constant_id = 0) const int TILE = 4;
 layout(scalar) uniform Params {
-    int slice; // the first updated slice
+#include "slice_params.glsl"
 };
 uniform texture3D volume;
 uniform writeonly image3D tile_ranges;
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID) + ivec3(0, 0, slice);
+    ivec3 at = ivec3(gl_GlobalInvocationID) + ivec3(first_column / TILE, first_row / TILE, slice);
     if (any(greaterThanEqual(at, imageSize(tile_ranges)))) return;
     ivec2 first = at.xy * TILE, last = textureSize(volume, 0).xy - 1;
     float low = 1.0, high = 0.0;

@@ -201,7 +201,7 @@ float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 // A texel, the next column's, the next row's, and the diagonal neighbour's, in units of NEIGHBOUR_UNIT.
 const float NEIGHBOUR_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
 vec4 neighbours_at(ivec3 at) {
-    uvec2 bits = texelFetch(packed_neighbours, at, 0).xy;
+    uvec2 bits = texelFetch(packed_neighbours, at - ivec3(first_packed_column, first_packed_row, 0), 0).xy;
     if (SAMPLING == 2) return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255);
     if (SAMPLING == 3) return vec4(ivec4(bits.xxyy >> uvec4(0, 16, 0, 16)) & 65535);
     return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));

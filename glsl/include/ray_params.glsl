@@ -11,6 +11,8 @@
     vec4 clip_3;
     vec3 brick_low;     // corner of the first brick, mm
     vec3 brick_density; // bricks per mm
+    int first_packed_column; // of packed neighbours, in the volume
+    int first_packed_row;
     float window_low;
     float window_scale;
     // Space to texture.

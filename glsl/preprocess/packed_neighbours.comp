@@ -1,5 +1,5 @@
 // Each texel of a slice with its neighbours one column and one row on, as they are stored. An interpolated sample then takes one
-// load per slice.
+// load per slice. What is made begins at the first visible column and row.
 // variants: plain
 #version 460
 #include "common.glsl"
@@ -25,16 +25,19 @@ uvec2 pair_at(ivec3 at, ivec2 last) {
 }
 
 void main() {
-    ivec3 at = ivec3(gl_GlobalInvocationID) * ivec3(RUN, 1, 1) + ivec3(first_column, first_row, slice);
+    ivec3 to = ivec3(gl_GlobalInvocationID) * ivec3(RUN, 1, 1) + ivec3(0, 0, slice);
     ivec3 size = imageSize(packed_neighbours);
-    if (any(greaterThanEqual(at, size))) return;
-    uvec2 here = pair_at(at, size.xy - 1);
+    if (any(greaterThanEqual(to, size))) return;
+    ivec3 at = to + ivec3(first_column, first_row, 0);
+    ivec2 last = textureSize(volume, 0).xy - 1;
+    uvec2 here = pair_at(at, last);
     for (int n = 0; n < RUN; ++n) {
-        uvec2 next = pair_at(at + ivec3(1, 0, 0), size.xy - 1);
+        uvec2 next = pair_at(at + ivec3(1, 0, 0), last);
         uvec2 bits = STORED == 0 ? uvec2(here.x | next.x << 8 | here.y << 16 | next.y << 24, 0)
                                  : uvec2(here.x | next.x << 16, here.y | next.y << 16);
-        if (at.x < size.x) imageStore(packed_neighbours, at, uvec4(bits, 0, 0));
+        if (to.x < size.x) imageStore(packed_neighbours, to, uvec4(bits, 0, 0));
         here = next;
         ++at.x;
+        ++to.x;
     }
 }

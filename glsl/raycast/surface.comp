@@ -5,6 +5,7 @@
 #version 460
 #include "common.glsl"
 layout(constant_id = 6) const int BEHIND = 0; // samples averaged behind the surface
+layout(constant_id = 15) const int ECHO = 1;  // 0: nothing reads the echo at the surface, and it is not stored
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
     float threshold;
@@ -128,5 +129,5 @@ void main() {
         found = false;
     }
     imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
-    imageStore(surface, pixel, vec4(found ? (PLACE > 0 ? top : first_echo) : 0.0, found ? 1.0 : 0.0, behind, 0.0));
+    if (ECHO == 1) imageStore(surface, pixel, vec4(found ? (PLACE > 0 ? top : first_echo) : 0.0, found ? 1.0 : 0.0, behind, 0.0));
 }

@@ -6,6 +6,9 @@
 #include "common.glsl"
 layout(constant_id = 0) const int POINT = 0; // 0: directional light, 1: point light
 layout(constant_id = 1) const int SKIN = 0;
+#ifndef COMPOSITED
+layout(constant_id = 4) const int ECHO = 1; // 0: neither texture nor skin needs the echo at the surface
+#endif
 #ifdef SHADOWED
 layout(constant_id = 2) const int DIMS_PIXEL = 0; // 1: a shadow dims ambient light too
 #endif
@@ -78,7 +81,8 @@ void main() {
     const vec4 echo = vec4(1.0, 1.0, 1.0, 0.0); // thickness is unknown
     const vec3 colour = vec3(1.0);
 #else
-    vec4 echo = texelFetch(surface, pixel, 0);
+    vec4 echo = vec4(1.0, 1.0, 1.0, 0.0);
+    if (ECHO == 1) echo = texelFetch(surface, pixel, 0);
     vec3 colour = vec3(mix(1.0, echo.x, texture_share * echo.y));
 #ifndef COLOURED
     colour *= surface_colour;

@@ -310,7 +310,7 @@ pub fn dial(name: &str, scene: &Scene) -> Result<Dial, String> {
         }
         "brick" => {
             need(marches, "leaps over nothing")?;
-            let now = s.ray.brick;
+            let now = scene.brick();
             let word = |n: u32| if n == 0 { "none".to_string() } else { format!("{n} texels") };
             let others = [0, 4, 8, 16, 32].into_iter().filter(|n| *n != now);
             let others = others.map(|n| at(word(n), &[format!("ray.brick={n}")], f64::from(n)));

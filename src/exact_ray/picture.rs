@@ -140,7 +140,9 @@ fn surfaces(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Eff
         let at = [n % size[0], n / size[0], 0];
         let (distance, surface) = found.map(|f| (f.0, f.1)).filter(|f| is_hit(f.0)).unwrap_or((MISS, [0.0; 4]));
         writes.get_mut("distance_map").set(at, &[distance]);
-        let map = writes.get_mut("surface");
-        map.set(at, &surface[..map.channels]);
+        if scene.lights_by_echo() {
+            let map = writes.get_mut("surface");
+            map.set(at, &surface[..map.channels]);
+        }
     }
 }

@@ -4,7 +4,7 @@
 
 use super::PASSES;
 use super::pass::{Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Link, Need, Params, Pass, RUN, Slot};
-use crate::scene::Scene;
+use crate::scene::{Rectangle, Scene, TILE};
 
 impl Chain {
     /// What the first link reads.
@@ -90,16 +90,8 @@ pub fn copied(scene: &Scene) -> Option<Slot> {
     if requested.next().is_none() && (filter.copies)(scene) { Chain::Slices.last(scene) } else { None }
 }
 
-/// Columns and rows of a slice that a pass makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rectangle {
-    pub first: [u32; 2],
-    pub size: [u32; 2],
-}
-
-/// Texels along an edge that a workgroup of the slices' filters makes, eight invocations of a run each: a rectangle begins and ends
-/// with complete workgroups, or at the slice's border.
-const WORKGROUP: u32 = 8 * RUN;
+// A rectangle begins and ends with complete workgroups of the slices' filters, eight invocations of a run each.
+const _: () = assert!(Rectangle::ALIGNMENT.is_multiple_of(8 * RUN));
 
 impl Pass {
     pub fn is_needed(&self, scene: &Scene) -> bool {
@@ -176,14 +168,7 @@ impl Pass {
             }
             _ => return None,
         }
-        let cut = |axis: usize| {
-            let (low, high) = (scene.visible_bounds.low[axis], scene.visible_bounds.high[axis]);
-            let first = low.saturating_sub(around[axis]) / WORKGROUP * WORKGROUP;
-            let end = high.saturating_add(around[axis]).next_multiple_of(WORKGROUP).min(scene.grid.size[axis]);
-            (first, end - first)
-        };
-        let (columns, rows) = (cut(0), cut(1));
-        Some(Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] })
+        Some(scene.visible_rectangle(around))
     }
 
     /// Invocations of a dispatch; of a slice only what is visible.
@@ -211,12 +196,18 @@ impl Pass {
         let Some(r) = self.rectangle(scene, args) else { return };
         for (name, kept) in before.iter() {
             let target = writes.get_mut(name);
+            let size = [kept.size[0], kept.size[1]];
+            if size == r.size.map(|n| n as usize) {
+                continue;
+            }
+            // A slice of tiles has one texel for each tile.
+            let texels = if size == scene.grid.size.map(|n| n as usize) { 1 } else { TILE as usize };
             for (x, y) in (0..kept.size[1]).flat_map(|y| (0..kept.size[0]).map(move |x| (x, y))) {
                 let made = [x, y]
                     .iter()
                     .zip(r.first)
                     .zip(r.size)
-                    .all(|((at, first), size)| (first as usize..(first + size) as usize).contains(at));
+                    .all(|((at, first), size)| (first as usize..(first + size) as usize).contains(&(at * texels)));
                 (0..kept.size[2]).filter(|_| !made).for_each(|z| target.set([x, y, z], kept.get([x, y, z])));
             }
         }

@@ -73,7 +73,7 @@ pub const TILE_RANGES: Pass = Pass {
     name: "tile_ranges",
     stage: Stage::Preprocess,
     frequency: Frequency::Volume,
-    link: Link::None,
+    link: Link::AfterSlices,
     shader: |_, _| "empty_space/tile_ranges.plain",
     needed: need,
     // A slice changes with the frames that are smoothed into it.

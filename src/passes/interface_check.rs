@@ -9,9 +9,9 @@ use crate::spirv::strip_bindings::strip_bindings;
 use crate::spirv::texture_to_storage::{ImageFormat, texture_to_storage};
 use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
-/// Textures that a shader declares and a pass may not bind: bricks and packed neighbours. Specialization constants say whether
-/// they are read.
-const OPTIONAL: [&str; 2] = ["bricks", "packed_neighbours"];
+/// Textures that a shader declares and a pass may not bind: bricks, packed neighbours, and the echo at a surface. Specialization
+/// constants say whether they are read or written.
+const OPTIONAL: [&str; 3] = ["bricks", "packed_neighbours", "surface"];
 
 /// A pass's shader without the textures that this scene does not have.
 ///

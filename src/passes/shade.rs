@@ -39,7 +39,7 @@ pub const LIGHT: Pass = Pass {
     },
     reads: |s, t| {
         let mut reads = vec![whole("distance_map", t.source())];
-        reads.extend((lit_thing(s) != Lit::Composited).then_some(whole("surface", Slot::Surface)));
+        reads.extend(s.lights_by_echo().then_some(whole("surface", Slot::Surface)));
         reads.extend((lit_thing(s) != Lit::Surface).then_some(whole("volume_layer", Slot::VolumeLayer)));
         reads.extend(casts_shadow(s).then_some(whole("shadow", Slot::Shadow)));
         reads.extend(is_occluded(s).then_some(whole("occlusion", Slot::Occlusion)));
@@ -69,6 +69,9 @@ pub const LIGHT: Pass = Pass {
         let dims_pixel = light.shadow.is_some_and(|shadow| shadow.dims == Dims::Pixel);
         let mut constants = vec![("POINT", light.position.is_some() as i32), ("SKIN", s.skin().is_some() as i32)];
         constants.extend(casts_shadow(s).then_some(("DIMS_PIXEL", dims_pixel as i32)));
+        if lit_thing(s) != Lit::Composited {
+            constants.push(("ECHO", s.lights_by_echo() as i32));
+        }
         if lit_thing(s) == Lit::Coloured {
             constants.push(("AMBIENT_ONLY", (s.settings.surface.colour == SurfaceColour::Rendered) as i32));
         }
@@ -162,8 +165,13 @@ fn lit(scene: &Scene, reads: &Arrays, x: usize, y: usize) -> Option<(DVec3, DVec
     let (ambient_colour, colour, found, behind) = match lit_thing(scene) {
         Lit::Composited => (DVec3::ONE, DVec3::ONE, 1.0, 1.0),
         lit => {
-            let surface = reads.get("surface").get([x, y, 0]);
-            let (echo, found, behind) = (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0));
+            let (echo, found, behind) = match scene.lights_by_echo() {
+                true => {
+                    let surface = reads.get("surface").get([x, y, 0]);
+                    (surface[0], surface[1], surface.get(2).copied().unwrap_or(0.0))
+                }
+                false => (1.0, 1.0, 0.0),
+            };
             let texture = 1.0 + (echo - 1.0) * light.texture * found;
             let colour = match lit {
                 Lit::Coloured => DVec3::from_slice(&reads.get("volume_layer").get([x, y, 0])[..3]),

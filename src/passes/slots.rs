@@ -140,10 +140,10 @@ slots! {
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
     /// The 3D texture that rays are cast through.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
-    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
-    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
+    /// Each texel of the visible columns and rows of the volume with its neighbours one column and one row on, as their bits.
+    PackedNeighbours = D::image("packed_neighbours", visible_volume, four_texels).multibuffered();
     /// Smallest and largest value of every tile of every slice.
-    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered();
+    TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear();
     /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
     BrickTable = D::table(
         "brick_table",
@@ -267,6 +267,12 @@ fn one_slice(scene: &Scene) -> Shape {
 
 fn volume(scene: &Scene) -> Shape {
     Shape::Three(scene.volume_size())
+}
+
+/// All slices, and the visible columns and rows of each: at least one.
+fn visible_volume(scene: &Scene) -> Shape {
+    let [columns, rows] = scene.visible_rectangle([0; 2]).size.map(|n| n.max(1));
+    Shape::Three([columns, rows, scene.slices()])
 }
 
 fn volume_format(scene: &Scene) -> Format {

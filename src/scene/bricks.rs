@@ -4,10 +4,12 @@
 
 use super::Scene;
 use super::region::insonified_box;
-use super::visible_bounds::reach;
+use super::visible_bounds::{marched_box, reach};
 use crate::probe::{Advance, Array, Geometry, Motion, Probe};
 use glam::DVec3;
 
+/// Edge of a brick where no setting says another, texels.
+const EDGE: u32 = 8;
 /// Size of the slice tiles whose minimum and maximum are stored, texels.
 pub const TILE: u32 = 4;
 /// Maximum number of bricks of a scene: a table of 8 MB.
@@ -69,11 +71,17 @@ impl Bricks {
 }
 
 impl Scene {
+    /// Edge of a brick, texels; 0 if none is asked for.
+    pub fn brick(&self) -> u32 {
+        self.settings.ray.brick.unwrap_or(EDGE)
+    }
+
     /// True if rays skip bricks.
     pub fn skips(&self) -> bool {
         let casts = self.composites() || self.detects_surface() || self.projects();
         let swept = self.probe().is_some_and(|p| !matches!(p.motion, Motion::Still { .. }));
-        if !casts || self.settings.ray.brick == 0 || (swept && self.settings.ray.entries < MIN_ENTRIES) {
+        let is_wanted = self.settings.ray.brick.map_or(self.bricks_pay, |edge| edge > 0);
+        if !casts || !is_wanted || (swept && self.settings.ray.entries < MIN_ENTRIES) {
             return false;
         }
         // No skipping where f32 cannot resolve positions to a brick's margin, as with a camera kilometres away.
@@ -83,10 +91,11 @@ impl Scene {
         farthest * 1e-6 < MARGIN * bricks.edge.min_element()
     }
 
-    /// The bricks of the whole insonified region, independent of the region of interest.
+    /// The bricks that rays may take samples in, on a lattice that does not depend on the region of interest. With
+    /// `slices.everything`, those of the whole insonified region: a region that is dragged then changes no table.
     pub fn bricks(&self) -> Bricks {
         let (low, high) = insonified_box(&self.geometry);
-        let size = f64::from(self.settings.ray.brick.max(TILE));
+        let size = f64::from(self.brick().max(TILE));
         let [x, y] = self.grid.pitch;
         let (pitch, first) = match &self.geometry {
             // Offset by half a texel, so that the samples of a brick of n texels lie between n + 1 texels.
@@ -101,7 +110,16 @@ impl Scene {
             let axis = (0..3).max_by(|a, b| n[*a].total_cmp(&n[*b])).unwrap_or(0);
             edge[axis] *= 2.0;
         }
-        Bricks { low, edge, count: count(edge).to_array().map(|n| n as u32) }
+        let count = count(edge);
+        // One brick more on each side than samples reach.
+        let (first, last) = match marched_box(self) {
+            Some((from, to)) => {
+                let first = (((from - low) / edge).floor() - 1.0).clamp(DVec3::ZERO, count - 1.0);
+                (first, (((to - low) / edge).ceil() + 1.0).clamp(first + 1.0, count))
+            }
+            None => (DVec3::ZERO, count),
+        };
+        Bricks { low: low + first * edge, edge, count: (last - first).to_array().map(|n| n as u32) }
     }
 
     /// Number of tiles along both axes of a slice, and number of slices.

@@ -16,8 +16,8 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     }
     within("ray.spread", settings.ray.spread, 0.0, 1.0)?;
     within("ray.samples_per_voxel", f64::from(settings.ray.samples_per_voxel.unwrap_or(1)), 1.0, 16.0)?;
-    if settings.ray.brick != 0 {
-        within("ray.brick", f64::from(settings.ray.brick), 4.0, 64.0)?;
+    if let Some(brick) = settings.ray.brick.filter(|brick| *brick != 0) {
+        within("ray.brick", f64::from(brick), 4.0, 64.0)?;
     }
     within("ray.entries", f64::from(settings.ray.entries), 2.0, 65536.0)?;
     if !matches!(settings.ray.sliding, 0 | 3 | 5) {

@@ -238,10 +238,10 @@ mod tests {
         let settings = layers.clone().finish().unwrap();
         assert_eq!((settings.ray.step, settings.camera.target, settings.distance.bilateral), (None, None, None));
         assert_eq!(settings.post.colour_map, super::super::ColourMap::None);
-        for wrong in ["ray.stp=none", "ray.brick=none", "mode=none", "light.shadow.depth=none"] {
+        for wrong in ["ray.stp=none", "ray.entries=none", "mode=none", "light.shadow.depth=none"] {
             assert!(layers.set(wrong).is_err(), "{wrong}");
         }
-        for (text, line) in [("[ray]\nbrick = 'none'", ""), ("[ray]\nstep = 'none'\nbrick = 'x'", "line 3")] {
+        for (text, line) in [("[ray]\nentries = 'none'", ""), ("[ray]\nstep = 'none'\nentries = 'x'", "line 3")] {
             let said = layers.add("scene.toml", text, None).unwrap_err().to_string();
             assert!(said.contains(line) && said.lines().count() == 1, "{said}");
         }

@@ -1,7 +1,8 @@
 //! Visible bounds: the texels of the volume that any sample of stage 2 may touch. Stage 1 computes only these (after Solteszova and
 //! others 2017, who filter only what a picture shows). They do not depend on the camera, which may move at any time.
 
-use super::{Layout, Mode, Scene, SliceGrid};
+use super::planes::{Plane, Tile};
+use super::{Mode, Scene, SliceGrid};
 use crate::probe::{Array, Geometry, Motion, Probe};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
@@ -47,6 +48,18 @@ impl VisibleBounds {
     }
 }
 
+/// Columns and rows of a slice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rectangle {
+    pub first: [u32; 2],
+    pub size: [u32; 2],
+}
+
+impl Rectangle {
+    /// Texels, a multiple of which each edge of a part of a slice lies at: that of the workgroups that make it, and of tiles.
+    pub const ALIGNMENT: u32 = 32;
+}
+
 /// The positions of the samples of a pass: inside a box and all half-spaces, or at most `reach` mm outside.
 struct Look {
     low: DVec3,
@@ -75,6 +88,19 @@ impl Scene {
         }
     }
 
+    /// The visible columns and rows of a slice and so many around them, extended to complete workgroups or the slice's border.
+    pub fn visible_rectangle(&self, around: [u32; 2]) -> Rectangle {
+        let cut = |axis: usize| {
+            let (low, high) = (self.visible_bounds.low[axis], self.visible_bounds.high[axis]);
+            let first = low.saturating_sub(around[axis]) / Rectangle::ALIGNMENT * Rectangle::ALIGNMENT;
+            let end =
+                high.saturating_add(around[axis]).next_multiple_of(Rectangle::ALIGNMENT).min(self.grid.size[axis]);
+            (first, end - first)
+        };
+        let (columns, rows) = (cut(0), cut(1));
+        Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] }
+    }
+
     /// Share of the volume's texels within the visible bounds.
     pub fn visible_share(&self) -> f64 {
         let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();
@@ -92,7 +118,28 @@ pub(super) fn of(scene: &Scene) -> VisibleBounds {
     looks(scene).iter().filter_map(|look| touched(scene, look)).fold(VisibleBounds::default(), VisibleBounds::with)
 }
 
+/// Corners of the box that holds every sample of every ray, mm in space; none if it may grow at any time, or no ray is cast.
+pub(super) fn marched_box(scene: &Scene) -> Option<(DVec3, DVec3)> {
+    if scene.settings.slices.everything {
+        return None;
+    }
+    let boxes = looks_of_rays(scene).into_iter().map(|look| (look.low - look.reach, look.high + look.reach));
+    boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
 fn looks(scene: &Scene) -> Vec<Look> {
+    let mut looks = looks_of_rays(scene);
+    if scene.cuts_planes() {
+        let (clips, sheet): (Vec<_>, _) = (scene.clips().collect(), scene.sheet());
+        looks.extend(sheet.tiles.iter().map(|tile| {
+            let planes = [clips.as_slice(), &tile_faces(scene, tile, sheet.pixel)].concat();
+            Look { low: scene.low, high: scene.high, planes, reach: 0.0 }
+        }));
+    }
+    looks
+}
+
+fn looks_of_rays(scene: &Scene) -> Vec<Look> {
     let clips: Vec<(DVec3, f64)> = scene.clips().collect();
     let look = |low, planes: &[_], steps| Look {
         low,
@@ -124,10 +171,17 @@ fn looks(scene: &Scene) -> Vec<Look> {
         }
         _ => {}
     }
-    if scene.is_flat() || scene.settings.layout == Layout::Four {
-        looks.push(look(scene.low, &clips, 0));
-    }
     looks
+}
+
+/// The half-spaces that bound the samples of a tile: its rectangle, as thick as the slab.
+fn tile_faces(scene: &Scene, tile: &Tile, pixel: f64) -> Vec<(DVec3, f64)> {
+    let Plane { at, right, down, normal } = tile.plane;
+    let [width, height] = tile.size.map(|n| f64::from(n) * pixel / 2.0);
+    // Slabs reach half of their thickness to either side.
+    let sides = [(right, width), (down, height), (normal, scene.settings.planes.thickness / 2.0)];
+    let faces = |(axis, half): (DVec3, f64)| [(axis, axis.dot(at) + half), (-axis, half - axis.dot(at))];
+    sides.into_iter().flat_map(faces).collect()
 }
 
 /// Maximum length of `steps` steps of a ray that are `step` mm long, mm. Growing steps keep growing outside the region.
@@ -213,7 +267,7 @@ fn touched(scene: &Scene, look: &Look) -> Option<VisibleBounds> {
 fn unswept(probe: &Probe, corners: &[DVec3], x: Span, y: Span, z: Span) -> (Span, Span, Span) {
     let Motion::Fan { .. } = probe.motion else { return (x, y, z) };
     let axis = probe.axis_depth();
-    // The whole sector, and with it the solid, lies beyond the wobble axis. A plane of constant angle divides the solid there, so that the
+    // What is drawn, and with it the solid, lies beyond the wobble axis. A plane of constant angle divides the solid there, so that the
     // extremes of the angle and the maximum distance from the axis lie at corners. The minimum distance may not.
     let beyond = Span((y.0 - axis).max(0.0), y.1 - axis);
     let angle = Span::of(corners.iter().map(|c| c.z.atan2((c.y - axis).max(1e-12))));

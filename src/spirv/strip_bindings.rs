@@ -1,15 +1,15 @@
 //! Removes bindings of textures that a module declares but a scene does not have. Specialization constants keep such
-//! textures from being read. Without this rewrite either a dummy texture would be bound or each combination would need a
+//! textures from being read or written. Without this rewrite either a dummy texture would be bound or each combination would need a
 //! shader variant of its own.
 
 use super::module::{HEADER_WORDS, Instruction, SpirvError, decode, encode, error, op, storage_class, text};
 use std::collections::HashSet;
 
 /// The module without the textures of these names. Texels fetched from them become undefined values, so no code that runs
-/// may use one. Names that the module does not have are ignored.
+/// may use one; texels stored to them are left out. Names that the module does not have are ignored.
 ///
 /// # Errors
-/// A module that breaks the format, or a texture that is used other than by fetches and size queries.
+/// A module that breaks the format, or a texture that is used other than by fetches, stores of texels and size queries.
 pub fn strip_bindings(words: &[u32], names: &[&str]) -> Result<Vec<u32>, SpirvError> {
     let instructions = decode(words)?;
     let stripped = Stripped::find(&instructions, names);
@@ -66,6 +66,7 @@ impl Stripped {
             (op::IMAGE_FETCH | op::IMAGE_QUERY_SIZE_LOD, [of, result, image, ..]) if is_stripped(image) => {
                 out.extend(encode(op::UNDEF, &[*of, *result]));
             }
+            (op::IMAGE_WRITE, [image, ..]) if is_stripped(image) => {}
             // Any other use of an image: calls, stores, copies, samples, selections.
             (
                 op::FUNCTION_CALL

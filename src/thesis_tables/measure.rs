@@ -144,7 +144,7 @@ pub fn scene(conditions: &Conditions) -> Result<Scene, SceneError> {
     settings.ray.step = Some(DEPTH / f64::from(n));
     settings.surface.edge = Some(Edge::Named(EdgeName::Samples));
     // The thesis takes every sample.
-    settings.ray.brick = 0;
+    settings.ray.brick = Some(0);
     settings.surface.rough = 1;
     settings.surface.place = Place::FirstCrossing;
     settings.distance.sigma = Some(Sigma { window: conditions.filter_2d, sigma: SIGMA, ..Sigma::default() });

@@ -54,7 +54,10 @@ fn surface_is_finite(device: &Device, name: &str, scene: Scene) {
         assert!(d.is_finite(), "{name}: {d}");
     }
     for slot in [Slot::Picture, Slot::Surface] {
-        let texels = renderer.read(slot).expect("read").expect("there");
+        let Some(texels) = renderer.read(slot).expect("read") else {
+            assert!(slot == Slot::Surface && !renderer.scene().lights_by_echo(), "{name}: slot '{}'", slot.name());
+            continue;
+        };
         assert!(texels.values.iter().all(|v| v.is_finite() && *v >= 0.0), "{name}: slot '{}'", slot.name());
     }
 }

@@ -9,7 +9,11 @@ use echolume::scene::Scene;
 
 fn of(toml: &str) -> Scene {
     let slices = if toml.contains("slices") { "" } else { "slices = { pixels = 40 }" };
-    scene(Geometry::Sweep(wobbler()), BYTES, &format!("{toml}\npicture = {{ size = [24, 24] }}\n{slices}"))
+    let mut scene =
+        scene(Geometry::Sweep(wobbler()), BYTES, &format!("{toml}\npicture = {{ size = [24, 24] }}\n{slices}"));
+    // So small a picture would not be worth its bricks.
+    scene.settings.ray.brick = Some(8);
+    scene
 }
 
 /// A mode with its settings, its passes, its slots.
@@ -32,17 +36,17 @@ const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'sr'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map surface picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map picture screen",
     ),
     (
         "mode = 'sr'\nsurface = { colour = 'rendered' }",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map surface volume_layer picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
     ),
     (
         "mode = 'mixed'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map surface volume_layer picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
     ),
     (
         "mode = 'mip'",
@@ -79,7 +83,7 @@ const MODES: &[(&str, &str, &str)] = &[
     (
         "mode = 'sr'\nlayout = '4up'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut tiles distance_map surface rendered planes picture screen",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut tiles distance_map rendered planes picture screen",
     ),
 ];
 

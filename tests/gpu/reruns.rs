@@ -120,8 +120,20 @@ fn a_scene_has_the_passes_and_slots_it_needs_and_no_others() {
     );
     assert_eq!(
         slots,
-        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map distance_a distance_b surface picture screen"
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut distance_map distance_a distance_b picture screen"
     );
+    // Texture and translucent skin take the echo at the surface, and nothing else does.
+    for (light, is_read) in [
+        ("texture = 0.5", true),
+        ("skin = {}", true),
+        ("skin = { translucency = 0.0 }", false),
+        ("shadow = {}, occlusion = {}", false),
+    ] {
+        for mode in ["sr", "mixed"] {
+            let (_, slots) = names(&format!("mode = '{mode}'\nlight = {{ {light} }}"));
+            assert_eq!(slots.split(' ').any(|s| s == "surface"), is_read, "{mode}, {light}");
+        }
+    }
     let (passes, slots) = names("mode = 'vr'\nslices = { sigma = { window = 5, sigma = 0.0 } }");
     assert_eq!(
         passes,

@@ -4,7 +4,7 @@ use crate::common::gpu::*;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, chain, is_hit};
-use echolume::plan::Rerun;
+use echolume::plan::{Plan, Rerun};
 use echolume::probe::Geometry;
 use echolume::scene::{Input, Sampling, Scene};
 use echolume::source::StoredType;
@@ -12,6 +12,8 @@ use glam::DVec3;
 
 const LOOK: &str =
     "picture.size = [72, 56]\ncamera = { azimuth = 25, elevation = -15 }\nray.step = 0.3\nsurface.edge = 1.2";
+
+const LOOK_COARSE: &str = "picture.size = [72, 56]\ncamera = { azimuth = 25, elevation = -15 }";
 
 fn volume(stored: StoredType, full: f64, toml: &str) -> Scene {
     scene(cartesian([24, 33, 11]), Input { stored, range: [0.0, full] }, &format!("{toml}\n{LOOK}"))
@@ -25,7 +27,9 @@ fn blob(p: DVec3) -> f64 {
 #[test]
 fn frames_in_the_volume_format_are_copied_without_a_pass() {
     let device = Device::new();
-    for (stored, full, format) in [(StoredType::U8, 255.0, "r8"), (StoredType::U16, 65535.0, "r16")] {
+    for (stored, full, format) in
+        [(StoredType::U8, 255.0, "r8"), (StoredType::U16, 65535.0, "r16"), (StoredType::F32, 1.0, "r32f")]
+    {
         for smooth in ["", ", smooth = { elevation = 1.0 }"] {
             let set = format!("mode = 'mip'\nslices = {{ format = '{format}'{smooth} }}");
             let scene = volume(stored, full, &set);
@@ -44,7 +48,8 @@ fn frames_in_the_volume_format_are_copied_without_a_pass() {
             // The same through a pass, into a finer format.
             let passed = scene.settings.clone();
             let mut passed = Scene::new(scene.geometry.clone(), scene.input, passed).expect("scene");
-            passed.settings.slices.format = echolume::scene::VolumeFormat::R32f;
+            use echolume::scene::VolumeFormat::{R16, R32f};
+            passed.settings.slices.format = if format == "r32f" { R16 } else { R32f };
             assert_eq!(chain::copied(&passed), None);
             let other = rendered(&device, passed, &frames).picture().expect("picture");
             let (_, largest) = difference(&renderer.picture().expect("picture"), &other);
@@ -59,10 +64,86 @@ fn scaled_clamped_or_filtered_frames_are_not_copied() {
     assert!(copied(StoredType::U8, 255.0, "slices.format = 'r8'").is_some());
     assert_eq!(copied(StoredType::U8, 200.0, "slices.format = 'r8'"), None, "another range");
     assert_eq!(copied(StoredType::U8, 255.0, "slices.format = 'r16'"), None, "another format");
-    assert_eq!(copied(StoredType::F32, 1.0, "slices.format = 'r32f'"), None, "floats may be beyond 0..1");
+    assert!(copied(StoredType::F32, 1.0, "slices.format = 'r32f'").is_some());
+    assert_eq!(copied(StoredType::F32, 2.0, "slices.format = 'r32f'"), None, "another range of floats");
+    assert_eq!(copied(StoredType::F32, 1.0, "slices.format = 'r16'"), None, "floats in another format");
     assert_eq!(copied(StoredType::U8, 255.0, "slices = { format = 'r8', median = true }"), None, "a filter");
     let polar = scene(Geometry::Sweep(wobbler()), BYTES, "slices.format = 'r8'");
     assert_eq!(chain::copied(&polar), None, "polar frames");
+}
+
+/// Floats beyond 0..1, and what is no number, are stored as a pass would store them.
+#[test]
+fn copied_floats_are_clamped() {
+    let device = Device::new();
+    let scene = volume(StoredType::F32, 1.0, "mode = 'mip'\nslices.format = 'r32f'");
+    assert_eq!(chain::copied(&scene), Some(Slot::Volume));
+    assert!(Plan::new(&scene).explain(&scene).contains("slices: copied into the 3D image"));
+    let values = [-3.0f32, -0.25, 0.0, 0.25, 1.0, 7.0, f32::INFINITY, f32::NAN];
+    let bytes: Vec<u8> = (0..24 * 33).flat_map(|n| values[n % 8].to_ne_bytes()).collect();
+    let mut renderer = Renderer::new(&device, scene, &RendererOptions::default()).expect("renderer");
+    (0..11).for_each(|slice| renderer.frame(slice, &bytes, 0).expect("frame"));
+    renderer.show(0).expect("show");
+    let there = renderer.read(Slot::Volume).expect("read").expect("there");
+    let expected = [0.0, 0.0, 0.0, 0.25, 1.0, 1.0, 1.0, 0.0];
+    assert!(there.values.iter().enumerate().all(|(n, v)| *v == expected[n % 8]));
+}
+
+/// Where a part of the columns and rows is seen, neighbours are packed of that part.
+#[test]
+fn packed_neighbours_and_bricks_are_as_large_as_what_is_seen() {
+    let device = Device::new();
+    let of = |toml: &str| {
+        let set = "mode = 'vr'\nslices.pixels = 200\nray = { sampling = 'quads', brick = 8, step = 0.3 }";
+        scene(Geometry::Sweep(wobbler()), BYTES, &format!("{set}\n{toml}\n{LOOK_COARSE}"))
+    };
+    let (all, part) = (of(""), of("region = { lateral = [-8, 4], depth = [22, 34] }"));
+    let bytes = |slot: Slot| (slot.bytes(&part) as f64) / slot.bytes(&all) as f64;
+    let share = part.visible_share();
+    assert!(share < 0.15, "{share}");
+    // Complete workgroups of 32 texels, and a brick more on each side.
+    assert!(bytes(Slot::PackedNeighbours) < 0.3, "{}", bytes(Slot::PackedNeighbours));
+    assert!(bytes(Slot::BrickRanges) < 0.3, "{}", bytes(Slot::BrickRanges));
+    let frames = body_frames(&all, |p| 0.5 + 0.4 * (p.x + 0.7 * p.y + p.z).sin());
+    let picture = |scene: &Scene| rendered(&device, scene.clone(), &frames).picture().expect("picture");
+    let everything = of("region = { lateral = [-8, 4], depth = [22, 34] }\nslices.everything = true");
+    assert_eq!(Slot::BrickRanges.bytes(&everything), Slot::BrickRanges.bytes(&all));
+    let seen = picture(&part);
+    assert!(seen.rgba.iter().any(|v| *v > 0 && *v < 255));
+    assert_eq!(seen.rgba, picture(&everything).rgba, "the same bits");
+    // To a smaller region and back. Neighbours and ranges were made of the smaller one, so that frames are asked for.
+    let mut renderer = rendered(&device, all.clone(), &frames);
+    let whole = renderer.picture().expect("picture");
+    assert!(matches!(renderer.change(part).expect("change"), Rerun::Steps { .. }));
+    assert_eq!(renderer.picture().expect("picture").rgba, seen.rgba);
+    assert_eq!(renderer.change(all).expect("change"), Rerun::Frames);
+    send(&mut renderer, &frames, 0);
+    assert_eq!(renderer.picture().expect("picture").rgba, whole.rgba);
+}
+
+/// Bricks are made where they are asked for, or where they save more than they take: in large pictures that composite.
+#[test]
+fn bricks_are_made_where_they_pay() {
+    let of = |toml: &str| {
+        let scene = scene(Geometry::Sweep(wobbler()), BYTES, &format!("slices.pixels = 96\n{toml}"));
+        let scene = scene.sampled(Sampling::PackedNeighbours);
+        let text = Plan::new(&scene).explain(&scene);
+        (scene.skips(), text.lines().find(|line| line.starts_with("bricks")).expect("said").to_string())
+    };
+    for (toml, skips, why) in [
+        ("mode = 'vr'\npicture.size = [512, 512]", true, "they pay"),
+        ("mode = 'vr'\npicture.size = [16, 16]", false, "none for one picture"),
+        ("mode = 'sr'\npicture.size = [512, 512]", false, "none for one picture"),
+        ("mode = 'sr'\npicture.size = [16, 16]\nslices.still = true", true, "many times"),
+        ("mode = 'sr'\npicture.size = [16, 16]\nray.brick = 8", true, "as set"),
+        ("mode = 'vr'\npicture.size = [512, 512]\nray.brick = 0", false, "as set"),
+    ] {
+        let (does, said) = of(toml);
+        assert_eq!(does, skips, "{toml}: {said}");
+        assert!(said.contains(why), "{toml}: {said}");
+    }
+    let on_a_gpu = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'sr'").sampled(Sampling::Hardware);
+    assert!(on_a_gpu.skips(), "what bricks cost a GPU has not been measured");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! image. If frames need no conversion, consecutive slices are copied in batches.
 
 use super::*;
+use crate::source::StoredType;
 
 impl InFlight {
     /// The recorder that reads the staging buffer.
@@ -103,7 +104,11 @@ impl Renderer {
         };
         let staging = self.ring[self.ring_index].staging.bytes_mut();
         let (from, to) = (offset + at, offset + at + bytes.len());
-        self.timings.host("stage", || staging[from..to].copy_from_slice(bytes));
+        let is_clamped = self.scene.input.stored == StoredType::F32 && chain::copied(&self.scene).is_some();
+        self.timings.host("stage", || match is_clamped {
+            true => copy_clamped(bytes, &mut staging[from..to]),
+            false => staging[from..to].copy_from_slice(bytes),
+        });
         if at + bytes.len() == frame_bytes {
             self.context.faults.frame(&self.scene, &mut staging[offset..offset + frame_bytes]);
         }
@@ -153,6 +158,15 @@ impl Renderer {
     /// Number of frames that were dropped because another began before all of their lines had arrived.
     pub fn incomplete_frames(&self) -> u64 {
         self.incomplete
+    }
+}
+
+/// Copies 32-bit floats, as 0..1: no pass clamps them where they are stored unchanged.
+fn copy_clamped(from: &[u8], to: &mut [u8]) {
+    for (from, to) in from.chunks_exact(4).zip(to.chunks_exact_mut(4)) {
+        let value = f32::from_ne_bytes([from[0], from[1], from[2], from[3]]);
+        let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
+        to.copy_from_slice(&value.to_ne_bytes());
     }
 }
 

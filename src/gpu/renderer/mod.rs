@@ -225,9 +225,21 @@ impl Renderer {
         self.unprocessed = vec![vec![true; self.scene.slices() as usize]; self.volume_images as usize];
     }
 
-    /// Allocates and fills the slots that are missing.
+    /// Allocates and fills the slots that are missing. What passes over the volume and the picture wrote into those that were replaced has
+    /// to be made again.
     fn fit(&mut self) -> Result<(), GpuError> {
         let new = self.slots.fit(&self.plan, &self.scene)?;
+        let mut is_volume_lost = false;
+        for (i, step) in self.plan.steps.iter().enumerate() {
+            let is_lost = step.writes(&self.scene).iter().any(|slot| new.iter().any(|(made, _)| made == slot));
+            if is_lost && step.pass.frequency != Frequency::Frame {
+                self.stale[i] = true;
+                is_volume_lost |= step.pass.frequency == Frequency::Volume;
+            }
+        }
+        if is_volume_lost {
+            self.invalidate_volumes();
+        }
         self.drawn &= !new.iter().any(|(slot, _)| *slot == Slot::Screen);
         if new.is_empty() {
             return Ok(());

@@ -14,7 +14,11 @@ pub const PASS: Pass = Pass {
     shader: |s, _| ray::variant!(s, "raycast/surface"),
     needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
     reads: |s, _| ray::marching_reads(s, empty_space::surface_skipping(s)),
-    writes: |_, _| vec![whole("distance_map", Slot::Distance), whole("surface", Slot::Surface)],
+    writes: |s, _| {
+        let mut writes = vec![whole("distance_map", Slot::Distance)];
+        writes.extend(s.lights_by_echo().then_some(whole("surface", Slot::Surface)));
+        writes
+    },
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
@@ -46,6 +50,7 @@ pub const PASS: Pass = Pass {
         constants.push(("NUMBER", s.settings.surface.number as i32));
         constants.push(("DETECTOR", detector));
         constants.push(("BEHIND", s.samples_behind() as i32));
+        constants.push(("ECHO", s.lights_by_echo() as i32));
         constants
     },
     tolerance: Tolerance {
@@ -78,8 +83,10 @@ pub const PASS: Pass = Pass {
                     None => (MISS, [0.0; 4]),
                 };
                 writes.get_mut("distance_map").set([x, y, 0], &[distance]);
-                let map = writes.get_mut("surface");
-                map.set([x, y, 0], &surface[..map.channels]);
+                if scene.lights_by_echo() {
+                    let map = writes.get_mut("surface");
+                    map.set([x, y, 0], &surface[..map.channels]);
+                }
             }
         }
     },

@@ -89,8 +89,9 @@ pub struct Slices {
     pub blur: bool,
     /// Storage of the volume.
     pub format: VolumeFormat,
-    /// Converts and filters the whole volume, not only the part that the region, start depths and clip planes leave visible. The picture
-    /// is the same; a region that grows then needs no new frames.
+    /// Converts and filters the whole volume, not only the part that the region, start depths and clip planes leave visible, or that the
+    /// shown planes cross. The picture is the same; a region that grows or a plane that moves then needs no new frames. The viewer sets it
+    /// while planes are shown.
     pub everything: bool,
     /// The volume is rendered many times before it changes, which makes precomputed data worth its cost. The picture is the same except
     /// for the last digit of its samples.

@@ -51,8 +51,9 @@ pub struct Ray {
     /// Rays per pixel along each axis, 1..=4: the picture is rendered larger and averaged.
     pub rays: u32,
     /// Brick size of empty-space skipping, texels: 4..=64; 0 takes every sample. Rays skip bricks that cannot change the picture, so
-    /// that it stays the same bit for bit.
-    pub brick: u32,
+    /// that it stays the same bit for bit. Absent: 8; a CPU skips only where one picture of a volume saves more time than the ranges of
+    /// the bricks take, or with `slices.still`.
+    pub brick: Option<u32>,
     /// Half resolution: one ray for four pixels, and the picture is enlarged, for a view that moves. The filters of the distance map
     /// cover the same part of the picture with half as many rays per axis. `rays` must be 1.
     pub half: bool,
@@ -69,7 +70,7 @@ impl Default for Ray {
             sliding: 0,
             entries: 1025,
             rays: 1,
-            brick: 8,
+            brick: None,
             half: false,
         }
     }

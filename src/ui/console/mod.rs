@@ -19,7 +19,7 @@ use crate::gpu::{Context, GpuError, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
-use crate::scene::Settings;
+use crate::scene::{Layout, Settings};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -512,8 +512,10 @@ impl Console {
             Some(rung) => rung.apply(settings, voxel),
             None => settings.clone(),
         };
-        // A region that grows shows slices that were left out. With all of them processed, dragging a face needs no frame again.
-        effective.slices.everything |= matches!(self.controls.tool(), Tool::Region | Tool::Clip);
+        // A region that grows and a plane that moves show slices that were left out. With all of them processed, dragging needs no frame
+        // again.
+        let cuts_planes = effective.mode.is_flat() || effective.layout == Layout::Four;
+        effective.slices.everything |= cuts_planes || matches!(self.controls.tool(), Tool::Region | Tool::Clip);
         (rung, effective)
     }
 }

@@ -68,7 +68,8 @@ fn frames_are_copied_where_the_volume_has_their_format() {
     assert_eq!(of(StoredType::U16, [0.0, 4095.0], &format("r16")), None);
     assert_eq!(of(StoredType::U8, bytes, &format("r16")), None);
     assert_eq!(of(StoredType::U16, words, &format("r8")), None);
-    assert_eq!(of(StoredType::F32, [0.0, 1.0], &format("r32f")), None, "floats may be beyond 0..1");
+    assert_eq!(of(StoredType::F32, [0.0, 1.0], &format("r32f")), Some(Slot::Volume));
+    assert_eq!(of(StoredType::F32, [0.0, 2.0], &format("r32f")), None);
     assert_eq!(of(StoredType::U8, bytes, "slices = { format = 'r8', median = true }"), None);
     assert_eq!(copied(&scene(fan(Advance::None), &format("r8"))), None, "lines are no pixels");
 }

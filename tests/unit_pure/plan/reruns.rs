@@ -112,7 +112,12 @@ fn slots_of_another_shape_format_or_meaning_are_created_again() {
 fn smaller_visible_bounds_keep_the_volume_and_larger_ones_need_frames() {
     let (all, less) = (with(""), with("region = { depth = [10, 20] }"));
     assert!(all.visible_bounds.holds(&less.visible_bounds) && all.visible_bounds != less.visible_bounds);
-    assert_eq!(passes(&all, &less), "raycast_surface median_distance bilateral_distance light tone");
+    let marched = "raycast_surface median_distance bilateral_distance light tone";
+    let bricks = "brick_ranges classify_bricks_surface brick_distance_surface";
+    assert_eq!(passes(&all, &less), format!("{bricks} {marched}"), "its bricks are fewer");
+    let whole = SURFACE.replace("median = true", "median = true, everything = true");
+    let dragged = |toml: &str| scene(fan(Advance::None), &format!("{whole}\n{toml}"));
+    assert_eq!(passes(&dragged(""), &dragged("region = { depth = [10, 20] }")), marched, "its bricks stay");
     assert_eq!(rerun(&less, &all), Rerun::Frames);
 }
 
@@ -149,9 +154,13 @@ fn lookup_tables_are_built_again_when_their_inputs_change() {
 
 #[test]
 fn tiles_and_blocks_follow_from_their_planes() {
-    let planes = |at: f64| {
-        scene(fan(Advance::None), &format!("mode = 'plane'\nplanes = {{ tilt = {at} }}\nslices = {{ pixels = 40 }}"))
+    let cut = |at: f64, everything: bool| {
+        let slices = format!("slices = {{ pixels = 40, everything = {everything} }}");
+        scene(fan(Advance::None), &format!("mode = 'plane'\nplanes = {{ tilt = {at} }}\n{slices}"))
     };
+    assert_eq!(rerun(&cut(0.0, false), &cut(5.0, false)), Rerun::Frames, "it crosses slices that were left out");
+    assert_eq!(rerun(&cut(5.0, false), &cut(5.0, true)), Rerun::Frames);
+    let planes = |at: f64| cut(at, true);
     assert_eq!(again(&planes(0.0), &planes(5.0)), ("raycast_planes_toned".into(), "tiles".into()));
     let cube = |inset: f64| {
         scene(
