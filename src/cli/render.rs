@@ -11,6 +11,7 @@ use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{PassTime, Slot, Texels};
 use crate::plan::Plan;
+use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
 use crate::scene::{Mode, Scene};
 use crate::source::{Frame, Source};
@@ -82,6 +83,9 @@ impl Render {
         }
 
         self.input.check_outputs(&targets, &*source)?;
+        if let Some(cut) = scene.probe().and_then(Probe::folded) {
+            remark(&cut);
+        }
         let finer = self.finer(&scene)?;
         if let Some(folder) = &self.dump {
             std::fs::create_dir_all(folder)

@@ -8,6 +8,7 @@ use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
 use crate::gpu::{self, Context, GpuError, Renderer, Wake};
+use crate::probe::Probe;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
 use crate::source::live::Event;
@@ -321,6 +322,9 @@ impl Stream {
             self.previous_pool = Some(pool);
         }
         let views = Views::new(&header, &self.settings, self.options.update)?;
+        if let Some(cut) = views.first().probe().and_then(Probe::folded) {
+            tracing::warn!("{cut}");
+        }
         let slices = views.first().slices() as usize;
         if !is_same || !self.cine.is_of(slices) {
             self.cine = Cine::new(self.options.cine, slices);

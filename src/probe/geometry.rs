@@ -207,8 +207,59 @@ impl Probe {
         }
     }
 
-    /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample, mm.
+    /// Corners (low, high) of the smallest in-plane rectangle (x, y) that contains every sample that is drawn, mm. What lies before the
+    /// wobble axis is not: a point of space beyond the axis would be there twice.
     pub fn plane_bounds(&self) -> ([f64; 2], [f64; 2]) {
+        let (mut low, mut high) = self.sector_bounds();
+        let axis = self.axis_depth();
+        if matches!(self.motion, Motion::Fan { .. }) && low[1] < axis {
+            low[1] = axis;
+            if let Array::Curved { .. } = self.array {
+                // Lines that end before the axis reach less far to the side than the last arc at the axis does.
+                let chord = (self.last_range().powi(2) - axis * axis).max(0.0).sqrt();
+                let ends_before = |line: f64| self.last_range() * line.cos() < axis;
+                if ends_before(self.lines.first()) {
+                    low[0] = low[0].max(-chord);
+                }
+                if ends_before(self.lines.last()) {
+                    high[0] = high[0].min(chord);
+                }
+            }
+        }
+        (low, high)
+    }
+
+    /// Share of a frame's samples that lie before the wobble axis, 0..=1. They are not drawn.
+    pub fn folded_share(&self) -> f64 {
+        let (axis, count) = (self.axis_depth(), self.lines.len());
+        if !matches!(self.motion, Motion::Fan { .. }) {
+            return 0.0;
+        }
+        let folded: f64 = (0..count)
+            .map(|line| {
+                let along = match self.array {
+                    Array::Linear => 1.0,
+                    Array::Curved { .. } => self.lines.at(line as f64).cos(),
+                };
+                // Samples 0..n lie before the axis.
+                let n = ((axis / along - self.first_range()) / self.sample_pitch).ceil();
+                n.clamp(0.0, self.samples as f64)
+            })
+            .sum();
+        folded / (count * self.samples) as f64
+    }
+
+    /// What is cut from the sector, on one line; none if all of it is drawn.
+    pub fn folded(&self) -> Option<String> {
+        let share = 100.0 * self.folded_share();
+        (share > 0.0).then(|| {
+            let axis = self.axis_depth();
+            format!("{share:.2} % of each frame lies before the wobble axis, at y = {axis:.2} mm, and is not drawn")
+        })
+    }
+
+    /// Corners of the smallest in-plane rectangle that contains every sample, mm.
+    fn sector_bounds(&self) -> ([f64; 2], [f64; 2]) {
         let (r0, r1) = (self.first_range(), self.last_range());
         let (first, last) = (self.lines.first(), self.lines.last());
         match self.array {
@@ -327,13 +378,13 @@ impl Probe {
                 if widest >= PI / 2.0 {
                     return fault("fan angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
                 }
-                let nearest = self.plane_bounds().0[1];
-                if nearest <= self.axis_depth() {
+                let farthest = self.sector_bounds().1[1];
+                if farthest <= self.axis_depth() {
                     return fault(
                         "wobble radius",
                         format!(
-                            "the sector reaches up to y = {nearest:.2} mm but the wobble axis is at {:.2} mm: \
-                             all of the sector must be beyond the axis",
+                            "the sector ends at y = {farthest:.2} mm but the wobble axis is at {:.2} mm: \
+                             nothing of the sector is beyond the axis",
                             self.axis_depth()
                         ),
                     );

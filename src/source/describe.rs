@@ -76,6 +76,9 @@ pub(super) fn probe(probe: &Probe) -> Vec<(String, String)> {
         }
         Motion::Still { thickness } => add("motion", format!("still, drawn {} mm thick", number(thickness))),
     }
+    if let Some(cut) = probe.folded() {
+        add("cut", cut);
+    }
     add("speed of sound", format!("{} m/s", number(probe.sound_speed)));
     rows
 }

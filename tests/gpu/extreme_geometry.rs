@@ -157,8 +157,12 @@ fn probes_without_a_valid_geometry_are_refused_by_name() {
         ("T = 0", fan(20.0, 12.0, 2.0, 0.0, 0.5), "scan lines", "rise"),
         ("T = 180 deg", fan(20.0, 20.0, 2.0, PI, 0.5), "sector angle", "under 90"),
         ("F = 180 deg", fan(20.0, 12.0, 2.0, 1.0, PI), "fan angle", "under 90"),
-        ("the sector reaches behind the axis", fan(20.0, 0.0, 2.0, 1.1, 0.6), "wobble radius", "beyond the axis"),
-        ("Ra = Rw = d0 = 0", fan(0.0, 0.0, 0.0, 1.1, 0.6), "wobble radius", "beyond the axis"),
+        (
+            "all of the sector lies before the axis",
+            Probe { lines: Axis::Even { first: 1.5, pitch: 0.001, count: 9 }, ..fan(20.0, 0.0, 2.0, 1.1, 0.6) },
+            "wobble radius",
+            "beyond the axis",
+        ),
         ("no sample pitch", Probe { sample_pitch: 0.0, ..plain.clone() }, "sample pitch", "1e-6"),
         ("no number", Probe { start_depth: f64::NAN, ..plain.clone() }, "start depth", "must lie"),
         ("a radius of a kilometre and more", fan(1.1e6, 12.0, 2.0, 1.1, 0.6), "array radius", "must lie"),
@@ -172,6 +176,23 @@ fn probes_without_a_valid_geometry_are_refused_by_name() {
     let grid = Grid { size: [64, 64, 64], spacing: [1e-4, 1.0, 1.0], origin: [0.0; 3] };
     let refused = Scene::new(Geometry::Cartesian(grid), BYTES, settings("")).expect_err("steps").to_string();
     assert!(refused.contains("ray.step") && refused.contains("65536"), "{refused}");
+}
+
+/// Row: a part of the sector before the wobble axis, which is cut, and a phased array whose lines meet at its face.
+#[test]
+fn a_sector_that_folds_about_its_axis_is_drawn_beyond_it() {
+    let device = Device::new();
+    for (name, probe) in [
+        ("endocavitary", fan(10.5, 6.0, 0.5, 146f64.to_radians(), 0.9)),
+        ("the axis at the face", fan(20.0, 0.0, 2.0, 1.1, 0.6)),
+        ("phased", fan(0.0, 0.0, 0.0, 1.1, 0.6)),
+        ("phased, behind its axis", fan(0.0, 5.0, 0.0, 1.3, 0.6)),
+    ] {
+        let of = |mode: &str| scene(Geometry::Sweep(probe.clone()), BYTES, &format!("mode = '{mode}'\n{OBLIQUE}"));
+        let seen = drawn_as_the_reference(&device, name, of("vr"));
+        assert!(seen > 0.01, "{name}: {seen} of the picture show something");
+        surface_is_finite(&device, name, of("sr"));
+    }
 }
 
 /// Row: camera inside the volume, ray parallel to a face or to the slices.

@@ -147,7 +147,8 @@ fn turned(pitch: f64) -> [Axis; 5] {
 #[test]
 fn the_plane_s_rectangle_touches_the_sector_on_all_four_sides() {
     for lines in turned(0.2) {
-        let probe = Probe { lines, ..fan() };
+        // Without a wobble axis, nothing of the sector is cut.
+        let probe = Probe { lines, motion: Motion::Translated, ..fan() };
         let (low, high) = probe.plane_bounds();
         let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for (sample, line) in (0..=4).flat_map(|s| (0..=80).map(move |l| (f64::from(s), f64::from(l) / 20.0))) {
@@ -212,4 +213,67 @@ fn sound_takes_a_tenth_of_a_millisecond_to_77_mm_and_back() {
         ..fan()
     };
     assert!(near(probe.acquisition_time(), 0.1), "{}", probe.acquisition_time());
+}
+
+/// Endocavitary probes with a wide sector and an axis in front of its outer lines, and phased arrays whose lines meet at their face. Of
+/// every sample beyond the axis, space has one point; of those before it, none is in the drawn rectangle.
+#[test]
+fn samples_beyond_the_axis_round_trip_through_space_where_the_sector_is_cut() {
+    let mut state = 7u64;
+    let mut random = |low: f64, high: f64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let (mut cut, mut whole) = (0, 0);
+    for n in 0..300 {
+        let radius = if n % 3 == 0 { 0.0 } else { random(4.0, 40.0) };
+        let half = random(0.2, 1.55);
+        let probe = Probe {
+            array: Array::Curved { radius },
+            lines: Axis::centred(2.0 * half / 40.0, 41),
+            start_depth: if n % 2 == 0 { 0.0 } else { random(0.0, 8.0) },
+            motion: Motion::Fan { wobble_radius: if n % 5 == 0 { 0.0 } else { random(0.0, 1.0) * radius } },
+            slices: Axis::centred(random(0.02, 0.2), 11),
+            samples: 80,
+            sample_pitch: random(0.1, 1.0),
+            advance: if n % 4 == 0 { Advance::Same(0.3 * 0.02) } else { Advance::None },
+            ..fan()
+        };
+        probe.check().expect("a probe");
+        let (low, high) = probe.plane_bounds();
+        let mut folded = 0;
+        for (line, sample) in (0..41).flat_map(|line| (0..80).map(move |sample| (f64::from(line), f64::from(sample)))) {
+            let (x, y) = probe.plane_point(sample, line);
+            if y < probe.axis_depth() - 1e-9 {
+                folded += 1;
+                assert!(y < low[1], "{probe:?}: a sample at {x}, {y} is cut and in {low:?}..{high:?}");
+                continue;
+            }
+            let within = |v: f64, axis: usize| v >= low[axis] - 1e-9 && v <= high[axis] + 1e-9;
+            assert!(within(x, 0) && within(y, 1), "{probe:?}: {x}, {y} is not in {low:?}..{high:?}");
+            if y < probe.axis_depth() + 1e-3 || x.hypot(y) < 1e-3 {
+                continue;
+            }
+            let there = at(sample, line, 10.0 * random(0.0, 1.0));
+            let back = probe.to_indices(probe.to_space(there));
+            let off =
+                (back.sample - there.sample).abs() + (back.line - there.line).abs() + (back.slice - there.slice).abs();
+            assert!(off < 1e-6, "{probe:?}: {there:?} came back as {back:?}");
+        }
+        let share = f64::from(folded) / (41.0 * 80.0);
+        assert!((probe.folded_share() - share).abs() < 0.002, "{share} of {probe:?}: {}", probe.folded_share());
+        assert_eq!(probe.folded().is_some(), probe.folded_share() > 0.0);
+        *(if folded > 0 { &mut cut } else { &mut whole }) += 1;
+    }
+    assert!(cut > 50 && whole > 30, "{cut} cut, {whole} whole");
+    // An endocavitary probe: 146 degrees about an axis 6 mm behind a face of 10.5 mm radius.
+    let probe = Probe {
+        array: Array::Curved { radius: 10.5 },
+        lines: Axis::centred(146f64.to_radians() / 127.0, 128),
+        start_depth: 0.0,
+        motion: Motion::Fan { wobble_radius: 6.0 },
+        ..fan()
+    };
+    probe.check().expect("a probe");
+    assert!(probe.folded_share() > 0.0 && probe.folded_share() < 0.1, "{}", probe.folded_share());
 }

@@ -96,20 +96,28 @@ fn a_sector_and_a_fan_stay_in_front_of_the_probe() {
 }
 
 #[test]
-fn the_sector_lies_beyond_the_wobble_axis() {
-    // Its outermost samples lie at 32 cos 60 deg = 16 mm.
+fn what_lies_before_the_wobble_axis_is_cut_and_a_sector_of_which_nothing_is_beyond_it_is_refused() {
+    // Its outermost lines begin at 32 cos 60 deg = 16 mm.
     let probe = |wobble_radius| Probe {
         lines: even(-FRAC_PI_2 / 1.5, FRAC_PI_2 / 1.5, 3),
         motion: Motion::Fan { wobble_radius },
         ..fan()
     };
-    refused(&probe(10.0), "wobble radius", &["y = 16.00 mm", "20.00 mm"]);
-    refused(&probe(13.9), "wobble radius", &["16.10 mm"]);
-    taken(&probe(14.1));
-    // Just at the axis: central lines begin at 30 mm, where the axis is too.
+    for (wobble_radius, is_cut) in [(10.0, true), (13.9, true), (14.1, false)] {
+        let probe = probe(wobble_radius);
+        taken(&probe);
+        assert_eq!(probe.folded_share() > 0.0, is_cut, "{wobble_radius}");
+        assert_eq!(probe.folded().is_some(), is_cut);
+        let low = if is_cut { probe.axis_depth() } else { 16.0 };
+        assert!((probe.plane_bounds().0[1] - low).abs() < 1e-9, "{:?}", probe.plane_bounds());
+    }
+    // All lines begin at the axis.
     let straight = Probe { lines: even(0.0, 0.1, 2), ..probe(0.0) };
     let at_axis = Probe { array: Array::Linear, start_depth: 0.0, lines: even(0.0, 1.0, 2), ..straight };
-    refused(&at_axis, "wobble radius", &["y = 0.00 mm", "0.00 mm"]);
+    taken(&at_axis);
+    // A sector to one side that ends before the axis.
+    let aside = Probe { lines: even(1.5, 0.01, 3), ..probe(0.0) };
+    refused(&aside, "wobble radius", &["nothing of the sector"]);
 }
 
 #[test]
