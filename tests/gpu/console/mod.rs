@@ -14,7 +14,7 @@ use echolume::gpu::{self, Context, Renderer};
 use echolume::live::Update;
 use echolume::live::Views;
 use echolume::picture::Picture;
-use echolume::scene::Settings;
+use echolume::scene::{Layout, Settings};
 use echolume::source::Frame;
 use echolume::source::live::{Event, Live};
 use echolume::ui::command::{Command, Tool};
@@ -120,7 +120,9 @@ impl Desk {
     /// The settings of the idle picture.
     pub fn drawn(&self) -> Settings {
         let mut settings = self.console.controls().settings().clone();
-        settings.slices.everything |= matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
+        let cuts_planes = settings.mode.is_flat() || settings.layout == Layout::Four;
+        settings.slices.everything |=
+            cuts_planes || matches!(self.console.controls().tool(), Tool::Region | Tool::Clip);
         settings
     }
 
