@@ -130,6 +130,8 @@ impl Stated {
     pub fn scene(&self, phantom: &Phantom, sizes: &Sizes) -> Result<Scene, String> {
         let mut set =
             vec![format!("slices.pixels={}", sizes.pixels), format!("picture.size=[{0}, {0}]", sizes.picture)];
+        // On a CPU small pictures have no bricks unless they are set.
+        set.push("ray.brick=8".into());
         set.extend(self.set.iter().map(|s| s.to_string()));
         let grid =
             Grid { size: [sizes.samples, sizes.lines, sizes.frames], spacing: [0.5, 1.0, 1.0], origin: [0.0; 3] };

@@ -46,12 +46,17 @@ pub fn scenes() -> Vec<SceneSpec> {
     ray_scenes().into_iter().chain(planes).chain(in_floats).collect()
 }
 
+/// Edge of a brick where a scene states none, texels.
+const BRICK: u32 = 8;
+
 /// A scene with settings from TOML.
 ///
 /// # Errors
 /// One line: the settings are invalid.
 pub fn scene(geometry: Geometry, input: Input, toml: &str) -> Result<Scene, String> {
-    let settings: Settings = toml::from_str(toml).map_err(|e| format!("settings: {}", e.message()))?;
+    let mut settings: Settings = toml::from_str(toml).map_err(|e| format!("settings: {}", e.message()))?;
+    // Pictures as small as these would not be worth their bricks on a CPU, and skipping would go unchecked.
+    settings.ray.brick.get_or_insert(BRICK);
     Scene::new(geometry, input, settings).map_err(|e| e.to_string())
 }
 

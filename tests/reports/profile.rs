@@ -10,6 +10,7 @@ const SETTINGS: &str = "mode = 'sr'
     picture = { size = [96, 96] }
     slices = { pixels = 64, format = 'r16f', sigma = { window = 3, sigma = 0.1 } }
     distance = { median = 5 }
+    ray = { brick = 8 }
     post = { sigma = { window = 3, sigma = 0.1 } }";
 
 fn asked(repeats: usize) -> ProfileOptions {
