@@ -583,7 +583,14 @@ fn reads(workers: PipelineStages) -> vk::AccessFlags2 {
     flags(
         workers,
         [
-            (PipelineStage::Compute, vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ),
+            // Numbers of passes are written by the host, and need no barrier. But their buffer may take memory that a readback had before:
+            // the host waited in between, which layers older than 1.3.297 do not know of timelines.
+            (
+                PipelineStage::Compute,
+                vk::AccessFlags2::SHADER_SAMPLED_READ
+                    | vk::AccessFlags2::SHADER_STORAGE_READ
+                    | vk::AccessFlags2::UNIFORM_READ,
+            ),
             (PipelineStage::Copy, vk::AccessFlags2::TRANSFER_READ),
             (PipelineStage::Host, vk::AccessFlags2::HOST_READ),
         ],
