@@ -158,7 +158,8 @@ fn a_wrong_known_answer_is_shown() {
     let sound = bench();
     for planted in verify::self_test::faults().filter(|p| ["stale slice", "shifted half pixel"].contains(&p.name)) {
         let mut bench = sound.with_fault(planted.change).expect("bench");
-        let checks = verify::checks(Level::Quick).into_iter().filter(|check| check.group == "known answers");
+        // Every second one: the self-test runs all of them.
+        let checks = verify::checks(Level::Quick).into_iter().filter(|check| check.group == "known answers").step_by(2);
         let outcomes: Vec<Outcome> = checks.map(|check| check.run(&mut bench)).collect();
         let failed: Vec<_> = outcomes.iter().filter(|o| o.verdict == Verdict::Failed).collect();
         assert!(!failed.is_empty(), "{} is not noticed", planted.name);
