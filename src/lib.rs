@@ -16,7 +16,7 @@
 //!   and the support bundle of a kiosk display.
 //! - [`reference`](mod@reference) renders on the CPU in f64, [`exact_ray`] integrates its rays without samples, [`bounds`] encloses them.
 //!   [`profile`] measures GPU times, [`error_report`] error against run time,
-//!   [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
+//!   [`filter_report`] what filters do to speckle and edges, [`thesis_tables`] the tables of the thesis. [`verify`] tests a device and its driver.
 //! - [`files`] reads with limits and writes atomically. [`picture`] holds pictures. [`cli`] is the command line.
 //!
 //! # Render a file
