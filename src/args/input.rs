@@ -1,6 +1,6 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
-use crate::files::check_target;
+use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::scene::load::Layers;
@@ -254,6 +254,13 @@ pub fn check_outputs<'a>(outputs: &[Output], read: impl IntoIterator<Item = &'a 
         }
         check_target(file).map_err(failed)?;
     }
+    Ok(())
+}
+
+/// Writes a report and says where: completely, or not at all.
+pub fn write_report(file: &Path, text: &str) -> Result<(), Failure> {
+    replace(file, text.as_bytes()).map_err(failed)?;
+    say!("written: {}", file.display());
     Ok(())
 }
 

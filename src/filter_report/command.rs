@@ -1,12 +1,11 @@
 //! `echolume report filters`.
 
 use super::candidates::candidates;
-use super::measure::{Effort, MeasureError, count, phantom, recording};
-use super::{Areas, Rectangle, Report, export, sheet};
-use crate::args::{Output, check_outputs, open_device};
+use super::measure::{MeasureError, MeasureOptions, count, phantom, recording};
+use super::{Area, Areas, Report, export, sheet};
+use crate::args::{Output, check_outputs, open_device, write_report};
 use crate::gpu::DeviceChoice;
 use crate::machine;
-use crate::picture::replace;
 use crate::source;
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
@@ -80,12 +79,12 @@ impl FilterReport {
             sources.push(source::open(file, None).map_err(input)?);
         }
         let context = open_device(self.device.clone(), false)?;
-        let effort = Effort { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
+        let options = MeasureOptions { only: &self.filter, pixels: self.pixels, repeats: self.repeat as usize };
         let bar = indicatif::ProgressBar::new((names.len() * count(&self.filter)) as u64).with_message("settings");
-        let mut subjects = vec![phantom(&context, effort, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
+        let mut subjects = vec![phantom(&context, options, &mut || bar.inc(1)).map_err(|e| fault("phantom", e))?];
         for ((source, file), areas) in sources.iter_mut().zip(&self.recordings).zip(areas) {
             let name = stem(file);
-            let measured = recording(&context, &mut **source, &name, areas, effort, &mut || bar.inc(1));
+            let measured = recording(&context, &mut **source, &name, areas, options, &mut || bar.inc(1));
             subjects.push(measured.map_err(|e| fault(&file.display().to_string(), e))?);
         }
         bar.finish_and_clear();
@@ -93,16 +92,16 @@ impl FilterReport {
             device: machine::device(&context),
             program: machine::program(),
             date: machine::date(),
-            repeats: effort.repeats,
+            repeats: options.repeats,
             subjects,
         };
         let written = export::markdown(&report);
         match &self.markdown {
             None => say!("{}", written.trim_end()),
-            Some(file) => write(file, &written)?,
+            Some(file) => write_report(file, &written)?,
         }
         if let Some(file) = &self.csv {
-            write(file, &export::csv(&report))?;
+            write_report(file, &export::csv(&report))?;
         }
         for (file, subject) in sheets.iter().zip(&report.subjects) {
             sheet::sheet(&report, subject).and_then(|sheet| sheet.save(file)).map_err(failed)?;
@@ -123,7 +122,7 @@ impl FilterReport {
             }
         }
         let parse = |flag: &str, text: &str| {
-            rectangle(text).ok_or_else(|| {
+            area(text).ok_or_else(|| {
                 input(format!(
                     "{flag} {text}: must read lateral=LOW:HIGH,depth=LOW:HIGH in mm, as lateral=-20:20,depth=30:70"
                 ))
@@ -141,7 +140,7 @@ impl FilterReport {
     }
 }
 
-fn rectangle(text: &str) -> Option<Rectangle> {
+fn area(text: &str) -> Option<Area> {
     let mut sides = [None; 2];
     for part in text.split(',') {
         let (key, range) = part.split_once('=')?;
@@ -150,7 +149,7 @@ fn rectangle(text: &str) -> Option<Rectangle> {
         let axis = ["lateral", "depth"].iter().position(|name| *name == key.trim())?;
         (range[0] < range[1] && sides[axis].is_none()).then(|| sides[axis] = Some(range))?;
     }
-    Some(Rectangle { lateral: sides[0]?, depth: sides[1]? })
+    Some(Area { lateral: sides[0]?, depth: sides[1]? })
 }
 
 fn stem(file: &Path) -> String {
@@ -162,10 +161,4 @@ fn fault(what: &str, error: MeasureError) -> Failure {
         MeasureError::Input(fault) => input(format!("{what}: {fault}")),
         MeasureError::Gpu(fault) => failed(fault),
     }
-}
-
-fn write(file: &Path, text: &str) -> Result<(), Failure> {
-    replace(file, text.as_bytes()).map_err(failed)?;
-    say!("written: {}", file.display());
-    Ok(())
 }

@@ -41,7 +41,7 @@ pub fn markdown(report: &Report) -> String {
         let name = markdown_text(&subject.name);
         let best: Vec<&Row> = chosen.iter().filter_map(|n| subject.rows.get(*n)).collect();
         let [width, height] = subject.size;
-        let area = |r: super::Rectangle| {
+        let area = |r: super::Area| {
             let ([left, right], [top, bottom]) = (r.lateral, r.depth);
             format!("lateral {left} to {right}, depth {top} to {bottom} mm")
         };

@@ -2,7 +2,7 @@
 
 use super::candidates::{Candidate, candidates};
 use super::quality::quality;
-use super::{Areas, Rectangle, Row, Subject};
+use super::{Area, Areas, Row, Subject};
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
 use crate::passes::{PassTime, Slot, Stage, by_name};
 use crate::picture::Region;
@@ -15,14 +15,14 @@ use std::sync::Arc;
 
 /// Where the phantom is measured: the face against the fluid before it.
 const PHANTOM: Areas = Areas {
-    crop: Rectangle { lateral: [-38.0, 38.0], depth: [28.0, 98.0] },
-    region: Rectangle { lateral: [-18.0, 8.0], depth: [57.0, 64.0] },
-    background: Rectangle { lateral: [-15.0, 15.0], depth: [32.0, 42.0] },
+    crop: Area { lateral: [-38.0, 38.0], depth: [28.0, 98.0] },
+    region: Area { lateral: [-18.0, 8.0], depth: [57.0, 64.0] },
+    background: Area { lateral: [-15.0, 15.0], depth: [32.0, 42.0] },
 };
 
 /// What to measure, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort<'a> {
+pub struct MeasureOptions<'a> {
     /// Part of the names of the filters; empty for all.
     pub only: &'a str,
     /// Pixels along the longer edge of a slice.
@@ -47,15 +47,15 @@ pub enum MeasureError {
 /// The device fails.
 pub fn phantom(
     context: &Arc<Context>,
-    effort: Effort<'_>,
+    options: MeasureOptions<'_>,
     after_each: &mut dyn FnMut(),
 ) -> Result<Subject, MeasureError> {
     let source = |speckle| {
         let options = PhantomOptions { speckle, ..PhantomOptions::default() };
         Phantom::new(options).map(PhantomSource::new).map_err(|e| MeasureError::Input(e.to_string()))
     };
-    let mut subject = recording(context, &mut source(Speckle::Random)?, "phantom", PHANTOM, effort, after_each)?;
-    let mut bare = Middle::new(context, &mut source(Speckle::Mean)?, PHANTOM, effort.pixels)?;
+    let mut subject = recording(context, &mut source(Speckle::Random)?, "phantom", PHANTOM, options, after_each)?;
+    let mut bare = Middle::new(context, &mut source(Speckle::Mean)?, PHANTOM, options.pixels)?;
     let clean = bare.filtered(context, &Candidate::none())?.0;
     for row in &mut subject.rows {
         row.quality = quality(&row.pixels, Some(&clean), subject.size, bare.levels());
@@ -73,16 +73,16 @@ pub fn recording(
     source: &mut dyn Source,
     name: &str,
     areas: Areas,
-    effort: Effort<'_>,
+    options: MeasureOptions<'_>,
     after_each: &mut dyn FnMut(),
 ) -> Result<Subject, MeasureError> {
-    let mut middle = Middle::new(context, source, areas, effort.pixels)?;
+    let mut middle = Middle::new(context, source, areas, options.pixels)?;
     let mut rows: Vec<Row> = Vec::new();
     let mut before: Vec<&'static str> = Vec::new();
-    for candidate in candidates(middle.scene.grid.pitch, effort.only) {
+    for candidate in candidates(middle.scene.grid.pitch, options.only) {
         let (mut times, mut pixels) = (Vec::new(), Vec::new());
         // The first one warms up.
-        for n in 0..=effort.repeats {
+        for n in 0..=options.repeats {
             let (values, passes) = middle.filtered(context, &candidate)?;
             if rows.is_empty() {
                 before = passes.iter().map(|p| p.name).collect();
@@ -99,12 +99,12 @@ pub fn recording(
     Ok(Subject { name: name.into(), areas, frame: middle.frame, size: middle.size(), clean: None, rows })
 }
 
-/// Number of candidates with `only` in their names, no filter among them.
+/// Number of candidates: no filter, and those whose filter's name contains `only`.
 pub fn count(only: &str) -> usize {
     candidates([1.0; 2], only).len()
 }
 
-/// Time of the passes of stage 1 that no filter does without, ns.
+/// Time of the passes of stage 1 that do not run without a filter (`before`), ns.
 fn time_of_filter(passes: &[PassTime], before: &[&str]) -> Option<f64> {
     let filters = passes
         .iter()
@@ -112,19 +112,13 @@ fn time_of_filter(passes: &[PassTime], before: &[&str]) -> Option<f64> {
     filters.map(|p| p.total).reduce(|a, b| a + b)
 }
 
-/// A part of a slice, first and last but one pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Window {
-    at: [usize; 2],
-    size: [usize; 2],
-}
-
 /// The middle frame of a volume, and where it is measured.
 struct Middle {
     scene: Scene,
     frame: usize,
     bytes: Vec<u8>,
-    crop: Window,
+    /// Pixels of the slice.
+    crop: Region,
     /// Tissue and background, relative to the crop.
     levels: [Region; 2],
     renderer: Option<Renderer>,
@@ -153,21 +147,20 @@ impl Middle {
             Scene::new(geometry.clone(), samples, settings).map_err(|e| input(e.to_string()))
         };
         let scene = scene_of(&[])?;
-        let window = |what: &str, r: Rectangle| {
-            let set = [format!("region.lateral={:?}", r.lateral), format!("region.depth={:?}", r.depth)];
-            let cut = scene_of(&set)?;
-            window(what, &scene, &cut)
+        let pixels_of = |what: &str, area: Area| {
+            let set = [format!("region.lateral={:?}", area.lateral), format!("region.depth={:?}", area.depth)];
+            pixels_within(what, &scene, &scene_of(&set)?)
         };
-        let crop = window("crop", areas.crop)?;
+        let crop = pixels_of("crop", areas.crop)?;
         let [tissue, behind] = [("region", areas.region), ("background", areas.background)]
-            .map(|(what, area)| window(what, area).and_then(|w| within(what, w, crop)));
+            .map(|(what, area)| pixels_of(what, area).and_then(|region| within(what, region, crop)));
         let mut made = Middle { scene, frame: middle, bytes, crop, levels: [tissue?, behind?], renderer: None };
         made.check_crop(context)?;
         Ok(made)
     }
 
     fn size(&self) -> [usize; 2] {
-        self.crop.size
+        self.crop.size.map(|n| n as usize)
     }
 
     fn levels(&self) -> [&Region; 2] {
@@ -208,11 +201,12 @@ impl Middle {
         let volume = renderer.read(Slot::Volume)?;
         let volume = volume.ok_or_else(|| GpuError::Broken("slot 'volume' is not in the plan".into()))?;
         let [width, height, _] = volume.size;
+        let [[left, top], [columns, rows]] = [self.crop.at, self.crop.size].map(|pair| pair.map(|n| n as usize));
         let row = |y: usize| {
-            let first = (self.frame * height + self.crop.at[1] + y) * width + self.crop.at[0];
-            volume.values[first..first + self.crop.size[0]].iter().copied()
+            let first = (self.frame * height + top + y) * width + left;
+            volume.values[first..first + columns].iter().copied()
         };
-        let crop = (0..self.crop.size[1]).flat_map(row).collect();
+        let crop = (0..rows).flat_map(row).collect();
         Ok((crop, renderer.take_times()?))
     }
 
@@ -250,25 +244,28 @@ fn settings(pixels: u32, more: &[String]) -> Result<crate::scene::Settings, Stri
 }
 
 /// The pixels of `scene` within the box of `cut`.
-fn window(what: &str, scene: &Scene, cut: &Scene) -> Result<Window, MeasureError> {
+fn pixels_within(what: &str, scene: &Scene, cut: &Scene) -> Result<Region, MeasureError> {
     let pixel = |axis: usize, place: f64| (place - scene.grid.origin[axis]) / scene.grid.pitch[axis];
-    let mut window = Window { at: [0; 2], size: [0; 2] };
+    let mut region = Region { at: [0; 2], size: [0; 2] };
     for axis in 0..2 {
-        let first = pixel(axis, cut.low[axis]).ceil().max(0.0) as usize;
-        let end = (pixel(axis, cut.high[axis]).floor() as usize + 1).min(scene.grid.size[axis] as usize);
+        let first = pixel(axis, cut.low[axis]).ceil().max(0.0) as u32;
+        let end = (pixel(axis, cut.high[axis]).floor() as u32 + 1).min(scene.grid.size[axis]);
         if end < first + 4 {
-            return Err(MeasureError::Input(format!("{what}: is less than 4 pixels wide")));
+            return Err(MeasureError::Input(format!(
+                "{what}: is less than 4 pixels wide; give a larger one, or more --pixels"
+            )));
         }
-        window.at[axis] = first;
-        window.size[axis] = end - first;
+        region.at[axis] = first;
+        region.size[axis] = end - first;
     }
-    Ok(window)
+    Ok(region)
 }
 
-fn within(what: &str, area: Window, crop: Window) -> Result<Region, MeasureError> {
+/// `area` relative to the crop, in which it must lie.
+fn within(what: &str, area: Region, crop: Region) -> Result<Region, MeasureError> {
     let is_inside = (0..2).all(|a| area.at[a] >= crop.at[a] && area.at[a] + area.size[a] <= crop.at[a] + crop.size[a]);
     if !is_inside {
         return Err(MeasureError::Input(format!("{what}: reaches beyond the crop")));
     }
-    Ok(Region { at: [0, 1].map(|a| (area.at[a] - crop.at[a]) as u32), size: area.size.map(|n| n as u32) })
+    Ok(Region { at: [0, 1].map(|a| area.at[a] - crop.at[a]), size: area.size })
 }

@@ -13,9 +13,9 @@ use crate::machine::Device;
 use crate::thesis_tables::Spread;
 use quality::Quality;
 
-/// A rectangle of a slice, mm: lateral, and depth as `region.depth` counts it.
+/// A part of a slice, mm: lateral, and depth as `region.depth` counts it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rectangle {
+pub struct Area {
     pub lateral: [f64; 2],
     pub depth: [f64; 2],
 }
@@ -24,10 +24,10 @@ pub struct Rectangle {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Areas {
     /// All measures but SNR and CNR; also what the sheet shows. Must lie inside of the sector.
-    pub crop: Rectangle,
+    pub crop: Area,
     /// Tissue of one kind: SNR, and CNR against `background`.
-    pub region: Rectangle,
-    pub background: Rectangle,
+    pub region: Area,
+    pub background: Area,
 }
 
 /// One filter with its settings, measured.

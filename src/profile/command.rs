@@ -1,6 +1,6 @@
 //! `echolume profile`.
 
-use crate::args::{InputArgs, Output, check_outputs, open_device};
+use crate::args::{InputArgs, Output, check_outputs, open_device, write_report};
 use crate::files::{read_text, replace};
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
@@ -122,9 +122,7 @@ impl Profile {
 
     fn write(&self, file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, Failure>) -> Result<(), Failure> {
         let Some(file) = file else { return Ok(()) };
-        replace(file, text()?.as_bytes()).map_err(failed)?;
-        say!("written: {}", file.display());
-        Ok(())
+        write_report(file, &text()?)
     }
 
     fn compare(&self, old: &Path, new: &Path) -> Result<(), Failure> {

@@ -1,14 +1,13 @@
 //! `echolume report tables`.
 
-use crate::args::{Output, check_outputs, open_device};
+use crate::args::{Output, check_outputs, open_device, write_report};
 use crate::gpu::DeviceChoice;
 use crate::picture::Grey;
-use crate::picture::replace;
 use crate::terminal::{Failure, failed, input, say};
 use crate::thesis_tables::export;
 use crate::thesis_tables::growth::growth;
 use crate::thesis_tables::measure::{TableOptions, run};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Warm-up volumes of each row: the driver compiles shaders and the clocks rise.
 const WARM_UP: usize = 1;
@@ -69,20 +68,14 @@ impl ThesisTables {
         let written = export::markdown(&report);
         match &self.markdown {
             None => say!("{}", written.trim_end()),
-            Some(file) => write(file, &written)?,
+            Some(file) => write_report(file, &written)?,
         }
         if let Some(file) = &self.csv {
-            write(file, &export::tables_csv(&report))?;
+            write_report(file, &export::tables_csv(&report))?;
         }
         match growth_file {
-            Some(file) => write(&file, &export::growth_csv(&report.grown)),
+            Some(file) => write_report(&file, &export::growth_csv(&report.grown)),
             None => Ok(()),
         }
     }
-}
-
-fn write(file: &Path, text: &str) -> Result<(), Failure> {
-    replace(file, text.as_bytes()).map_err(failed)?;
-    say!("written: {}", file.display());
-    Ok(())
 }

@@ -1,8 +1,8 @@
 //! `echolume verify`.
 
-use crate::args::check_outputs;
+use crate::args::{check_outputs, write_report};
+use crate::files::read_text;
 use crate::files::signals::Held;
-use crate::files::{read_text, replace};
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
 use crate::terminal::{Failure, failed, input, say};
 use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
@@ -236,9 +236,7 @@ impl Verify {
 /// Writes a report file, if one was requested.
 fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
     let Some(file) = file else { return Ok(()) };
-    replace(file, text().map_err(failed)?.as_bytes()).map_err(failed)?;
-    say!("written: {}", file.display());
-    Ok(())
+    write_report(file, &text().map_err(failed)?)
 }
 
 fn announce(dut: &DeviceUnderTest) {
