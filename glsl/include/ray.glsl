@@ -5,7 +5,7 @@
 //   NON_UNIFORM         slices at non-uniform positions or of mixed directions: the slice table
 
 layout(constant_id = 0) const int SWEEP = 1;    // 0 Cartesian, 1 fan, 2 translated, 3 still
-layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved
+layout(constant_id = 1) const int ARRAY = 1;    // 0 linear, 1 curved, 2 curved with lines 90 degrees or more off the axis
 layout(constant_id = 2) const int SAMPLING = 0; // 0 the device's filter, 1 eight fetches; two loads of four packed
                                                 // neighbours: 2 of bytes, 3 of 16 bits of 0..1, 4 of half floats
 layout(constant_id = 20) const int CLIPS = 0;   // clip planes
@@ -129,6 +129,20 @@ Sector sector() {
     return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
 }
 
+// Tangent of a quarter of the angle off the depth axis, for angles up to 180 degrees: that of half the angle has no bound. Of the sine
+// and the cosine of half the angle the larger is a root, and the smaller follows from the sine, so that nothing cancels.
+float quarter_tangent(float x, float y, float range) {
+    range = max(range, 1e-20);
+    float larger = sqrt(0.5 + 0.5 * abs(y) / range), smaller = 0.5 * abs(x) / (range * larger);
+    float t = y >= 0.0 ? smaller / (1.0 + larger) : larger / (1.0 + smaller);
+    return x < 0.0 ? -t : t;
+}
+
+// Parameter of the line through an in-plane point of a curved array, see `line_parameter` of lookup_tables.rs.
+float line_at(float x, float y, float range) {
+    return ARRAY == 2 ? quarter_tangent(x, y, range) : x / max(range + y, 1e-20);
+}
+
 // Texture indices (column, row, slice) of a point in space, and its coordinates in the sector; false outside the insonified
 // region. No trigonometry: the look-up table takes the tangent of half the angle about the wobble axis, z / (rho + y).
 bool locate(vec3 p, out vec3 texel, out vec4 place) {
@@ -145,9 +159,9 @@ bool locate(vec3 p, out vec3 texel, out vec4 place) {
         position = p.z / max(rho + beyond, 1e-20);
     }
     float range = y, line = x;
-    if (ARRAY == 1) {
+    if (ARRAY != 0) {
         range = sqrt(x * x + y * y);
-        line = x / max(range + y, 1e-20);
+        line = line_at(x, y, range);
     }
     float e = 0.0, k = 0.0;
 #ifdef SWEPT

@@ -21,6 +21,9 @@ const int HALVINGS = 6; // 1/64 of a step
 // line would be a row of dots.
 const float EDGE_WIDTH = 1.5;
 
+// Cosine of the least angle between faces that meet at an edge, 8 degrees: where a plane touches an arc there is none.
+const float SAME_FACE = 0.99;
+
 #ifdef SWEPT
 const int BORDERS = 6;
 #else
@@ -35,16 +38,17 @@ vec4 border(int n, vec3 p, float slice) {
     // The frame's own depth axis in space.
     vec3 depth = SWEEP == 1 ? vec3(0.0, beyond / rho, p.z / rho) : vec3(0.0, 1.0, 0.0);
     float x = p.x, y = SWEEP == 1 ? rho + axis_depth : p.y;
-    float range = ARRAY == 1 ? max(sqrt(x * x + y * y), 1e-20) : y;
-    vec3 along = ARRAY == 1 ? (vec3(x, 0.0, 0.0) + depth * y) / range : depth;
+    float range = ARRAY != 0 ? max(sqrt(x * x + y * y), 1e-20) : y;
+    vec3 along = ARRAY != 0 ? (vec3(x, 0.0, 0.0) + depth * y) / range : depth;
     if (n == 0) return vec4(-along, range - range_low);
     if (n == 1) return vec4(along, range_high - range);
-    vec3 across = ARRAY == 1 ? (vec3(y, 0.0, 0.0) - depth * x) / range : vec3(1.0, 0.0, 0.0);
+    vec3 across = ARRAY != 0 ? (vec3(y, 0.0, 0.0) - depth * x) / range : vec3(1.0, 0.0, 0.0);
     if (n < 4) {
-        // Of two half tangents: the tangent of half the angle between them.
         float limit = n == 2 ? line_low : line_high;
-        float line = ARRAY == 1 ? x / max(range + y, 1e-20) : x;
-        float apart = ARRAY == 1 ? 2.0 * range * (limit - line) / (1.0 + limit * line) : limit - line;
+        float line = ARRAY != 0 ? line_at(x, y, range) : x;
+        // Of two half tangents: the tangent of half the angle between them.
+        float apart = ARRAY == 2 ? 4.0 * range * (atan(limit) - atan(line))
+            : ARRAY == 1 ? 2.0 * range * (limit - line) / (1.0 + limit * line) : limit - line;
         return n == 2 ? vec4(-across, -apart) : vec4(across, apart);
     }
     vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
@@ -66,15 +70,32 @@ float beyond_angle(vec2 p, float half_tangent) {
     return (p.x * (1.0 - t2) - p.y * 2.0 * half_tangent) / (1.0 + t2);
 }
 
+// Distance from a scan line of a curved array, mm, positive on the side of larger angles.
+float beyond_line(vec2 p, float limit) {
+    if (ARRAY == 1) return beyond_angle(p, limit);
+    // From the tangent of a quarter of the angle to that of half, as cosine and sine.
+    float q2 = limit * limit;
+    vec2 half_angle = vec2(1.0 - q2, 2.0 * limit) / (1.0 + q2);
+    vec2 angle = vec2(half_angle.x * half_angle.x - half_angle.y * half_angle.y, 2.0 * half_angle.x * half_angle.y);
+    return p.x * angle.x - p.y * angle.y;
+}
+
+// Lower bound of the distance to the lines of a curved array, mm. Up to 180 degrees of lines lie between two half-planes; beyond, what
+// is left out does.
+float distance_to_lines(vec2 p) {
+    float above = beyond_line(p, line_high), below = -beyond_line(p, line_low);
+    bool is_reflex = ARRAY == 2 && atan(line_high) - atan(line_low) > 0.7853982;
+    return is_reflex ? min(above, below) : max(above, below);
+}
+
 // Lower bound of the distance to the insonified region, mm. Each border is bounded by a sphere, a plane or a cone, and the
 // distance to those shrinks no faster than a ray advances.
 float distance_to_sector(vec3 p) {
     float y = p.y, x = p.x, distance = 0.0;
     if (SWEEP == 1) y = length(vec2(p.y - axis_depth, p.z)) + axis_depth;
-    float range = ARRAY == 1 ? length(vec2(x, y)) : y;
+    float range = ARRAY != 0 ? length(vec2(x, y)) : y;
     distance = max(distance, max(range - range_high, range_low - range));
-    distance = max(distance, ARRAY == 1 ? max(beyond_angle(vec2(x, y), line_high), -beyond_angle(vec2(x, y), line_low))
-                                : max(x - line_high, line_low - x));
+    distance = max(distance, ARRAY != 0 ? distance_to_lines(vec2(x, y)) : max(x - line_high, line_low - x));
 #ifdef SWEPT
     float sweep_high = sweep_low + float(sweep_lut.entry.length() - 1) / sweep_density;
     vec2 q = vec2(p.z, p.y - axis_depth);
@@ -164,7 +185,8 @@ void main() {
                         other.w -= dot(other.xyz, p);
                     } else other = border(i - halves, p, texel.z);
                     float pixels = other.w / max(length(vec2(dot(other.xyz, ex), dot(other.xyz, ey))), 1e-20);
-                    near = max(near, i == face || (i >= halves && i - halves == own) ? 0.0 : EDGE_WIDTH - pixels);
+                    bool is_own = i == face || (i >= halves && i - halves == own) || dot(other.xyz, normal) >= SAME_FACE;
+                    near = max(near, is_own ? 0.0 : EDGE_WIDTH - pixels);
                 }
                 colour.rgb = mix(colour.rgb, edge_colour, edge_strength * clamp(near, 0.0, 1.0));
             }

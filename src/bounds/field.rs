@@ -9,6 +9,7 @@ use super::interval::Interval;
 use crate::exact_ray::Line;
 use crate::passes::Texels;
 use crate::probe::{Advance, Array, Axis, Geometry, Motion, Probe};
+use std::f64::consts::FRAC_PI_2;
 
 /// What is known of a part of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,6 +167,17 @@ impl<'a> Field<'a> {
         }
         let (range, at) = match probe.array {
             Array::Linear => (depth, x),
+            Array::Curved { .. } if probe.is_radial() => {
+                // Off the depth axis: the angle to the lateral axis has no jump there.
+                let quarter = Interval { low: FRAC_PI_2, high: FRAC_PI_2.next_up() };
+                let angle = match x {
+                    x if x.low > 0.0 => quarter - depth.angle(x),
+                    x if x.high < 0.0 => depth.angle(-x) - quarter,
+                    x if depth.low > 0.0 => x.angle(depth),
+                    _ => return Some(([everything; 3], false)),
+                };
+                ((x.square() + depth.square()).root(), angle)
+            }
             // Lines lie within 90 degrees of the axis.
             Array::Curved { .. } if depth.high <= 0.0 => return None,
             Array::Curved { .. } if depth.low <= 0.0 => return Some(([everything; 3], false)),

@@ -258,10 +258,15 @@ impl Plane<'_> {
         }
     }
 
-    /// Where the line has a range from the apex of a curved array. The range is a convex function of s as long as the depth in the
-    /// plane is not negative, since it is the length of (linear, convex): it has one least place and at most two crossings.
+    /// Where the line has a range from the apex of a curved array. The range is a convex function of s, since it is the length of (linear,
+    /// linear), or of (linear, convex) as long as the depth in the plane is not negative: it has one least place and at most two crossings.
     fn range(&self, range: f64, [low, high]: [f64; 2], found: &mut Vec<f64>) {
-        let off = |s: f64| self.x(s).hypot((self.depth(s) + self.offset).max(0.0)) - range;
+        if self.turns && self.offset < 0.0 && self.probe.is_radial() {
+            return self.range_above_the_apex(range, [low, high], found);
+        }
+        // Without a turn the depth may be negative: above the apex of a radial probe.
+        let least_depth = if self.turns { 0.0 } else { f64::MIN };
+        let off = |s: f64| self.x(s).hypot((self.depth(s) + self.offset).max(least_depth)) - range;
         // The least place by golden sections, until one lies within the range.
         let golden = (5f64.sqrt() - 1.0) / 2.0;
         let (mut a, mut b) = (low, high);
@@ -280,5 +285,13 @@ impl Plane<'_> {
             found.extend(bracketed(off, low, within));
             found.extend(bracketed(off, within, high));
         }
+    }
+
+    /// The same where the range is not convex: by signs at the ends of many parts.
+    fn range_above_the_apex(&self, range: f64, [low, high]: [f64; 2], found: &mut Vec<f64>) {
+        const PARTS: u32 = 256;
+        let off = |s: f64| self.x(s).hypot(self.depth(s) + self.offset) - range;
+        let end = |n: u32| low + (high - low) * f64::from(n) / f64::from(PARTS);
+        found.extend((0..PARTS).filter_map(|n| bracketed(off, end(n), end(n + 1))));
     }
 }

@@ -67,11 +67,21 @@ fn sweep_position(motion: Motion, parameter: f64) -> f64 {
     }
 }
 
-/// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm.
-pub(super) fn line_parameter(array: Array, position: f64) -> f64 {
-    match array {
+/// The parameter of the line look-up table: the tangent of half the in-plane angle, or mm. For a radial probe that of a quarter, because
+/// the tangent of half has no bound towards 180 degrees.
+pub(super) fn line_parameter(probe: &Probe, position: f64) -> f64 {
+    match probe.array {
+        Array::Curved { .. } if probe.is_radial() => (position / 4.0).tan(),
         Array::Curved { .. } => (position / 2.0).tan(),
         Array::Linear => position,
+    }
+}
+
+fn line_position(probe: &Probe, parameter: f64) -> f64 {
+    match probe.array {
+        Array::Curved { .. } if probe.is_radial() => 4.0 * parameter.atan(),
+        Array::Curved { .. } => 2.0 * parameter.atan(),
+        Array::Linear => parameter,
     }
 }
 
@@ -96,15 +106,11 @@ pub fn sweep_lut(scene: &Scene) -> Vec<f32> {
 pub fn line_lut(scene: &Scene) -> Vec<f32> {
     let Some(probe) = scene.probe() else { return Vec::new() };
     let entries = scene.settings.ray.entries;
-    let low = line_parameter(probe.array, probe.lines.first());
-    let high = line_parameter(probe.array, probe.lines.last());
+    let low = line_parameter(probe, probe.lines.first());
+    let high = line_parameter(probe, probe.lines.last());
     floats((0..entries).map(|i| {
         let parameter = low + (high - low) * f64::from(i) / f64::from(entries - 1);
-        let position = match probe.array {
-            Array::Curved { .. } => 2.0 * parameter.atan(),
-            Array::Linear => parameter,
-        };
-        probe.lines.index_of(position) / probe.lines.len() as f64
+        probe.lines.index_of(line_position(probe, parameter)) / probe.lines.len() as f64
     }))
 }
 

@@ -105,6 +105,12 @@ impl Probe {
         }
     }
 
+    /// True if lines of a curved array lie 90 degrees or more off the depth axis, as those of a radial probe do: half-planes do not
+    /// bound such a sector, and it reaches above its apex.
+    pub fn is_radial(&self) -> bool {
+        matches!(self.array, Array::Curved { .. }) && self.lines.first().abs().max(self.lines.last().abs()) >= PI / 2.0
+    }
+
     /// Y of the wobble axis, mm: Ra - Rw. 0 unless the motion is a fan.
     pub fn axis_depth(&self) -> f64 {
         match self.motion {
@@ -215,8 +221,9 @@ impl Probe {
         if matches!(self.motion, Motion::Fan { .. }) && low[1] < axis {
             low[1] = axis;
             if let Array::Curved { .. } = self.array {
-                // Lines that end before the axis reach less far to the side than the last arc at the axis does.
-                let chord = (self.last_range().powi(2) - axis * axis).max(0.0).sqrt();
+                // Lines that end before the axis reach less far to the side than the last arc at the axis does; above the apex, the
+                // arc is widest beyond the axis.
+                let chord = (self.last_range().powi(2) - axis.max(0.0).powi(2)).max(0.0).sqrt();
                 let ends_before = |line: f64| self.last_range() * line.cos() < axis;
                 if ends_before(self.lines.first()) {
                     low[0] = low[0].max(-chord);
@@ -241,9 +248,13 @@ impl Probe {
                     Array::Linear => 1.0,
                     Array::Curved { .. } => self.lines.at(line as f64).cos(),
                 };
-                // Samples 0..n lie before the axis.
-                let n = ((axis / along - self.first_range()) / self.sample_pitch).ceil();
-                n.clamp(0.0, self.samples as f64)
+                if along == 0.0 {
+                    return if axis > 0.0 { self.samples as f64 } else { 0.0 };
+                }
+                // Samples before this one lie before the axis; on a line that rises from the apex, those after it.
+                let at_axis = (axis / along - self.first_range()) / self.sample_pitch;
+                let before = |n: f64| n.clamp(0.0, self.samples as f64);
+                if along > 0.0 { before(at_axis.ceil()) } else { self.samples as f64 - before(at_axis.floor() + 1.0) }
             })
             .sum();
         folded / (count * self.samples) as f64
@@ -265,11 +276,15 @@ impl Probe {
         match self.array {
             Array::Linear => ([first, r0], [last, r1]),
             Array::Curved { .. } => {
-                let widest = first.abs().max(last.abs());
-                let straight = if first <= 0.0 && last >= 0.0 { 0.0 } else { first.abs().min(last.abs()) };
-                let low_x = if first < 0.0 { r1 * first.sin() } else { r0 * first.sin() };
-                let high_x = if last > 0.0 { r1 * last.sin() } else { r0 * last.sin() };
-                ([low_x, r0 * widest.cos()], [high_x, r1 * straight.cos()])
+                // The extremes of an annular sector: its corners, and where an arc is level or upright.
+                let upright = [-PI / 2.0, 0.0, PI / 2.0].into_iter().filter(|a| *a > first && *a < last);
+                let places = [first, last].into_iter().chain(upright).flat_map(|a| {
+                    let level = if a.abs() == PI / 2.0 { 0.0 } else { a.cos() };
+                    [r0, r1].map(|r| [r * a.sin(), r * level])
+                });
+                let ends = ([f64::MAX; 2], [f64::MIN; 2]);
+                places
+                    .fold(ends, |(low, high), p| ([0, 1].map(|n| p[n].min(low[n])), [0, 1].map(|n| p[n].max(high[n]))))
             }
         }
     }
@@ -347,8 +362,8 @@ impl Probe {
         }
         if let Array::Curved { .. } = self.array {
             let widest = self.lines.first().abs().max(self.lines.last().abs());
-            if widest >= PI / 2.0 {
-                return fault("sector angle", format!("{:.1} deg off axis, must stay under 90", widest.to_degrees()));
+            if widest >= PI {
+                return fault("sector angle", format!("{:.1} deg off axis, must stay under 180", widest.to_degrees()));
             }
         }
         match &self.advance {

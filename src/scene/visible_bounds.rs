@@ -279,7 +279,8 @@ fn unswept(probe: &Probe, corners: &[DVec3], x: Span, y: Span, z: Span) -> (Span
 fn in_sector(probe: &Probe, x: Span, y: Span) -> (Span, Span) {
     let (low, high) = probe.plane_bounds();
     let (mut x, mut y) = (x.within(low[0], high[0]), y.within(low[1], high[1]));
-    if let Array::Curved { .. } = probe.array {
+    // A radial sector is bounded by its box alone.
+    if matches!(probe.array, Array::Curved { .. }) && !probe.is_radial() {
         let chord = |range: f64, across: f64| (range * range - across * across).max(0.0).sqrt();
         y = y.within(chord(probe.first_range(), x.most()), chord(probe.last_range(), x.least()));
         let (first, last) = (probe.lines.first().tan(), probe.lines.last().tan());

@@ -117,6 +117,19 @@ pub fn still() -> Probe {
     Probe { motion: Motion::Still { thickness: 3.0 }, slices: Axis::centred(1.0, 1), ..wobbler() }
 }
 
+/// A radial probe that is pulled back: lines to 141 degrees off the depth axis.
+pub fn radial() -> Probe {
+    Probe {
+        array: Array::Curved { radius: 6.0 },
+        lines: Axis::centred(0.105, 48),
+        start_depth: 1.0,
+        motion: Motion::Translated,
+        slices: Axis::centred(2.0, 9),
+        samples: 40,
+        ..wobbler()
+    }
+}
+
 pub fn cartesian(size: [usize; 3]) -> Geometry {
     Geometry::Cartesian(Grid { size, spacing: [0.5, 0.4, 0.9], origin: [-4.0, 1.0, -3.0] })
 }
@@ -194,6 +207,7 @@ pub fn geometries() -> Vec<(&'static str, Geometry)> {
         ("fan, uneven and mixed", Geometry::Sweep(mixed)),
         ("linear array, translated", Geometry::Sweep(linear())),
         ("single frame", Geometry::Sweep(still())),
+        ("radial array, translated", Geometry::Sweep(radial())),
         ("Cartesian", cartesian([17, 23, 9])),
     ]
 }
@@ -279,6 +293,7 @@ fn ray_scenes() -> Vec<SceneSpec> {
         ("linear array, translated", Geometry::Sweep(linear())),
         ("linear array, translated and moving backwards", Geometry::Sweep(moved(linear(), -0.9))),
         ("single frame", Geometry::Sweep(still())),
+        ("radial array, translated and moving", Geometry::Sweep(moved(radial(), 0.6))),
         ("Cartesian", cartesian([17, 23, 9])),
         ("Cartesian, one slice", cartesian([9, 8, 1])),
     ];

@@ -13,7 +13,7 @@ pub use super::files::*;
 pub use super::probes::wobbler;
 pub use super::scenes::{BYTES, FLOATS, scene};
 pub use echolume::verify::built_in::{
-    ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, still, uneven,
+    ALL_FILTERS, Noise, TURNED, body_frames, cartesian, frames, geometries, linear, radial, still, uneven,
 };
 
 /// A context that fails its test if validation reported anything.

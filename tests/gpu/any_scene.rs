@@ -102,7 +102,7 @@ fn one_of<'a, T: ?Sized>(noise: &mut Noise, all: &[&'a T]) -> &'a T {
 fn geometries() -> Vec<Geometry> {
     let mut moving = wobbler();
     moving.advance = Advance::Same(0.02);
-    let sweeps = [wobbler(), moving, uneven(wobbler()), linear(), still()];
+    let sweeps = [wobbler(), moving, uneven(wobbler()), linear(), still(), radial()];
     sweeps.into_iter().map(Geometry::Sweep).chain([cartesian([20, 22, 18])]).collect()
 }
 

@@ -44,6 +44,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
         ("translated", Geometry::Sweep(linear())),
         ("translated, moving backwards", Geometry::Sweep(moved(linear(), -0.9))),
         ("still", Geometry::Sweep(still())),
+        ("radial, moving", Geometry::Sweep(moved(radial(), 0.6))),
         ("Cartesian", {
             let grid =
                 echolume::probe::Grid { size: [60, 110, 40], spacing: [0.5, 0.5, 0.7], origin: [-14.0, 18.0, -14.0] };

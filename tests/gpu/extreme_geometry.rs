@@ -76,6 +76,14 @@ fn fan(ra: f64, rw: f64, d0: f64, sector: f64, sweep: f64) -> Probe {
     }
 }
 
+fn still(probe: Probe) -> Probe {
+    Probe { motion: Motion::Still { thickness: 2.0 }, slices: Axis::centred(1.0, 1), ..probe }
+}
+
+fn translated(probe: Probe, pitch: f64) -> Probe {
+    Probe { motion: Motion::Translated, slices: Axis::centred(pitch, 9), ..probe }
+}
+
 const OBLIQUE: &str = "picture = { size = [28, 24] }
     camera = { azimuth = 25, elevation = 35 }
     ray = { sampling = 'exact', early_end = 0.0 }
@@ -86,10 +94,6 @@ const OBLIQUE: &str = "picture = { size = [28, 24] }
 #[test]
 fn probes_at_the_limits_of_what_is_built_are_drawn() {
     let device = Device::new();
-    let still =
-        |probe: Probe| Probe { motion: Motion::Still { thickness: 2.0 }, slices: Axis::centred(1.0, 1), ..probe };
-    let translated =
-        |probe: Probe, pitch: f64| Probe { motion: Motion::Translated, slices: Axis::centred(pitch, 9), ..probe };
     let linear = |pitch: f64, probe: Probe| Probe { array: Array::Linear, lines: Axis::centred(pitch, 24), ..probe };
     let wide = 179.8 / 180.0 * PI;
     let plain = fan(20.0, 12.0, 2.0, 1.1, 0.6);
@@ -108,6 +112,15 @@ fn probes_at_the_limits_of_what_is_built_are_drawn() {
         ("T near 180 deg, still", still(fan(10.0, 0.0, 0.0, wide, 0.1))),
         ("T near 180 deg, translated", translated(fan(10.0, 0.0, 0.0, wide, 0.1), 2.0)),
         ("T near 180 deg, fan about the apex", fan(10.0, 10.0, 0.0, wide, 0.5)),
+        ("T = 180 deg, translated", translated(fan(10.0, 0.0, 0.0, PI, 0.1), 2.0)),
+        ("T = 200 deg, still", still(fan(10.0, 0.0, 2.0, 3.5, 0.1))),
+        ("T = 290 deg, translated", translated(fan(6.0, 0.0, 1.0, 5.06, 0.1), 2.0)),
+        ("T of a circle but for a line", translated(fan(6.0, 0.0, 1.0, 2.0 * PI * 31.0 / 32.0, 0.1), 2.0)),
+        ("T = 240 deg, fan about an axis behind the apex", fan(10.0, 30.0, 0.5, 4.2, 0.5)),
+        ("T = 240 deg to one side", {
+            let lines = Axis::Even { first: -1.0, pitch: 0.13, count: 32 };
+            translated(Probe { lines, ..fan(6.0, 0.0, 1.0, 1.0, 0.1) }, 2.0)
+        }),
         ("F near 180 deg", fan(20.0, 12.0, 2.0, 1.1, wide)),
         ("T and F near 180 deg", fan(10.0, 10.0, 0.5, wide, wide)),
         ("Ra = 10 m: f32 places are off by 0.5 um", fan(1e4, 12.0, 2.0, 6e-3, 0.6)),
@@ -155,7 +168,7 @@ fn probes_without_a_valid_geometry_are_refused_by_name() {
         ("single frame of a fan", Probe { slices: Axis::centred(0.1, 1), ..plain.clone() }, "frames", "still"),
         ("F = 0", fan(20.0, 12.0, 2.0, 1.1, 0.0), "frames", "rise"),
         ("T = 0", fan(20.0, 12.0, 2.0, 0.0, 0.5), "scan lines", "rise"),
-        ("T = 180 deg", fan(20.0, 20.0, 2.0, PI, 0.5), "sector angle", "under 90"),
+        ("T = 360 deg", fan(20.0, 20.0, 2.0, 2.0 * PI, 0.5), "sector angle", "under 180"),
         ("F = 180 deg", fan(20.0, 12.0, 2.0, 1.0, PI), "fan angle", "under 90"),
         (
             "all of the sector lies before the axis",
@@ -187,6 +200,10 @@ fn a_sector_that_folds_about_its_axis_is_drawn_beyond_it() {
         ("the axis at the face", fan(20.0, 0.0, 2.0, 1.1, 0.6)),
         ("phased", fan(0.0, 0.0, 0.0, 1.1, 0.6)),
         ("phased, behind its axis", fan(0.0, 5.0, 0.0, 1.3, 0.6)),
+        ("phased, a single frame", still(fan(0.0, 0.0, 0.0, 1.4, 0.1))),
+        ("phased, translated", translated(fan(0.0, 0.0, 0.0, 1.4, 0.1), 2.0)),
+        ("phased and radial", translated(fan(0.0, 0.0, 0.0, 4.6, 0.1), 2.0)),
+        ("endocavitary and radial", fan(10.5, 6.0, 0.5, 3.9, 0.9)),
     ] {
         let of = |mode: &str| scene(Geometry::Sweep(probe.clone()), BYTES, &format!("mode = '{mode}'\n{OBLIQUE}"));
         let seen = drawn_as_the_reference(&device, name, of("vr"));

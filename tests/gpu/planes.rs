@@ -50,8 +50,9 @@ fn a_linear_field_is_itself_on_every_plane() {
     let device = Device::new();
     for (name, geometry) in geometries() {
         let is_still = name == "single frame";
-        let slope = DVec3::new(0.006, 0.009, if is_still { 0.0 } else { -0.007 });
-        let field = |p: DVec3| 0.25 + slope.dot(p - DVec3::new(0.0, 20.0, 0.0));
+        let slope = DVec3::new(0.005, 0.006, if is_still { 0.0 } else { -0.005 });
+        let (low, high) = echolume::scene::insonified_box(&geometry);
+        let field = |p: DVec3| 0.5 + slope.dot(p - (low + high) / 2.0);
         for (plane, axes) in [
             ("", turned(0.0, 0.0, 0.0)),
             ("plane = 'b'", [DVec3::Z, DVec3::Y, DVec3::X]),

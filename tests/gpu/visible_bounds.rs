@@ -24,6 +24,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
         ("translated", Geometry::Sweep(linear())),
         ("translated, moving", Geometry::Sweep(moved(linear()))),
         ("single frame", Geometry::Sweep(still())),
+        ("radial, moving", Geometry::Sweep(moved(radial()))),
     ]
 }
 

@@ -47,8 +47,9 @@ fn geometry(draw: &mut Draw) -> Geometry {
         0 => Advance::Same(0.5 * (slices.at(1.0) - slices.at(0.0))),
         _ => Advance::None,
     };
-    let (array, lines) = match draw.of(3) {
+    let (array, lines) = match draw.of(4) {
         0 => (Array::Linear, Axis::centred(2.0, 16)),
+        1 => (Array::Curved { radius: 20.0 }, Axis::centred(0.3, 16)),
         _ => (Array::Curved { radius: 20.0 }, Axis::centred(0.05, 16)),
     };
     Geometry::Sweep(Probe { array, lines, motion, slices, advance, ..wobbler() })

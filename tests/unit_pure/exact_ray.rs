@@ -56,6 +56,14 @@ fn sweeps() -> Vec<Probe> {
         Probe { motion: Motion::Translated, slices: Axis::centred(2.5, 8), ..fan.clone() },
         Probe { array: Array::Linear, lines: Axis::centred(2.0, 16), ..fan.clone() },
         Probe { motion: Motion::Fan { wobble_radius: 32.0 }, ..fan.clone() },
+        // Radial: lines to 135 degrees off the axis, which lies behind the apex for the second.
+        Probe {
+            lines: Axis::centred(0.31, 16),
+            motion: Motion::Translated,
+            slices: Axis::centred(9.0, 8),
+            ..fan.clone()
+        },
+        Probe { lines: Axis::centred(0.31, 16), motion: Motion::Fan { wobble_radius: 50.0 }, ..fan.clone() },
         fan,
     ]
 }

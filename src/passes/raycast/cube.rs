@@ -118,13 +118,17 @@ fn reference_pixel(scene: &Scene, volume: &Texels, block: &[HalfSpace], x: f64, 
         Some(own) if scene.settings.cube.edges => {
             let faces = block.iter().map(|half| Side { normal: half.normal, room: half.room(place) });
             let sides = faces.chain(borders(place)).enumerate();
-            edge(scene, sides.filter(|(i, _)| *i != own).map(|(_, side)| side), normal, place, x, y)
+            let others = sides.filter(|(i, side)| *i != own && side.normal.dot(normal) < SAME_FACE);
+            edge(scene, others.map(|(_, side)| side), normal, place, x, y)
         }
         _ => 0.0,
     };
     let [r, g, b] = EDGE.0.map(|c| grey + (c - grey) * EDGE.1 * near);
     [r, g, b, 1.0]
 }
+
+/// Cosine of the least angle between faces that meet at an edge, 8 degrees: where a plane touches an arc there is none.
+const SAME_FACE: f64 = 0.99;
 
 /// A face of the block or a border of the sector relative to a point: its outward normal, and its distance, mm.
 struct Side {

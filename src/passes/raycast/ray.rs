@@ -70,6 +70,7 @@ pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
             },
             match probe.array {
                 Array::Linear => 0,
+                Array::Curved { .. } if probe.is_radial() => 2,
                 Array::Curved { .. } => 1,
             },
         ),
@@ -133,8 +134,8 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
             .f32("line_density", 0.0)
             .f32("advance", 0.0),
         Geometry::Sweep(probe) => {
-            let low = line_parameter(probe.array, probe.lines.first());
-            let high = line_parameter(probe.array, probe.lines.last());
+            let low = line_parameter(probe, probe.lines.first());
+            let high = line_parameter(probe, probe.lines.last());
             let (sweep_low, sweep_high) = sweep_span(probe);
             let entries = f64::from(scene.settings.ray.entries - 1);
             let advance = match &probe.advance {

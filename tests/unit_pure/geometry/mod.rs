@@ -98,7 +98,8 @@ fn ways(probe: &Probe) -> Vec<Probe> {
 fn indices_round_trip_through_space_for_every_array_motion_and_advance() {
     let two = Probe { slices: Axis::Even { first: -1.0, pitch: 2.0, count: 2 }, ..linear() };
     let seven = Probe { slices: Axis::Even { first: -4.0, pitch: 2.0, count: 7 }, ..linear() };
-    for probe in [fan(), linear(), two, seven].iter().flat_map(ways) {
+    let radial = Probe { lines: Axis::centred(3.1, 3), motion: Motion::Translated, ..fan() };
+    for probe in [fan(), linear(), two, seven, radial].iter().flat_map(ways) {
         probe.check().expect("a probe");
         let slices = probe.slices.len() as f64 - 1.0;
         for n in 0..200 {
@@ -146,12 +147,14 @@ fn turned(pitch: f64) -> [Axis; 5] {
 
 #[test]
 fn the_plane_s_rectangle_touches_the_sector_on_all_four_sides() {
-    for lines in turned(0.2) {
+    for lines in turned(0.2).into_iter().chain(turned(0.5)) {
         // Without a wobble axis, nothing of the sector is cut.
         let probe = Probe { lines, motion: Motion::Translated, ..fan() };
         let (low, high) = probe.plane_bounds();
         let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for (sample, line) in (0..=4).flat_map(|s| (0..=80).map(move |l| (f64::from(s), f64::from(l) / 20.0))) {
+        let upright = [-PI / 2.0, 0.0, PI / 2.0].map(|a| probe.lines.index_of(a).clamp(0.0, 4.0));
+        let all: Vec<f64> = (0..=80).map(|l| f64::from(l) / 20.0).chain(upright).collect();
+        for (sample, line) in (0..=4).flat_map(|s| all.iter().map(move |l| (f64::from(s), *l))) {
             let (x, y) = probe.plane_point(sample, line);
             least = [least[0].min(x), least[1].min(y)];
             most = [most[0].max(x), most[1].max(y)];
@@ -227,12 +230,15 @@ fn samples_beyond_the_axis_round_trip_through_space_where_the_sector_is_cut() {
     let (mut cut, mut whole) = (0, 0);
     for n in 0..300 {
         let radius = if n % 3 == 0 { 0.0 } else { random(4.0, 40.0) };
-        let half = random(0.2, 1.55);
+        // Every fifth is radial, and may have its axis behind the apex.
+        let is_radial = n % 5 == 3;
+        let half = if is_radial { random(1.6, 3.1) } else { random(0.2, 1.55) };
+        let wobble_radius = random(0.0, if is_radial { 2.0 } else { 1.0 }) * radius;
         let probe = Probe {
             array: Array::Curved { radius },
             lines: Axis::centred(2.0 * half / 40.0, 41),
             start_depth: if n % 2 == 0 { 0.0 } else { random(0.0, 8.0) },
-            motion: Motion::Fan { wobble_radius: if n % 5 == 0 { 0.0 } else { random(0.0, 1.0) * radius } },
+            motion: Motion::Fan { wobble_radius: if n % 5 == 0 { 0.0 } else { wobble_radius } },
             slices: Axis::centred(random(0.02, 0.2), 11),
             samples: 80,
             sample_pitch: random(0.1, 1.0),

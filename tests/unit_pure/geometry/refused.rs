@@ -2,7 +2,7 @@
 
 use super::{fan, linear, still};
 use echolume::probe::{Advance, Array, Axis, Motion, Probe};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Refused with this field, in a message that contains all of these words.
 fn refused(probe: &Probe, field: &str, words: &[&str]) {
@@ -73,12 +73,12 @@ fn a_sweep_has_two_frames_and_a_still_probe_one() {
 }
 
 #[test]
-fn a_sector_and_a_fan_stay_in_front_of_the_probe() {
+fn a_sector_stays_under_half_a_turn_and_a_fan_in_front_of_the_probe() {
     let sector = |widest: f64| Probe { lines: even(0.0, widest, 2), motion: Motion::Translated, ..fan() };
-    refused(&sector(FRAC_PI_2), "sector angle", &["90.0 deg off axis"]);
-    refused(&sector(1.6), "sector angle", &["91.7 deg"]);
-    refused(&Probe { lines: even(-1.6, 1.6, 2), ..sector(1.0) }, "sector angle", &["91.7 deg"]);
-    taken(&sector(1.57));
+    refused(&sector(PI), "sector angle", &["180.0 deg off axis"]);
+    refused(&sector(3.2), "sector angle", &["183.3 deg"]);
+    refused(&Probe { lines: even(-3.2, 3.2, 2), ..sector(1.0) }, "sector angle", &["183.3 deg"]);
+    taken(&sector(3.13));
     // The lines of a linear array are positions: 3 mm are no angle. The same holds for the slices of a translated array.
     taken(&linear());
     // Beyond the wobble axis: the complete sector is in front of the apex.
