@@ -21,6 +21,8 @@ use std::thread::JoinHandle;
 pub struct Pipeline {
     context: Arc<Context>,
     pub module: Module,
+    /// Of its filtered textures. [`Pipelines`] owns it.
+    pub sampler: vk::Sampler,
     pub set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
@@ -167,17 +169,16 @@ impl Pipeline {
     ) -> Result<Pipeline, GpuError> {
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
-        let samplers = [sampler];
         let bindings: Vec<_> = module
             .bindings
             .iter()
             .map(|b| {
-                let binding = vk::DescriptorSetLayoutBinding::default()
+                // Without immutable samplers: lavapipe of Mesa 26.2 loses those of pushed descriptors.
+                vk::DescriptorSetLayoutBinding::default()
                     .binding(b.binding)
                     .descriptor_type(descriptor_type(b.kind))
                     .descriptor_count(1)
-                    .stage_flags(vk::ShaderStageFlags::COMPUTE);
-                if b.kind == Kind::Filtered { binding.immutable_samplers(&samplers) } else { binding }
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
             })
             .collect();
         let flags = match context.push_descriptor {
@@ -190,6 +191,7 @@ impl Pipeline {
         let mut pipeline = Pipeline {
             context: context.clone(),
             module,
+            sampler,
             set_layout,
             layout: vk::PipelineLayout::null(),
             handle: vk::Pipeline::null(),

@@ -352,7 +352,8 @@ impl Recorder {
                     };
                     places.push((binding, DescriptorInfo::Image(images.len())));
                     images.push([vk::DescriptorImageInfo {
-                        sampler: vk::Sampler::null(),
+                        // Ignored by bindings that have none.
+                        sampler: pipeline.sampler,
                         image_view: view,
                         image_layout: vk::ImageLayout::GENERAL,
                     }]);
