@@ -1,23 +1,19 @@
-//! Instance, device, queues, memory allocator and validation messenger. Everything made from a context holds an `Arc` of it, and
-//! its `Drop` destroys them in order.
+//! Instance, device, queues and memory allocator. Everything made from a context holds an `Arc` of it, and its `Drop` destroys them in
+//! order.
 
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
+use super::validation::{self, Layer, Messenger};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::{BTreeSet, HashMap};
-use std::ffi::{CStr, CString, c_void};
+use std::ffi::CString;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
-
-const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
-/// The first version of the layer whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559,
-/// September 2024).
-const TIMELINE_VALIDATION: u32 = vk::make_api_version(0, 1, 3, 297);
 
 /// Which device a [`Context`] uses, and how.
 #[derive(Clone, Debug, Default)]
@@ -36,8 +32,8 @@ pub struct Context {
     pub(super) instance: ash::Instance,
     /// For a context that presents pictures.
     pub(super) presentation: Option<Presentation>,
-    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    messages: Box<Mutex<Vec<String>>>,
+    /// With validation.
+    messenger: Option<Messenger>,
     /// The validation layer handles waits for timeline semaphores.
     layer_knows_timelines: bool,
     pub candidate: Candidate,
@@ -86,7 +82,7 @@ pub struct Counts {
 /// No Vulkan loader or no driver.
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
-    let instance = create_instance(&entry, false, false, None)?;
+    let instance = create_instance(&entry, None, false, None)?;
     let candidates = device_selection::candidates(&instance);
     // SAFETY: nothing made from the instance is left.
     unsafe { instance.destroy_instance(None) };
@@ -113,20 +109,17 @@ impl Context {
 
     fn create(options: &ContextOptions, target: Option<&Target>) -> Result<Arc<Context>, GpuError> {
         let entry = load()?;
-        // SAFETY: only reads the list of layers.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
-        let layer = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(VALIDATION));
-        if options.validation && layer.is_none() {
-            return Err(GpuError::NoValidation);
-        }
-        let validates_timelines = layer.is_some_and(|l| l.spec_version >= TIMELINE_VALIDATION);
+        let layer = match options.validation {
+            true => Some(Layer::find(&entry).ok_or(GpuError::NoValidation)?),
+            false => None,
+        };
         // SAFETY: only reads the list of extensions.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-        let debug_utils = options.validation
+        let debug_utils = layer.is_some()
             || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
-        let instance = create_instance(&entry, options.validation, debug_utils, target)?;
+        let instance = create_instance(&entry, layer, debug_utils, target)?;
         // Also on failure, the loader stays loaded until the instance is destroyed.
-        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, validates_timelines, target);
+        let made = Context::on_instance(entry.clone(), &instance, options, debug_utils, layer, target);
         if made.is_err() {
             // SAFETY: `on_instance` leaves nothing alive when it fails.
             unsafe { instance.destroy_instance(None) };
@@ -139,7 +132,7 @@ impl Context {
         instance: &ash::Instance,
         options: &ContextOptions,
         debug_utils: bool,
-        validates_timelines: bool,
+        layer: Option<Layer>,
         target: Option<&Target>,
     ) -> Result<Arc<Context>, GpuError> {
         let mut candidates = device_selection::candidates(instance)?;
@@ -164,18 +157,14 @@ impl Context {
                 return Err(GpuError::Memory { operation: "create allocator".into(), fault: e.to_string() });
             }
         };
-        let messages = Box::new(Mutex::new(Vec::new()));
-        let messenger = match options.validation {
-            false => None,
-            true => match create_messenger(&entry, instance, &messages) {
-                Ok(messenger) => Some(messenger),
-                Err(error) => {
-                    drop(allocator);
-                    // SAFETY: nothing made from the device is left.
-                    unsafe { device.destroy_device(None) };
-                    return Err(error);
-                }
-            },
+        let messenger = match layer.map(|_| Messenger::new(&entry, instance)).transpose() {
+            Ok(messenger) => messenger,
+            Err(error) => {
+                drop(allocator);
+                // SAFETY: nothing made from the device is left.
+                unsafe { device.destroy_device(None) };
+                return Err(error);
+            }
         };
         let context = Arc::new(Context {
             push_descriptor: (candidate.push_descriptors)
@@ -198,8 +187,7 @@ impl Context {
             instance: instance.clone(),
             entry,
             messenger,
-            messages,
-            layer_knows_timelines: validates_timelines,
+            layer_knows_timelines: layer.is_some_and(Layer::knows_timelines),
             candidate,
             device,
             allocator: Mutex::new(Some(allocator)),
@@ -217,7 +205,7 @@ impl Context {
 
     /// All validation messages so far. A correct program has none.
     pub fn messages(&self) -> Vec<String> {
-        self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+        self.messenger.as_ref().map(Messenger::messages).unwrap_or_default()
     }
 
     /// True if hazards between submissions that validation reports are real. Older layers ignore that a queue waits for the timeline
@@ -354,9 +342,7 @@ impl Drop for Context {
             let _ = self.device.device_wait_idle();
             drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
             self.device.destroy_device(None);
-            if let Some((debug, messenger)) = self.messenger.take() {
-                debug.destroy_debug_utils_messenger(messenger, None);
-            }
+            drop(self.messenger.take());
             self.instance.destroy_instance(None);
         }
     }
@@ -370,7 +356,7 @@ fn load() -> Result<ash::Entry, GpuError> {
 /// `target`: where pictures will be presented, if anywhere.
 fn create_instance(
     entry: &ash::Entry,
-    validation: bool,
+    layer: Option<Layer>,
     debug_utils: bool,
     target: Option<&Target>,
 ) -> Result<ash::Instance, GpuError> {
@@ -378,22 +364,24 @@ fn create_instance(
         .application_name(c"echolume")
         .engine_name(c"echolume")
         .api_version(vk::API_VERSION_1_3);
-    let layers: Vec<_> = validation.then_some(VALIDATION.as_ptr()).into_iter().collect();
+    let layers: Vec<_> = layer.iter().map(|_| Layer::NAME.as_ptr()).collect();
     let mut extensions: Vec<_> = debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect();
-    // The layer itself provides this extension.
-    extensions.extend(validation.then_some(ash::ext::validation_features::NAME.as_ptr()));
+    extensions.extend(layer.map(|layer| layer.extension().as_ptr()));
     if let Some(target) = target {
         extensions.extend(target.extensions(entry)?.iter().map(|name| name.as_ptr()));
     }
-    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let settings = validation::settings();
+    let mut by_settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
+    let mut by_features = vk::ValidationFeaturesEXT::default().enabled_validation_features(validation::FEATURES);
     let mut create = vk::InstanceCreateInfo::default()
         .application_info(&application)
         .enabled_layer_names(&layers)
         .enabled_extension_names(&extensions);
-    if validation {
-        create = create.push_next(&mut features);
-    }
+    create = match layer {
+        Some(layer) if layer.has_settings => create.push_next(&mut by_settings),
+        Some(_) => create.push_next(&mut by_features),
+        None => create,
+    };
     // SAFETY: every pointer in `create` outlives the call.
     let instance = unsafe { entry.create_instance(&create, None) };
     match instance {
@@ -439,39 +427,4 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
     // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
     unsafe { instance.create_device(candidate.handle, &create, None) }
         .context(|| format!("create device '{}'", candidate.name))
-}
-
-fn create_messenger(
-    entry: &ash::Entry,
-    instance: &ash::Instance,
-    messages: &Mutex<Vec<String>>,
-) -> Result<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT), GpuError> {
-    let debug = ash::ext::debug_utils::Instance::new(entry, instance);
-    let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
-        // Not PERFORMANCE: it recommends transfer layouts, but images stay in GENERAL by design.
-        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
-        .pfn_user_callback(Some(on_message))
-        .user_data(std::ptr::from_ref(messages).cast_mut().cast());
-    // SAFETY: `messages` is boxed in the context and dropped after the messenger.
-    let messenger = unsafe { debug.create_debug_utils_messenger(&create, None) };
-    messenger.map(|m| (debug, m)).context(|| "create messenger".into())
-}
-
-unsafe extern "system" fn on_message(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    messages: *mut c_void,
-) -> vk::Bool32 {
-    if data.is_null() || messages.is_null() {
-        return vk::FALSE;
-    }
-    // SAFETY: Vulkan hands over valid data, and `messages` is the context's boxed mutex, which outlives the messenger.
-    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
-    // SAFETY: a message is null or a terminated string.
-    let text = unsafe { data.message_as_c_str() }.map_or(String::new(), |m| m.to_string_lossy().into_owned());
-    tracing::error!(target: "validation", "{text}");
-    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
-    vk::FALSE
 }

@@ -20,6 +20,7 @@ pub mod resources;
 pub mod shader_reload;
 mod timeline;
 mod timing;
+mod validation;
 pub mod window;
 
 pub use context::{Context, ContextOptions};

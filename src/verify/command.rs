@@ -159,6 +159,14 @@ impl Verify {
             made => made,
         }
         .map_err(no_device)
+        .and_then(|mut dut| {
+            if dut.watched() && !dut.prove_validation().map_err(failed)? {
+                say!(
+                    "validation sees nothing here: the layer is active and did not notice a missing barrier; its silence proves nothing"
+                );
+            }
+            Ok(dut)
+        })
     }
 
     fn chosen(&self, mut checks: Vec<Check>) -> Result<Vec<Check>, Failure> {

@@ -31,6 +31,35 @@ pub fn checks(_: Level) -> Vec<Check> {
     ]
 }
 
+/// True if the validation layer notices that a barrier is missing. A layer may be active and see nothing: since 2024 it ignores what
+/// shaders access, unless it is told otherwise.
+///
+/// # Errors
+/// As [`DeviceUnderTest::another`].
+pub fn validation_notices_a_dropped_barrier(dut: &DeviceUnderTest) -> Result<bool, GpuError> {
+    // The last ones: they lie between passes over the picture.
+    const TRIED: usize = 8;
+    let isolated = IsolatedContext::of_changes(dut)?;
+    let (context, scene) = (&isolated.context, made(PLAIN)?);
+    let frames = stored(&scene, 0);
+    let barriers_without = |dropped: Option<u32>| {
+        let mut renderer = Renderer::new(context, scene.clone(), &RendererOptions::default())?;
+        dropped.iter().for_each(|n| renderer.drop_barrier(*n));
+        send(&mut renderer, &frames, 0)?;
+        renderer.show(0)?;
+        renderer.picture()?;
+        Ok::<u32, GpuError>(renderer.barriers())
+    };
+    let count = barriers_without(None)?;
+    for n in (1..=count).rev().take(TRIED) {
+        barriers_without(Some(n))?;
+        if isolated.credible_messages().iter().any(|message| message.contains("SYNC-HAZARD")) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
 /// Runs a scenario on one, two and three queues.
 fn on_queues(dut: &mut DeviceUnderTest, scenario: Scenario) -> Result<Findings, GpuError> {
     let (mut findings, mut totals) = (Findings::default(), [0, 0]);

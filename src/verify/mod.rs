@@ -214,6 +214,8 @@ pub struct DeviceUnderTest {
     injected_fault: Option<Change>,
     /// Number of validation messages already reported.
     messages_read: usize,
+    /// The validation layer is active but does not notice a missing barrier.
+    validation_is_blind: bool,
 }
 
 impl DeviceUnderTest {
@@ -248,6 +250,7 @@ impl DeviceUnderTest {
             program: std::env::current_exe().ok(),
             modes: None,
             messages_read: 0,
+            validation_is_blind: false,
         })
     }
 
@@ -316,9 +319,20 @@ impl DeviceUnderTest {
         &self.options
     }
 
-    /// True if the validation layer is active.
+    /// True if the validation layer is active, and not known to see nothing.
     pub fn watched(&self) -> bool {
-        self.options.validation
+        self.options.validation && !self.validation_is_blind
+    }
+
+    /// Finds out, once and for all, whether validation notices a missing barrier. If not, its silence proves nothing, and no report says
+    /// that it watched. Without validation it notices none.
+    ///
+    /// # Errors
+    /// As [`DeviceUnderTest::another`].
+    pub fn prove_validation(&mut self) -> Result<bool, GpuError> {
+        let notices = hazards::validation_notices_a_dropped_barrier(self)?;
+        self.validation_is_blind = !notices;
+        Ok(notices)
     }
 
     /// A run of these outcomes that ends now.
@@ -329,7 +343,7 @@ impl DeviceUnderTest {
             date: machine::date(),
             device: machine::device(&self.context),
             level: self.level,
-            validation: self.options.validation,
+            validation: self.watched(),
             seconds: begun.elapsed().as_secs_f64(),
             outcomes,
         }
@@ -401,8 +415,13 @@ impl IsolatedContext {
 
     /// Adds the validation messages as faults.
     pub(crate) fn report_validation(&self, findings: &mut Findings) {
-        let messages = credible_messages(&self.context, self.context.messages(), self.hears_submissions);
+        let messages = self.credible_messages();
         findings.faults.extend(messages.iter().map(|message| Fault::new(format!("validation: {message}"))));
+    }
+
+    /// All validation messages so far, without known false positives.
+    fn credible_messages(&self) -> Vec<String> {
+        credible_messages(&self.context, self.context.messages(), self.hears_submissions)
     }
 }
 

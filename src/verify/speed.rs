@@ -68,7 +68,8 @@ fn time(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuE
         return Ok(Findings::left_out("no scene that is timed needs it"));
     };
     // Validation slows down commands and submissions, so times are measured without it.
-    let own = dut.watched().then(|| Context::new(&ContextOptions { validation: false, ..dut.options().clone() }));
+    let own =
+        dut.options().validation.then(|| Context::new(&ContextOptions { validation: false, ..dut.options().clone() }));
     let context = own.transpose()?.unwrap_or_else(|| dut.context.clone());
     let samples = pass_runner::time_pass(&context, scene, pass, repeats)?;
     let mut findings = Findings::default();

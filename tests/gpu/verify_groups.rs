@@ -222,3 +222,14 @@ fn a_renderer_unlike_a_fresh_one_is_detected_by_the_stress_check() {
     let found = verify::stress::stress(&mut bench(), 0.1, &spoil).expect("stress");
     assert!(found.faults.iter().any(|fault| fault.what.contains("values are others")), "{:?}", found.faults);
 }
+
+/// Prevents reports that say that validation watched where it sees nothing: layers from 2024 on ignore what shaders access unless asked.
+#[test]
+fn validation_counts_only_if_it_notices_a_dropped_barrier() {
+    for validation in [true, false] {
+        let options = ContextOptions { device: chosen(), validation };
+        let mut bench = DeviceUnderTest::new(&options, Level::Quick).expect("bench");
+        assert_eq!(bench.prove_validation().expect("a device"), validation);
+        assert_eq!(bench.watched(), validation);
+    }
+}

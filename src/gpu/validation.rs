@@ -1,0 +1,122 @@
+//! The Khronos validation layer: what is asked of it, and its messages.
+
+use super::error::{ErrorContext, GpuError};
+use ash::vk;
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
+/// The first version whose synchronization validation handles timeline semaphores (Vulkan-ValidationLayers #8559, September 2024).
+const KNOWS_TIMELINES: u32 = vk::make_api_version(0, 1, 3, 297);
+
+/// The layer as it is installed.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer {
+    version: u32,
+    /// It takes its settings from the program that creates the instance: since January 2024.
+    pub has_settings: bool,
+}
+
+impl Layer {
+    pub const NAME: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+    pub fn find(entry: &ash::Entry) -> Option<Layer> {
+        // SAFETY: only reads the list of layers.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
+        let version = layers.iter().find(|l| l.layer_name_as_c_str() == Ok(Layer::NAME))?.spec_version;
+        // SAFETY: only reads the list of the layer's extensions.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(Some(Layer::NAME)) };
+        let is_settings =
+            |e: &vk::ExtensionProperties| e.extension_name_as_c_str() == Ok(ash::ext::layer_settings::NAME);
+        // Layers between the two do not know every setting, and say so in a message.
+        let has_settings = version >= KNOWS_TIMELINES && extensions.unwrap_or_default().iter().any(is_settings);
+        Some(Layer { version, has_settings })
+    }
+
+    pub fn knows_timelines(self) -> bool {
+        self.version >= KNOWS_TIMELINES
+    }
+
+    /// The extension, of the layer itself, by which the instance asks for synchronization validation.
+    pub fn extension(self) -> &'static CStr {
+        if self.has_settings { ash::ext::layer_settings::NAME } else { ash::ext::validation_features::NAME }
+    }
+}
+
+/// What is asked of a layer that takes settings. Since 2024 synchronization validation ignores what shaders read and write, unless the
+/// second is on: it assumes that a shader accesses every descriptor that it names. All of ours do.
+pub fn settings() -> [vk::LayerSettingEXT<'static>; 2] {
+    const ON: &vk::Bool32 = &vk::TRUE;
+    [c"validate_sync", c"syncval_shader_accesses_heuristic"].map(|name| {
+        let mut setting = vk::LayerSettingEXT::default()
+            .layer_name(Layer::NAME)
+            .setting_name(name)
+            .ty(vk::LayerSettingTypeEXT::BOOL32)
+            .values(bytemuck::bytes_of(ON));
+        // ash 0.38 counts bytes.
+        setting.value_count = 1;
+        setting
+    })
+}
+
+/// What is asked of a layer that takes none.
+pub const FEATURES: &[vk::ValidationFeatureEnableEXT] = &[vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+
+/// Collects the layer's messages. To be dropped before its instance is destroyed.
+pub struct Messenger {
+    debug: ash::ext::debug_utils::Instance,
+    handle: vk::DebugUtilsMessengerEXT,
+    messages: Box<Mutex<Vec<String>>>,
+}
+
+impl Messenger {
+    /// # Errors
+    /// The instance runs out of memory.
+    pub fn new(entry: &ash::Entry, instance: &ash::Instance) -> Result<Messenger, GpuError> {
+        let messages = Box::new(Mutex::new(Vec::new()));
+        let debug = ash::ext::debug_utils::Instance::new(entry, instance);
+        let create = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(
+                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+            )
+            // Not PERFORMANCE: it recommends transfer layouts, but images stay in GENERAL by design.
+            .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+            .pfn_user_callback(Some(on_message))
+            .user_data(std::ptr::from_ref::<Mutex<Vec<String>>>(&messages).cast_mut().cast());
+        // SAFETY: `messages` is boxed, and is dropped after the messenger is destroyed.
+        let handle = unsafe { debug.create_debug_utils_messenger(&create, None) };
+        Ok(Messenger { handle: handle.context(|| "create messenger".into())?, debug, messages })
+    }
+
+    /// All messages so far.
+    pub fn messages(&self) -> Vec<String> {
+        self.messages.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+}
+
+impl Drop for Messenger {
+    fn drop(&mut self) {
+        // SAFETY: the instance is still there, as the type's description demands, and nothing calls back once this returns.
+        unsafe { self.debug.destroy_debug_utils_messenger(self.handle, None) };
+    }
+}
+
+unsafe extern "system" fn on_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    if data.is_null() || messages.is_null() {
+        return vk::FALSE;
+    }
+    // SAFETY: Vulkan hands over valid data, and `messages` is the messenger's boxed mutex, which outlives its handle.
+    let (data, messages) = unsafe { (&*data, &*messages.cast::<Mutex<Vec<String>>>()) };
+    // SAFETY: a message and its name are null or terminated strings.
+    let [text, name] = unsafe { [data.message_as_c_str(), data.message_id_name_as_c_str()] }
+        .map(|text| text.map_or(String::new(), |t| t.to_string_lossy().into_owned()));
+    // Older layers repeat the name in the message.
+    let text = if text.contains(&name) { text } else { format!("{name}: {text}") };
+    tracing::error!(target: "validation", "{text}");
+    messages.lock().unwrap_or_else(|e| e.into_inner()).push(text);
+    vk::FALSE
+}
