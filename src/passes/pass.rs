@@ -305,6 +305,12 @@ impl Params {
         self
     }
 
+    /// The texel of the volume that its image begins with.
+    pub(super) fn first_stored(self, scene: &Scene) -> Params {
+        let [column, row, slice] = Slot::Volume.first_texel(scene);
+        self.i32("first_stored_column", column).i32("first_stored_row", row).i32("first_stored_slice", slice)
+    }
+
     pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {
         self.0.push((name, Value::Vec2(value.map(finite))));
         self

@@ -254,17 +254,20 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
     reference: |scene, args, reads, writes| {
         let volume = reads.get("volume");
         let target = writes.get_mut("packed_neighbours");
-        let [width, height, _] = target.size;
-        let first = scene.visible_rectangle([0; 2]).first.map(|n| n as usize);
-        for z in args.slice as usize..(args.slice + args.slices) as usize {
+        let [width, height, depth] = target.size;
+        // Beyond the stored part of the volume its border repeats. No sample needs what is there.
+        let first = Slot::PackedNeighbours.first_texel(scene).map(|n| n as usize);
+        for z in (args.slice as usize..(args.slice + args.slices) as usize)
+            .filter(|z| (first[2]..first[2] + depth).contains(z))
+        {
             for to in (0..height).flat_map(|y| (0..width).map(move |x| [x, y])) {
                 let (x, y) = (to[0] + first[0], to[1] + first[1]);
-                let (right, below) = ((x + 1).min(volume.size[0] - 1), (y + 1).min(volume.size[1] - 1));
+                let (right, below) = ((x + 1).min(first[0] + width - 1), (y + 1).min(first[1] + height - 1));
                 let of = [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| volume.one(x, y, z));
                 let packed = Texels { size: [4, 1, 1], channels: 1, values: of.to_vec() };
                 let bytes = packed.encode(Slot::Volume.format(scene));
                 let words = bytes.chunks_exact(4).map(|b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-                target.set([to[0], to[1], z], &words.collect::<Vec<_>>());
+                target.set([to[0], to[1], z - first[2]], &words.collect::<Vec<_>>());
             }
         }
     },

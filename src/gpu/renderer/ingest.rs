@@ -38,7 +38,7 @@ impl InFlight {
         if let Some(target) = slots.image(place.slot, place.copy) {
             let InFlight { copier, recorder, staging } = self;
             let by = copier.as_mut().unwrap_or(recorder);
-            by.copy_in(barriers, staging, target, place);
+            by.copy_in(barriers, (staging, BufferLayout::default()), target, place);
             by.stamp("upload");
         }
         if let Some(copier) = &mut self.copier {
@@ -235,9 +235,15 @@ impl Renderer {
         };
         let from = self.ring_index;
         self.ring_index = (from + 1) % FRAMES_IN_FLIGHT as usize;
-        let place = SlotParts { slot, copy: image, parts: first..first + count };
+        let [column, row, slice] = slot.first_texel(&self.scene);
+        let place = SlotParts { slot, copy: image, parts: first - slice..first - slice + count };
+        // Of each frame what is stored.
+        let [row_length, image_height] = self.scene.frame_size();
+        let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
+        let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
+        let layout = BufferLayout { offset, row_length, image_height };
         let entry = &mut self.ring[from];
-        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, place, &mut self.timings)?;
+        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)?;
         let Some((slice, image, received)) = self.partial.as_ref().map(PartialFrame::place) else { return Ok(()) };
         self.wait_for_ring()?;
         let at = count as usize * frame_bytes(&self.scene) as usize;
@@ -255,13 +261,13 @@ impl InFlight {
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
         slots: &SlotResources,
-        place: SlotParts,
+        (place, layout): (SlotParts, BufferLayout),
         timings: &mut Timings,
     ) -> Result<(), GpuError> {
         let by = self.copier.as_mut().unwrap_or(&mut self.recorder);
         by.begin(barriers, timelines)?;
         if let Some(target) = slots.image(place.slot, place.copy) {
-            by.copy_in(barriers, &self.staging, target, place);
+            by.copy_in(barriers, (&self.staging, layout), target, place);
             by.stamp("upload");
         }
         timings.host("submit", || by.submit(barriers, timelines))
