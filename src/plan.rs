@@ -126,8 +126,11 @@ impl Plan {
 
     /// How slices get into the 3D image.
     fn slice_path(&self, scene: &Scene) -> String {
-        if chain::copied(scene).is_some() {
-            return "copied into the 3D image as they arrive, by no pass".into();
+        if let Some(slot) = chain::copied(scene) {
+            let (from, to) = (Slot::Frames.format(scene), slot.format(scene));
+            let widened =
+                if from == to { String::new() } else { format!(", widened from {from:?} to {to:?} by the CPU") };
+            return format!("copied into the 3D image as they arrive, by no pass{widened}");
         }
         let last = self.steps_of(Frequency::Frame).last().map_or("no pass", |(_, step)| step.pass.name);
         format!("{last}, the last pass of a frame, writes them into the 3D image")

@@ -83,7 +83,7 @@ pub fn picture_end(scene: &Scene) -> Slot {
 }
 
 /// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
-/// what it reads unchanged.
+/// what it reads without loss.
 pub fn copied(scene: &Scene) -> Option<Slot> {
     let mut requested = Chain::Slices.requested(scene);
     let (_, filter) = requested.next()?;
@@ -109,7 +109,7 @@ impl Pass {
         match self.link {
             Link::Filter(filter) if filter.chain == Chain::Slices => match (self.needed)(scene) {
                 Ok(_) if copied(scene).is_some() => {
-                    Err("a frame is a slice as the volume stores it: it is copied there")
+                    Err("the volume stores a frame's values without loss: it is copied there")
                 }
                 need => need,
             },

@@ -187,7 +187,7 @@ pub struct Filter {
     /// How many columns and rows away one step on slices looks; none: from border to border. Filters before it make that much
     /// more than is visible.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
-    /// True if a step would store what it reads unchanged: alone in its chain it is left out, and frames are copied.
+    /// True if a step would store what it reads without loss: alone in its chain it is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
 }
 

@@ -182,7 +182,7 @@ pub const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter { copies: stores_what_it_reads, ..Filter::of(Chain::Slices) }),
+    link: Link::Filter(Filter { copies: stores_without_loss, ..Filter::of(Chain::Slices) }),
     shader: |_, t| {
         if t.writes_volume() { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
@@ -216,12 +216,13 @@ pub const LOAD_SLICE: Pass = Pass {
     },
 };
 
-/// True if the volume stores the same values as frames hold. Floats that may be beyond 0..1 are clamped on their way to the device.
-fn stores_what_it_reads(scene: &Scene) -> bool {
+/// True if the volume's format holds every value that frames may hold, unscaled. On their way to the device integers become those of a wider
+/// format or floats, and floats that may be beyond 0..1 are clamped. 16-bit floats hold few of the 255ths exactly.
+fn stores_without_loss(scene: &Scene) -> bool {
     let format = Slot::Volume.format(scene);
     match scene.input.stored {
-        StoredType::U8 => format == Format::R8 && scene.input.range == [0.0, 255.0],
-        StoredType::U16 => format == Format::R16 && scene.input.range == [0.0, 65535.0],
+        StoredType::U8 => format != Format::R16f && scene.input.range == [0.0, 255.0],
+        StoredType::U16 => matches!(format, Format::R16 | Format::R32f) && scene.input.range == [0.0, 65535.0],
         StoredType::F32 => format == Format::R32f && scene.input.range == [0.0, 1.0],
     }
 }
