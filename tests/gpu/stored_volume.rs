@@ -3,13 +3,13 @@
 
 use crate::common::gpu::*;
 use crate::visible_bounds::{FILTERS, WINDOWS, geometries, speckle};
-use echolume::passes::{Slot, Texels, is_hit};
+use echolume::passes::{Slot, Texels, chain, is_hit};
 use echolume::picture::Picture;
 use echolume::plan::Rerun;
-use echolume::probe::Geometry;
+use echolume::probe::{Geometry, Grid};
 use echolume::scene::load::Layers;
 use echolume::scene::{Input, Scene, VisibleBounds};
-use echolume::source::Recording;
+use echolume::source::{Recording, StoredType};
 use std::path::Path;
 
 /// Bytes of the volume and of packed neighbours where only the visible part is stored, and where everything is.
@@ -81,6 +81,18 @@ fn draw(device: &Device, scene: Scene, frames: &[Texels]) -> Drawn {
     Drawn { picture, distance, volume, scene: renderer.scene().clone() }
 }
 
+/// What is read back of the volume is the same wherever it is visible.
+fn same_texels(part: &Drawn, all: &Drawn, what: &str) {
+    assert_eq!(part.volume.size, all.volume.size, "{what}");
+    let VisibleBounds { low, high } = part.scene.visible_bounds;
+    for z in low[2]..high[2] {
+        for (x, y) in (low[1]..high[1]).flat_map(|y| (low[0]..high[0]).map(move |x| (x, y))) {
+            let at = [x, y, z].map(|n| n as usize);
+            assert!(part.volume.get(at) == all.volume.get(at), "{what}: texel {at:?}");
+        }
+    }
+}
+
 /// Bit for bit where texels are fetched. The device's filter takes coordinates that are divided by the size of the image: the quotients of
 /// two sizes round differently, by at most 2^-24 of the larger size, which is 1e-5 of a texel here. A sample then differs by 1e-5 of the
 /// difference of two texels, which may change the rounding of a level, and now and then what a threshold decides.
@@ -103,18 +115,9 @@ fn pictures_of_the_stored_part_are_those_of_the_whole_volume() {
             let frames = speckle(&of(true));
             let (part, all) = (draw(&device, of(false), &frames), draw(&device, of(true), &frames));
             let what = format!("{name}, {filter}, {format}, {sampling}, {window}");
-            let bounds = part.scene.visible_bounds;
             stored += Slot::Volume.bytes(&part.scene);
             whole += Slot::Volume.bytes(&all.scene);
-            assert_eq!(part.volume.size, all.volume.size, "{what}");
-            for z in bounds.slices() {
-                for (x, y) in
-                    (bounds.low[1]..bounds.high[1]).flat_map(|y| (bounds.low[0]..bounds.high[0]).map(move |x| (x, y)))
-                {
-                    let at = [x, y, z].map(|n| n as usize);
-                    assert!(part.volume.get(at) == all.volume.get(at), "{what}: texel {at:?}");
-                }
-            }
+            same_texels(&part, &all, &what);
             if sampling != "hardware" {
                 assert!(part.picture == all.picture && part.distance == all.distance, "{what}");
                 continue;
@@ -203,4 +206,41 @@ fn smoothing_that_reaches_further_asks_for_the_slices_beyond() {
     assert_eq!(renderer.picture().expect("picture"), rendered(&device, far, &frames).picture().expect("picture"));
     assert!(matches!(renderer.change(near.clone()).expect("change"), Rerun::Steps { .. }), "what it needs is there");
     assert_eq!(renderer.picture().expect("picture"), rendered(&device, near, &frames).picture().expect("picture"));
+}
+
+/// Frames that no pass touches are cut out of the staging buffer by the copy: the first column and row, the length of a row and of a frame, and the
+/// texel's size are those of what was staged.
+#[test]
+fn copied_frames_are_cut_to_what_is_stored() {
+    let device = Device::new();
+    for (stored, full, format) in [
+        (StoredType::U8, 255.0, "r8"),
+        (StoredType::U8, 255.0, "r16"),
+        (StoredType::U8, 255.0, "r32f"),
+        (StoredType::U16, 65535.0, "r16"),
+        (StoredType::U16, 65535.0, "r32f"),
+        (StoredType::F32, 1.0, "r32f"),
+    ] {
+        for smooth in ["", ", smooth = { elevation = 0.7 }"] {
+            let of = |everything: bool| {
+                let toml = format!(
+                    "mode = 'mip'\npicture.size = [40, 32]\nray.sampling = 'exact'\ncamera = {{ azimuth = 25, elevation = -15 }}\nregion = {{ lateral = [14, 21], depth = [25, 33], elevation = [9, 13] }}\nslices = {{ format = '{format}', everything = {everything}{smooth} }}"
+                );
+                let grid = Grid { size: [150, 203, 24], spacing: [0.25, 0.25, 1.0], origin: [0.0; 3] };
+                scene(Geometry::Cartesian(grid), Input { stored, range: [0.0, full] }, &toml)
+            };
+            let what = format!("{stored:?} in {format}{smooth}");
+            let [column, row, slice] = Slot::Volume.first_texel(&of(false));
+            assert!(column > 0 && row > 0 && slice > 0, "{what}: {:?}", of(false).stored_bounds());
+            assert_eq!(
+                chain::copied(&of(false)),
+                Some(if smooth.is_empty() { Slot::Volume } else { Slot::SharpVolume })
+            );
+            let frames = speckle(&of(true));
+            let (part, all) = (draw(&device, of(false), &frames), draw(&device, of(true), &frames));
+            assert!(part.picture.rgba.iter().any(|v| *v > 0 && *v < 255), "{what}: black");
+            assert!(part.picture == all.picture, "{what}");
+            same_texels(&part, &all, &what);
+        }
+    }
 }
