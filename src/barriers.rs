@@ -86,14 +86,14 @@ impl Access {
 /// The memory accesses of a dispatch.
 pub fn accesses(scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Vec<Access> {
     let access = |bind: crate::passes::Bind, write| {
+        let all = bind.slot.shape(scene).parts();
+        // An image may begin with a later slice than the first.
+        let part = |slice: u32| slice.saturating_sub(bind.slot.first_texel(scene)[2]).min(all);
         let parts = match bind.part {
-            Part::Whole => 0..bind.slot.shape(scene).parts(),
-            Part::Slice => args.slice..args.slice + 1,
+            Part::Whole => 0..all,
+            Part::Slice => part(args.slice)..part(args.slice) + 1,
             Part::Layer => args.layer..args.layer + 1,
-            Part::Around(more) => {
-                let all = bind.slot.shape(scene).parts();
-                args.slice.saturating_sub(more)..(args.slice + args.slices + more).min(all)
-            }
+            Part::Around(more) => part(args.slice.saturating_sub(more))..part(args.slice + args.slices + more),
         };
         let image = if bind.slot.is_multibuffered() { args.image } else { 0 };
         Access::of_slot(bind.slot, image, parts, write, PipelineStage::Compute)

@@ -192,6 +192,11 @@ pub fn array(slot: Slot, texels: Option<&Texels>, scene: &Scene) -> (Vec<u8>, Va
     if unit == DISTANCES {
         about["no_surface"] = json!(MISS);
     }
+    if slot == Slot::PackedNeighbours {
+        // Of the volume it holds the stored part. The volume itself is written whole.
+        let [column, row, slice] = slot.first_texel(scene);
+        about["first"] = json!({"slice": slice, "row": row, "column": column});
+    }
     (bytes, about)
 }
 

@@ -126,8 +126,11 @@ impl Plan {
 
     /// How slices get into the 3D image.
     fn slice_path(&self, scene: &Scene) -> String {
-        if chain::copied(scene).is_some() {
-            return "copied into the 3D image as they arrive, by no pass".into();
+        if let Some(slot) = chain::copied(scene) {
+            let (from, to) = (Slot::Frames.format(scene), slot.format(scene));
+            let widened =
+                if from == to { String::new() } else { format!(", widened from {from:?} to {to:?} by the CPU") };
+            return format!("copied into the 3D image as they arrive, by no pass{widened}");
         }
         let last = self.steps_of(Frequency::Frame).last().map_or("no pass", |(_, step)| step.pass.name);
         format!("{last}, the last pass of a frame, writes them into the 3D image")
@@ -141,17 +144,20 @@ impl Plan {
         let stored = |plan: &Plan, scene: &Scene| -> Vec<_> {
             let slots = plan.steps.iter().filter(|s| s.pass.frequency == Frequency::Frame).flat_map(|s| s.slots(scene));
             let slots = slots.chain(chain::copied(scene));
-            slots.map(|s| (s, s.shape(scene), s.format(scene))).collect()
+            slots.map(|s| (s, s.array_size(scene), s.format(scene))).collect()
         };
         let moved = !old.geometry.equals_except_advance(&new.geometry);
         if stored(&before, old) != stored(self, new) || moved || old.input != new.input {
             return Rerun::Everything;
         }
-        // A smaller visible region needs nothing new; a larger one needs frames.
-        if !old.visible_bounds.holds(&new.visible_bounds) {
+        // A smaller visible region needs nothing new; a larger one needs frames, and so does smoothing that reaches further across slices.
+        let new = &new.clone().keeping(old);
+        let (frames, wanted) = (old.visible_frames(), new.visible_frames());
+        let has_frames = wanted.is_empty() || (frames.start <= wanted.start && wanted.end <= frames.end);
+        if !old.visible_bounds.holds(&new.visible_bounds) || !has_frames || old.stored_bounds() != new.stored_bounds() {
             return Rerun::Frames;
         }
-        let old = &Scene { visible_bounds: new.visible_bounds, ..old.clone() };
+        let old = &Scene { visible_bounds: new.visible_bounds, kept_bounds: new.kept_bounds, ..old.clone() };
         let slots: Vec<Slot> = self.slots.iter().copied().filter(|s| s.differs(old, new)).collect();
         let mut changed = slots.clone();
         let mut steps = Vec::new();

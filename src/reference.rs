@@ -51,12 +51,10 @@ pub fn render_with(scene: &Scene, frames: &[Texels], replace: &mut Replacement) 
 /// Initial contents of a slot on the device: zeros, or values computed from the scene.
 fn empty(slot: Slot, scene: &Scene) -> Texels {
     let format = slot.format(scene);
-    let size = match slot.shape(scene) {
-        Shape::Two([w, h]) => [w as usize, h as usize, 1],
-        Shape::Layers([w, h, _]) => [w as usize, h as usize, 1],
-        Shape::Three(n) => n.map(|n| n as usize),
-        Shape::Buffer(bytes) => [bytes as usize / 4, 1, 1],
-    };
+    let mut size = slot.array_size(scene);
+    if let Shape::Layers(_) = slot.shape(scene) {
+        size[2] = 1;
+    }
     let mut texels = Texels::from_fn(size, format.channels(), |_, _| 0.0);
     if let Initializer::ByScene(make) = slot.initializer() {
         texels.values = make(scene).into_iter().map(f64::from).collect();

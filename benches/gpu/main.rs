@@ -19,7 +19,6 @@ mod scenes;
 use common::Run;
 use criterion::{Criterion, SamplingMode, Throughput};
 use echolume::gpu::pass_runner::PassTimer;
-use echolume::gpu::resources::shape_size;
 use echolume::gpu::{Context, ContextOptions, DeviceChoice, GpuError, Renderer, RendererOptions};
 use echolume::passes::slots::Initializer;
 use echolume::passes::{DispatchArgs, Pass, Slot, Texels, measure};
@@ -168,7 +167,7 @@ fn noise(scene: &Scene, pass: &Pass) -> Vec<(Slot, Texels)> {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     };
     let mut filled = |slot: Slot| {
-        let mut texels = Texels::untouched(shape_size(slot.shape(scene)), slot.format(scene).channels());
+        let mut texels = Texels::untouched(slot.array_size(scene), slot.format(scene).channels());
         texels.values.fill_with(&mut next);
         (slot, texels)
     };

@@ -6,6 +6,12 @@
 #include "aos.glsl"
 layout(scalar) uniform Params {
     int slice;
+#ifndef PICTURE
+    // The texel of the volume that its image begins with.
+    int first_stored_column;
+    int first_stored_row;
+    int first_stored_slice;
+#endif
 };
 uniform texture2D shares;
 uniform texture2D forward;
@@ -16,6 +22,7 @@ uniform texture2D rows;
 uniform texture2D step_result;
 #endif
 #ifdef SLICE
+#include "stored_volume.glsl"
 uniform writeonly image3D target;
 #else
 uniform writeonly image2D target;
@@ -38,7 +45,8 @@ void main() {
         result = 2.0 * result - LOADED(texelFetch(step_result, at, 0));
 #endif
 #ifdef SLICE
-        imageStore(target, ivec3(at, slice), STORED(result));
+        ivec3 to = ivec3(at, slice) - first_stored;
+        if (all(lessThan(uvec3(to), uvec3(imageSize(target))))) imageStore(target, to, STORED(result));
 #else
         imageStore(target, at, STORED(result));
 #endif

@@ -1,4 +1,5 @@
-// One axis of a separable Gaussian. Taps beyond the border are omitted and the weights renormalised. An invocation makes four
+// One axis of a separable Gaussian. Taps beyond the border are omitted and the weights renormalised: the border of the volume, since
+// all slices that a visible one needs are stored. An invocation makes four
 // adjacent texels along the axis and passes their taps through registers.
 // variants: plane; slice SLICE; volume VOLUME
 #version 460
@@ -21,8 +22,7 @@ void main() {
     ivec3 at = made_run(AXIS, RUN);
     ivec3 size = source_size();
 #ifdef VOLUME
-    at.z += slice; // the first updated slice
-    size.z = min(size.z, slice + slices);
+    size.z = min(size.z, slice + slices - first_stored_slice);
 #endif
     if (any(greaterThanEqual(at, size))) return;
     int length = source_size()[AXIS];

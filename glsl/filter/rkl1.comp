@@ -10,6 +10,10 @@ layout(scalar) uniform Params {
     float nu;
     float share;
     int slice;
+    // The texel of the volume that its image begins with.
+    int first_stored_column;
+    int first_stored_row;
+    int first_stored_slice;
 };
 #define T float
 #include "diffusion.glsl"
@@ -18,6 +22,7 @@ uniform texture2D last; // y[j-1]
 uniform texture2D before; // y[j-2]
 #endif
 #ifdef SLICE
+#include "stored_volume.glsl"
 uniform writeonly image3D target;
 #else
 uniform writeonly image2D target;
@@ -39,7 +44,8 @@ void main() {
     result += nu * texelFetch(before, at, 0).x;
 #endif
 #ifdef SLICE
-    imageStore(target, ivec3(at, slice), vec4(result, 0.0, 0.0, 0.0));
+    ivec3 to = ivec3(at, slice) - first_stored;
+    if (all(lessThan(uvec3(to), uvec3(imageSize(target))))) imageStore(target, to, vec4(result, 0.0, 0.0, 0.0));
 #else
     imageStore(target, at, vec4(result, 0.0, 0.0, 0.0));
 #endif

@@ -1,7 +1,7 @@
 // What a filter reads and writes, by variant. T is the type of one texel.
 //   plane     2D to 2D, one channel            slices between filters
 //   slice     2D to one slice of a 3D texture  the last filter of stage 1
-//   volume    3D to 3D                         across slices
+//   volume    3D to 3D                         across slices; coordinates in the stored part
 //   distance  2D to 2D, one channel with misses
 //   picture   2D to 2D, colours, channel by channel
 #include "common.glsl"
@@ -20,6 +20,10 @@
 #define VALID(v) is_hit(v)
 #else
 #define VALID(v) true
+#endif
+
+#if defined(VOLUME) || defined(SLICE)
+#include "stored_volume.glsl"
 #endif
 
 #ifdef VOLUME
@@ -45,6 +49,9 @@ ivec3 made_run(int axis, int run) {
 #if !defined(DISTANCE) && !defined(PICTURE)
     at.xy += ivec2(first_column, first_row);
 #endif
+#ifdef VOLUME
+    at += ivec3(0, 0, slice) - first_stored; // `slice` is the first updated slice
+#endif
     return at;
 }
 ivec3 made_texel() { return made_run(0, 1); }
@@ -53,7 +60,7 @@ void write_at(ivec3 at, T value) {
 #if defined(VOLUME)
     imageStore(target, at, STORED(value));
 #elif defined(SLICE)
-    imageStore(target, ivec3(at.xy, slice), STORED(value));
+    imageStore(target, ivec3(at.xy, slice) - first_stored, STORED(value));
 #else
     imageStore(target, at.xy, STORED(value));
 #endif

@@ -12,6 +12,7 @@ layout(constant_id = 20) const int CLIPS = 0;   // clip planes
 layout(constant_id = 21) const int SPREAD = 0;  // 1: steps grow with the range, as the sample spacing of a convex sweep does
 layout(constant_id = 22) const int SLIDING = 0; // 3 or 5: edge of the Gaussian that slides along the ray
 
+#include "stored_volume.glsl"
 uniform sampler3D volume;
 uniform utexture3D packed_neighbours;
 #ifdef SWEPT
@@ -25,7 +26,7 @@ readonly buffer SliceTable { vec2 entry[]; } slice_table; // position and advanc
 #endif
 
 // Queried once, because every sample needs it.
-ivec3 volume_last = textureSize(volume, 0) - 1;
+ivec3 last_stored = first_stored + textureSize(volume, 0) - 1;
 
 struct Ray {
     vec3 origin;
@@ -123,7 +124,7 @@ Sector sector() {
 #ifdef NON_UNIFORM
     slices = float(slice_table.entry.length() - 1);
 #else
-    slices = float(volume_last.z);
+    slices = last_slice;
 #endif
 #endif
     return Sector(vec4(range_low, line_low, 0.0, -1e-4), vec4(range_high, line_high, entries, slices + 1e-4));
@@ -210,23 +211,27 @@ float share_inside(vec4 inner, vec4 outer) {
     return clamp(min(min(shares.x, shares.y), min(shares.z, shares.w)), 0.0, 1.0);
 }
 
+// At coordinates in the stored part.
 float fetch(ivec3 at) { return texelFetch(volume, at, 0).x; }
 
 // A texel, the next column's, the next row's, and the diagonal neighbour's, in units of NEIGHBOUR_UNIT.
 const float NEIGHBOUR_UNIT = SAMPLING == 2 ? 1.0 / 255.0 : SAMPLING == 3 ? 1.0 / 65535.0 : 1.0;
 vec4 neighbours_at(ivec3 at) {
-    uvec2 bits = texelFetch(packed_neighbours, at - ivec3(first_packed_column, first_packed_row, 0), 0).xy;
+    uvec2 bits = texelFetch(packed_neighbours, at, 0).xy;
     if (SAMPLING == 2) return vec4(ivec4(bits.xxxx >> uvec4(0, 8, 16, 24)) & 255);
     if (SAMPLING == 3) return vec4(ivec4(bits.xxyy >> uvec4(0, 16, 0, 16)) & 65535);
     return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
-// The volume at texture indices; beyond the border it repeats the nearest texel.
+// The volume at texture indices; beyond the border it repeats the nearest texel. Beyond the stored part no sample is needed. Indices are
+// shifted to the image as integers, so that the same texels get the same weights wherever the stored part begins; the device's filter
+// divides by the image's size.
 float raw_volume(vec3 texel) {
-    if (SAMPLING == 0) return textureLod(volume, (texel + 0.5) / vec3(volume_last + 1), 0.0).x;
-    vec3 at = clamp(texel, vec3(0.0), vec3(volume_last));
-    ivec3 low = ivec3(at), high = min(low + 1, volume_last);
+    if (SAMPLING == 0) return textureLod(volume, (texel - vec3(first_stored) + 0.5) / vec3(last_stored - first_stored + 1), 0.0).x;
+    vec3 at = clamp(texel, vec3(first_stored), vec3(last_stored));
+    ivec3 low = ivec3(at), high = min(low + 1, last_stored) - first_stored;
     vec3 w = at - vec3(low);
+    low -= first_stored;
     vec4 near, far;
     if (SAMPLING > 1) {
         near = neighbours_at(low);

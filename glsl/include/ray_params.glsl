@@ -11,8 +11,11 @@
     vec4 clip_3;
     vec3 brick_low;     // corner of the first brick, mm
     vec3 brick_density; // bricks per mm
-    int first_packed_column; // of packed neighbours, in the volume
-    int first_packed_row;
+    // The texel of the volume that its image and that of packed neighbours begin with.
+    int first_stored_column;
+    int first_stored_row;
+    int first_stored_slice;
+    float last_slice; // of the volume
     float window_low;
     float window_scale;
     // Space to texture.

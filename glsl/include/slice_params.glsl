@@ -2,4 +2,8 @@
 #if !defined(DISTANCE) && !defined(PICTURE)
     int first_column; // of the rectangle that is made
     int first_row;
+    // The texel of the volume that its image begins with.
+    int first_stored_column;
+    int first_stored_row;
+    int first_stored_slice;
 #endif

@@ -1,5 +1,5 @@
 // Each texel of a slice with its neighbours one column and one row on, as they are stored. An interpolated sample then takes one
-// load per slice. What is made begins at the first visible column and row.
+// load per slice. Both images hold the stored part of the volume.
 // variants: plain
 #version 460
 #include "common.glsl"
@@ -8,6 +8,7 @@ layout(constant_id = 1) const int STORED = 0; // 0 bytes, 1 16 bits of 0..1, 2 h
 layout(scalar) uniform Params {
 #include "slice_params.glsl"
 };
+#include "stored_volume.glsl"
 uniform texture3D volume;
 uniform writeonly uimage3D packed_neighbours;
 
@@ -16,7 +17,7 @@ uint bits_of(float value) {
     return uint(int(value * (STORED == 0 ? 255.0 : 65535.0) + 0.5));
 }
 
-// A texel and the one below it; beyond the border the last row repeats.
+// A texel and the one below it; beyond the last stored row it repeats.
 uvec2 pair_at(ivec3 at, ivec2 last) {
     ivec2 near = min(at.xy, last);
     float value = texelFetch(volume, ivec3(near, at.z), 0).x;
@@ -25,10 +26,10 @@ uvec2 pair_at(ivec3 at, ivec2 last) {
 }
 
 void main() {
-    ivec3 to = ivec3(gl_GlobalInvocationID) * ivec3(RUN, 1, 1) + ivec3(0, 0, slice);
+    ivec3 to = ivec3(gl_GlobalInvocationID) * ivec3(RUN, 1, 1) + ivec3(first_column, first_row, slice) - first_stored;
     ivec3 size = imageSize(packed_neighbours);
     if (any(greaterThanEqual(to, size))) return;
-    ivec3 at = to + ivec3(first_column, first_row, 0);
+    ivec3 at = to;
     ivec2 last = textureSize(volume, 0).xy - 1;
     uvec2 here = pair_at(at, last);
     for (int n = 0; n < RUN; ++n) {

@@ -53,7 +53,7 @@ vec4 border(int n, vec3 p, float slice) {
     }
     vec3 sweep = SWEEP == 1 ? vec3(0.0, -p.z / rho, beyond / rho) : vec3(0.0, 0.0, 1.0);
     // In mean pitches from the first slice.
-    float position = slice, last = float(textureSize(volume, 0).z - 1);
+    float position = slice, last = last_slice;
 #ifdef NON_UNIFORM
     int s = clamp(int(slice), 0, slice_table.entry.length() - 2);
     position = mix(slice_table.entry[s].x, slice_table.entry[s + 1].x, slice - float(s));

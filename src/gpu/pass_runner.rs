@@ -4,8 +4,8 @@ use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, embedded};
-use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, SlotResources, shape_size};
+use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, SlotResources};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::slots::{Initializer, Shape};
@@ -82,7 +82,7 @@ impl PassRunner {
         }
         for bind in &writes {
             let format = bind.slot.format(scene);
-            let poisoned = Texels::from_fn(shape_size(bind.slot.shape(scene)), format.channels(), |_, _| poison);
+            let poisoned = Texels::from_fn(bind.slot.shape(scene).size(), format.channels(), |_, _| poison);
             staged.push((Bind { part: Part::Whole, ..*bind }, poisoned.encode(format)));
         }
 
@@ -98,7 +98,8 @@ impl PassRunner {
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            recorder.copy_in(&mut barriers, &staging, image, SlotParts { slot: bind.slot, copy, parts });
+            let from = (&staging, BufferLayout::default());
+            recorder.copy_in(&mut barriers, from, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(staging);
         }
         recorder.dispatch(&mut barriers, &Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
@@ -108,7 +109,7 @@ impl PassRunner {
             let buffer = Buffer::new(&self.context, "output", bind.slot.bytes(scene), Purpose::Readback)?;
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
             recorder.copy_out(&mut barriers, image, bind.slot, copy, &buffer);
-            results.push((bind.name, shape_size(image.shape), image.format, buffer));
+            results.push((bind, image.shape.size(), image.format, buffer));
         }
         recorder.submit(&mut barriers, &mut timelines)?;
         let done = timelines.wait_all();
@@ -116,8 +117,10 @@ impl PassRunner {
         timelines.drain();
         done?;
         let mut outputs = Arrays::default();
-        for (name, size, format, buffer) in results {
-            outputs.insert(name, Texels::decode(size, format, buffer.bytes()));
+        for (bind, size, format, buffer) in results {
+            let outside = Texels::stored(format, poison);
+            let part = Texels::decode(size, format, buffer.bytes());
+            outputs.insert(bind.name, part.with_outside(bind.slot, scene, outside));
         }
         Ok(outputs)
     }
@@ -139,8 +142,8 @@ pub struct PassTimer {
 }
 
 impl PassTimer {
-    /// `contents` is what images hold before the first run. Slots that the scene computes are filled; all others hold zeros. A pass
-    /// over frames works on layer 0 and the middle slice, a pass over volumes on all slices. Runs the pass once, because drivers
+    /// `contents` is what images hold before the first run, of the volume all of it. Slots that the scene computes are filled; all others hold zeros. A pass
+    /// over frames works on layer 0 and the middle slice, a pass over volumes on all visible slices. Runs the pass once, because drivers
     /// compile at the first run.
     ///
     /// # Errors
@@ -166,11 +169,10 @@ impl PassTimer {
         texel_access: TexelAccess,
     ) -> Result<PassTimer, GpuError> {
         let scene = &formats::adapt_scene(context, texel_access, scene.clone());
-        let first = DispatchArgs { slice: scene.slices() / 2, ..DispatchArgs::default() };
-        let first = if pass.frequency == Frequency::Frame {
-            first
-        } else {
-            DispatchArgs { slice: 0, slices: scene.slices(), ..first }
+        let visible = scene.visible_bounds.slices();
+        let first = match pass.frequency {
+            Frequency::Frame => DispatchArgs { slice: (visible.start + visible.end) / 2, ..DispatchArgs::default() },
+            _ => DispatchArgs { slice: visible.start, slices: visible.end - visible.start, ..DispatchArgs::default() },
         };
         let iterations: Vec<DispatchArgs> =
             (0..(pass.repeat)(scene)).map(|iteration| DispatchArgs { iteration, ..first }).collect();
@@ -206,7 +208,8 @@ impl PassTimer {
         self.recorder.clear_new(&mut self.barriers, &self.slots, &new);
         let mut keep = Vec::new();
         for &(slot, copy) in &new {
-            let given = contents.iter().find(|(s, _)| *s == slot).map(|(_, t)| t.encode(slot.format(&self.scene)));
+            let given = contents.iter().find(|(s, _)| *s == slot);
+            let given = given.map(|(_, t)| t.stored_part(slot, &self.scene).encode(slot.format(&self.scene)));
             let bytes = match (given, slot.initializer()) {
                 (Some(bytes), _) => bytes,
                 (None, Initializer::ByScene(make)) => bytemuck::cast_slice(&make(&self.scene)).to_vec(),
@@ -218,7 +221,7 @@ impl PassTimer {
             let length = bytes.len().min(staging.bytes().len());
             staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
             let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-            self.recorder.copy_in(&mut self.barriers, &staging, image, place);
+            self.recorder.copy_in(&mut self.barriers, (&staging, BufferLayout::default()), image, place);
             keep.push(staging);
         }
         self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
@@ -258,7 +261,8 @@ impl PassTimer {
         let done = self.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
         self.timelines.drain();
-        done.map(|()| Some(Texels::decode(shape_size(image.shape), image.format, buffer.bytes())))
+        let part = done.map(|()| Texels::decode(image.shape.size(), image.format, buffer.bytes()))?;
+        Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
     }
 }
 
@@ -286,7 +290,7 @@ pub fn time_pass(context: &Arc<Context>, scene: &Scene, pass: &'static Pass, cou
 fn input(scene: &Scene, bind: &Bind, inputs: &Arrays) -> Option<Vec<u8>> {
     let format = bind.slot.format(scene);
     if let Some((_, texels)) = inputs.iter().find(|(name, _)| *name == bind.name) {
-        return Some(texels.encode(format));
+        return Some(texels.stored_part(bind.slot, scene).encode(format));
     }
     match (bind.slot.initializer(), bind.slot.shape(scene)) {
         (Initializer::ByScene(make), Shape::Two(_) | Shape::Buffer(_)) => {

@@ -44,6 +44,17 @@ pub struct SlotParts {
     pub parts: Range<u32>,
 }
 
+/// Where texels that are copied lie in a buffer. Lengths of 0: they fill it, row after row.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BufferLayout {
+    /// Byte offset of the first.
+    pub offset: u64,
+    /// Texels from one row to the next.
+    pub row_length: u32,
+    /// Rows from one image to the next.
+    pub image_height: u32,
+}
+
 /// A command buffer that is recorded and submitted again and again.
 pub struct Recorder {
     context: Arc<Context>,
@@ -442,8 +453,14 @@ impl Recorder {
         }
     }
 
-    /// Copies a staging buffer into layers or slices of an image.
-    pub fn copy_in(&mut self, barriers: &mut BarrierRecorder, from: &Buffer, image: &Image, to: SlotParts) {
+    /// Copies texels of a staging buffer into layers or slices of an image.
+    pub fn copy_in(
+        &mut self,
+        barriers: &mut BarrierRecorder,
+        (from, layout): (&Buffer, BufferLayout),
+        image: &Image,
+        to: SlotParts,
+    ) {
         let parts = to.parts.clone();
         self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
         // SAFETY: the buffer holds the bytes of these parts (its maker sized it so) and both live until the device is done.
@@ -453,7 +470,7 @@ impl Recorder {
                 from.handle,
                 image.handle,
                 vk::ImageLayout::GENERAL,
-                &[region(image, parts.start, parts.end - parts.start)],
+                &[region(image, parts.start, parts.end - parts.start, layout)],
             );
         }
     }
@@ -472,7 +489,7 @@ impl Recorder {
                 image.handle,
                 vk::ImageLayout::GENERAL,
                 to.handle,
-                &[region(image, 0, parts)],
+                &[region(image, 0, parts, BufferLayout::default())],
             );
         }
         self.barrier(barriers, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);
@@ -480,10 +497,13 @@ impl Recorder {
 }
 
 /// The copy region of `parts` layers or slices, from `part` on.
-fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
+fn region(image: &Image, part: u32, parts: u32, layout: BufferLayout) -> vk::BufferImageCopy {
     let is_volume = image.extent.depth > 1 || matches!(image.shape, Shape::Three(_));
     let (layer, layers, z, depth) = if is_volume { (0, 1, part, parts) } else { (part, parts, 0, 1) };
     vk::BufferImageCopy {
+        buffer_offset: layout.offset,
+        buffer_row_length: layout.row_length,
+        buffer_image_height: layout.image_height,
         image_subresource: vk::ImageSubresourceLayers {
             aspect_mask: vk::ImageAspectFlags::COLOR,
             mip_level: 0,
@@ -492,7 +512,6 @@ fn region(image: &Image, part: u32, parts: u32) -> vk::BufferImageCopy {
         },
         image_offset: vk::Offset3D { x: 0, y: 0, z: z as i32 },
         image_extent: vk::Extent3D { depth, ..image.extent },
-        ..vk::BufferImageCopy::default()
     }
 }
 

@@ -199,15 +199,6 @@ impl Drop for Image {
     }
 }
 
-/// Texels of a shape along x, y and z; the first varies fastest. A buffer counts as a row of floats.
-pub fn shape_size(shape: Shape) -> [usize; 3] {
-    match shape {
-        Shape::Two([w, h]) => [w as usize, h as usize, 1],
-        Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
-        Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
-    }
-}
-
 const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
 
 /// True if a lookup table of this size can be a texel buffer, for any size of its entries.

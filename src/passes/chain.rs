@@ -4,7 +4,7 @@
 
 use super::PASSES;
 use super::pass::{Arrays, Bind, Chain, Dispatch, DispatchArgs, Filter, Link, Need, Params, Pass, RUN, Slot};
-use crate::scene::{Rectangle, Scene, TILE};
+use crate::scene::{Rectangle, Scene, TILE, VisibleBounds};
 
 impl Chain {
     /// What the first link reads.
@@ -83,7 +83,7 @@ pub fn picture_end(scene: &Scene) -> Slot {
 }
 
 /// The slot that frames are copied into as they arrive, if nothing is done to them: the chain of slices is one link that would store
-/// what it reads unchanged.
+/// what it reads without loss.
 pub fn copied(scene: &Scene) -> Option<Slot> {
     let mut requested = Chain::Slices.requested(scene);
     let (_, filter) = requested.next()?;
@@ -92,6 +92,12 @@ pub fn copied(scene: &Scene) -> Option<Slot> {
 
 // A rectangle begins and ends with complete workgroups of the slices' filters, eight invocations of a run each.
 const _: () = assert!(Rectangle::ALIGNMENT.is_multiple_of(8 * RUN));
+
+/// The columns and rows of the volume that are stored.
+fn stored_rectangle(scene: &Scene) -> Rectangle {
+    let VisibleBounds { low, high } = scene.stored_bounds();
+    Rectangle { first: [low[0], low[1]], size: [high[0] - low[0], high[1] - low[1]] }
+}
 
 impl Pass {
     pub fn is_needed(&self, scene: &Scene) -> bool {
@@ -103,7 +109,7 @@ impl Pass {
         match self.link {
             Link::Filter(filter) if filter.chain == Chain::Slices => match (self.needed)(scene) {
                 Ok(_) if copied(scene).is_some() => {
-                    Err("a frame is a slice as the volume stores it: it is copied there")
+                    Err("the volume stores a frame's values without loss: it is copied there")
                 }
                 need => need,
             },
@@ -180,12 +186,21 @@ impl Pass {
         [visible.size[0].div_ceil(run(0)), visible.size[1].div_ceil(run(1)), extent[2]]
     }
 
-    /// Numbers of a dispatch; of a slice, with the texel that its first invocation makes.
+    /// Numbers of a dispatch; of a slice, with the texel that its first invocation makes, and the first texel of the volume that is stored.
     pub fn numbers(&self, scene: &Scene, args: &DispatchArgs) -> Params {
-        let params = (self.params)(scene, args);
-        match self.rectangle(scene, args) {
-            Some(r) => params.i32("first_column", r.first[0]).i32("first_row", r.first[1]),
-            None => params,
+        let mut params = (self.params)(scene, args);
+        if let Some(r) = self.rectangle(scene, args) {
+            params = params.i32("first_column", r.first[0]).i32("first_row", r.first[1]);
+        }
+        let of_slices = match self.link {
+            Link::Filter(filter) => filter.chain == Chain::Slices,
+            Link::Observer(chain) => chain == Chain::Slices,
+            Link::AfterSlices => true,
+            Link::None => false,
+        };
+        match of_slices && params.0.iter().any(|(name, _)| *name == "slice") {
+            true => params.first_stored(scene),
+            false => params,
         }
     }
 
@@ -193,9 +208,12 @@ impl Pass {
     pub fn expected(&self, scene: &Scene, args: &DispatchArgs, reads: &Arrays, writes: &mut Arrays) {
         let before = writes.clone();
         self.reference(scene, args, reads, writes);
-        let Some(r) = self.rectangle(scene, args) else { return };
-        for (name, kept) in before.iter() {
-            let target = writes.get_mut(name);
+        let made = self.rectangle(scene, args);
+        for bind in self.writes(scene, args) {
+            let (kept, target) = (before.get(bind.name), writes.get_mut(bind.name));
+            // What is made beyond the stored part of the volume is dropped.
+            let is_volume = matches!(bind.slot, Slot::Volume | Slot::SharpVolume);
+            let Some(r) = made.or(is_volume.then(|| stored_rectangle(scene))) else { continue };
             let size = [kept.size[0], kept.size[1]];
             if size == r.size.map(|n| n as usize) {
                 continue;

@@ -187,7 +187,7 @@ pub struct Filter {
     /// How many columns and rows away one step on slices looks; none: from border to border. Filters before it make that much
     /// more than is visible.
     pub reach: fn(&Scene) -> Option<[u32; 2]>,
-    /// True if a step would store what it reads unchanged: alone in its chain it is left out, and frames are copied.
+    /// True if a step would store what it reads without loss: alone in its chain it is left out, and frames are copied.
     pub copies: fn(&Scene) -> bool,
 }
 
@@ -303,6 +303,12 @@ impl Params {
     pub fn i32(mut self, name: &'static str, value: u32) -> Params {
         self.0.push((name, Value::I32(value as i32)));
         self
+    }
+
+    /// The texel of the volume that its image begins with.
+    pub(super) fn first_stored(self, scene: &Scene) -> Params {
+        let [column, row, slice] = Slot::Volume.first_texel(scene);
+        self.i32("first_stored_column", column).i32("first_stored_row", row).i32("first_stored_slice", slice)
     }
 
     pub fn vec2(mut self, name: &'static str, value: [f64; 2]) -> Params {

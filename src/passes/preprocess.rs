@@ -182,7 +182,7 @@ pub const LOAD_SLICE: Pass = Pass {
     name: "load_slice",
     stage: Stage::Preprocess,
     frequency: Frequency::Frame,
-    link: Link::Filter(Filter { copies: stores_what_it_reads, ..Filter::of(Chain::Slices) }),
+    link: Link::Filter(Filter { copies: stores_without_loss, ..Filter::of(Chain::Slices) }),
     shader: |_, t| {
         if t.writes_volume() { "preprocess/load_slice.slice" } else { "preprocess/load_slice.plane" }
     },
@@ -216,12 +216,13 @@ pub const LOAD_SLICE: Pass = Pass {
     },
 };
 
-/// True if the volume stores the same values as frames hold. Floats that may be beyond 0..1 are clamped on their way to the device.
-fn stores_what_it_reads(scene: &Scene) -> bool {
+/// True if the volume's format holds every value that frames may hold, unscaled. On their way to the device integers become those of a wider
+/// format or floats, and floats that may be beyond 0..1 are clamped. 16-bit floats hold few of the 255ths exactly.
+fn stores_without_loss(scene: &Scene) -> bool {
     let format = Slot::Volume.format(scene);
     match scene.input.stored {
-        StoredType::U8 => format == Format::R8 && scene.input.range == [0.0, 255.0],
-        StoredType::U16 => format == Format::R16 && scene.input.range == [0.0, 65535.0],
+        StoredType::U8 => format != Format::R16f && scene.input.range == [0.0, 255.0],
+        StoredType::U16 => matches!(format, Format::R16 | Format::R32f) && scene.input.range == [0.0, 65535.0],
         StoredType::F32 => format == Format::R32f && scene.input.range == [0.0, 1.0],
     }
 }
@@ -254,17 +255,20 @@ pub const PACKED_NEIGHBOURS: Pass = Pass {
     reference: |scene, args, reads, writes| {
         let volume = reads.get("volume");
         let target = writes.get_mut("packed_neighbours");
-        let [width, height, _] = target.size;
-        let first = scene.visible_rectangle([0; 2]).first.map(|n| n as usize);
-        for z in args.slice as usize..(args.slice + args.slices) as usize {
+        let [width, height, depth] = target.size;
+        // Beyond the stored part of the volume its border repeats. No sample needs what is there.
+        let first = Slot::PackedNeighbours.first_texel(scene).map(|n| n as usize);
+        for z in (args.slice as usize..(args.slice + args.slices) as usize)
+            .filter(|z| (first[2]..first[2] + depth).contains(z))
+        {
             for to in (0..height).flat_map(|y| (0..width).map(move |x| [x, y])) {
                 let (x, y) = (to[0] + first[0], to[1] + first[1]);
-                let (right, below) = ((x + 1).min(volume.size[0] - 1), (y + 1).min(volume.size[1] - 1));
+                let (right, below) = ((x + 1).min(first[0] + width - 1), (y + 1).min(first[1] + height - 1));
                 let of = [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| volume.one(x, y, z));
                 let packed = Texels { size: [4, 1, 1], channels: 1, values: of.to_vec() };
                 let bytes = packed.encode(Slot::Volume.format(scene));
                 let words = bytes.chunks_exact(4).map(|b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
-                target.set([to[0], to[1], z], &words.collect::<Vec<_>>());
+                target.set([to[0], to[1], z - first[2]], &words.collect::<Vec<_>>());
             }
         }
     },

@@ -138,10 +138,10 @@ slots! {
     SliceStageC = D::image("slice_stage_c", one_slice, |_| Format::R32f).across_queues();
     /// The volume before smoothing across slices.
     SharpVolume = D::image("sharp_volume", volume, volume_format).multibuffered().clear().across_queues();
-    /// The 3D texture that rays are cast through.
+    /// The 3D texture that rays are cast through: the part that is visible.
     Volume = D::image("volume", volume, volume_format).multibuffered().clear().across_queues();
-    /// Each texel of the visible columns and rows of the volume with its neighbours one column and one row on, as their bits.
-    PackedNeighbours = D::image("packed_neighbours", visible_volume, four_texels).multibuffered();
+    /// Each texel of the volume with its neighbours one column and one row on, as their bits.
+    PackedNeighbours = D::image("packed_neighbours", volume, four_texels).multibuffered();
     /// Smallest and largest value of every tile of every slice.
     TileRanges = D::image("tile_ranges", |s| Shape::Three(s.tile_counts()), |_| Format::Rg16).multibuffered().clear();
     /// Which tiles the samples in each brick may touch, and on which side of the sector's border the brick is.
@@ -265,14 +265,10 @@ fn one_slice(scene: &Scene) -> Shape {
     Shape::Two(scene.grid.size)
 }
 
+/// The part of the volume that is stored.
 fn volume(scene: &Scene) -> Shape {
-    Shape::Three(scene.volume_size())
-}
-
-/// All slices, and the visible columns and rows of each: at least one.
-fn visible_volume(scene: &Scene) -> Shape {
-    let [columns, rows] = scene.visible_rectangle([0; 2]).size.map(|n| n.max(1));
-    Shape::Three([columns, rows, scene.slices()])
+    let stored = scene.stored_bounds();
+    Shape::Three(std::array::from_fn(|a| stored.high[a] - stored.low[a]))
 }
 
 fn volume_format(scene: &Scene) -> Format {
@@ -360,6 +356,23 @@ impl Slot {
         }
     }
 
+    /// The texel of the whole volume that the image begins with; 0 of a slot that is no part of it.
+    pub fn first_texel(self, scene: &Scene) -> [u32; 3] {
+        match self {
+            Slot::Volume | Slot::SharpVolume | Slot::PackedNeighbours => scene.stored_bounds().low,
+            _ => [0; 3],
+        }
+    }
+
+    /// Size of the slot's array in references and in what is read back. Of the volume it is all of it, so that its indices are texel
+    /// coordinates.
+    pub fn array_size(self, scene: &Scene) -> [usize; 3] {
+        match self {
+            Slot::Volume | Slot::SharpVolume => scene.volume_size().map(|n| n as usize),
+            _ => self.shape(scene).size(),
+        }
+    }
+
     /// Bytes of one copy.
     pub fn bytes(self, scene: &Scene) -> u64 {
         self.shape(scene).texels() * self.format(scene).texel_bytes() as u64
@@ -430,6 +443,15 @@ impl Shape {
             Shape::Two([w, h]) => u64::from(w) * u64::from(h),
             Shape::Layers(n) | Shape::Three(n) => n.iter().map(|n| u64::from(*n)).product(),
             Shape::Buffer(bytes) => u64::from(bytes) / 4,
+        }
+    }
+
+    /// Texels along x, y and z; the first varies fastest. A buffer counts as a row of floats.
+    pub fn size(self) -> [usize; 3] {
+        match self {
+            Shape::Two([w, h]) => [w as usize, h as usize, 1],
+            Shape::Layers(n) | Shape::Three(n) => n.map(|n| n as usize),
+            Shape::Buffer(bytes) => [bytes as usize / Format::Floats.texel_bytes(), 1, 1],
         }
     }
 

@@ -1,6 +1,7 @@
 //! Arrays of the f64 references.
 
-use super::slots::Format;
+use super::slots::{Format, Slot};
+use crate::scene::Scene;
 use half::f16;
 
 /// Texels with `channels` values each; x fastest.
@@ -57,6 +58,45 @@ impl Texels {
         self.values[i..i + self.channels].copy_from_slice(value);
     }
 
+    fn part(&self, first: [usize; 3], size: [usize; 3]) -> Texels {
+        let mut part = Texels::untouched(size, self.channels);
+        for (y, z) in (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z))) {
+            let (from, to) = (self.index([first[0], first[1] + y, first[2] + z]), part.index([0, y, z]));
+            let length = size[0] * self.channels;
+            part.values[to..to + length].copy_from_slice(&self.values[from..from + length]);
+        }
+        part
+    }
+
+    fn insert(&mut self, first: [usize; 3], part: &Texels) {
+        let size = part.size;
+        for (y, z) in (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| (y, z))) {
+            let (from, to) = (part.index([0, y, z]), self.index([first[0], first[1] + y, first[2] + z]));
+            let length = size[0] * self.channels;
+            self.values[to..to + length].copy_from_slice(&part.values[from..from + length]);
+        }
+    }
+
+    /// The part of a slot's array ([`Slot::array_size`]) that the device stores.
+    pub(crate) fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
+        match slot {
+            Slot::Volume | Slot::SharpVolume => {
+                self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size())
+            }
+            _ => self.clone(),
+        }
+    }
+
+    /// The slot's array of which the device stores this part; `outside` is all of the rest.
+    pub(crate) fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
+        if self.size == slot.array_size(scene) {
+            return self;
+        }
+        let mut array = Texels::from_fn(slot.array_size(scene), self.channels, |_, _| outside);
+        array.insert(slot.first_texel(scene).map(|n| n as usize), &self);
+        array
+    }
+
     /// First channel between texels, beyond the border that of the nearest.
     pub fn trilinear(&self, at: [f64; 3]) -> f64 {
         let low = at.map(f64::floor);
@@ -106,6 +146,12 @@ impl Texels {
             Format::R32u | Format::Rg32u => f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         });
         Texels { size, channels: format.channels(), values: values.collect() }
+    }
+
+    /// A value as the format stores it.
+    pub(crate) fn stored(format: Format, value: f64) -> f64 {
+        let one = Texels { size: [1; 3], channels: format.channels(), values: vec![value; format.channels()] };
+        Texels::decode([1; 3], format, &one.encode(format)).values[0]
     }
 
     /// The distance between neighbouring values that the format stores near `value`.

@@ -3,7 +3,7 @@
 use crate::gpu::{Context, GpuError, Renderer, RendererOptions, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
-use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer};
+use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer, slice};
 use crate::plan::{Plan, Rerun, Step};
 use crate::profile::export::{self, Track};
 use crate::profile::statistics::Sample;
@@ -281,9 +281,11 @@ fn touched(bind: &Bind, scene: &Scene) -> u64 {
 fn copied_bytes(name: &str, scene: &Scene, runs: u64) -> u64 {
     let frame = touched(&layer("frames", Slot::Frames), scene);
     match name {
-        // One copy uploads several slices.
-        "upload" if chain::copied(scene).is_some() && runs > 0 => scene.visible_frames().len() as u64 * frame,
-        "upload" => runs * frame,
+        // One copy uploads several slices, and of each what is stored.
+        "upload" if runs > 0 => match chain::copied(scene) {
+            Some(slot) => scene.visible_frames().len() as u64 * touched(&slice("volume", slot), scene),
+            None => runs * frame,
+        },
         "readback" => runs * Slot::Screen.bytes(scene),
         _ => 0,
     }

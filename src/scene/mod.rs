@@ -154,6 +154,8 @@ pub struct Scene {
     pub distance: Distance,
     /// The texels of the volume that stage 2 may read. Stage 1 computes only these.
     pub visible_bounds: visible_bounds::VisibleBounds,
+    /// What a renderer stores beyond what this scene shows, from an earlier scene: [`Scene::keeping`].
+    pub kept_bounds: visible_bounds::VisibleBounds,
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -241,6 +243,7 @@ impl Scene {
             apron: 0.0,
             distance,
             visible_bounds: VisibleBounds::default(),
+            kept_bounds: VisibleBounds::default(),
         };
         for (axis, field) in
             ["slices.smooth.lateral", "slices.smooth.depth", "slices.smooth.elevation"].iter().enumerate()

@@ -101,6 +101,28 @@ impl Scene {
         Rectangle { first: [columns.0, rows.0], size: [columns.1, rows.1] }
     }
 
+    /// The texels of the volume that the device stores: the visible rectangle of the slices that stage 1 needs, at least one texel. Texel
+    /// coordinates are those of the whole volume everywhere; only where an image is accessed, its first texel is subtracted.
+    pub fn stored_bounds(&self) -> VisibleBounds {
+        let (Rectangle { first, size }, slices) = (self.visible_rectangle([0; 2]), self.visible_frames());
+        let shown = VisibleBounds {
+            low: [first[0], first[1], slices.start],
+            high: [first[0] + size[0], first[1] + size[1], slices.end],
+        };
+        let all = shown.with(self.kept_bounds);
+        if all.is_empty() { VisibleBounds::all([1; 3]) } else { all }
+    }
+
+    /// The scene, which stores all that `before` stores if that holds what this scene shows: a region that shrinks needs no other
+    /// memory, and finds its slices where they are.
+    pub fn keeping(self, before: &Scene) -> Scene {
+        let stored = before.stored_bounds();
+        let shown = Scene { kept_bounds: VisibleBounds::default(), ..self };
+        let is_held = shown.visible_bounds.is_empty() || stored.holds(&shown.stored_bounds());
+        let is_kept = shown.volume_size() == before.volume_size() && is_held;
+        Scene { kept_bounds: if is_kept { stored } else { VisibleBounds::default() }, ..shown }
+    }
+
     /// Share of the volume's texels within the visible bounds.
     pub fn visible_share(&self) -> f64 {
         let texels = |size: [u32; 3]| size.map(f64::from).iter().product::<f64>();

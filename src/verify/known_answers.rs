@@ -4,7 +4,6 @@ use super::built_in::{BYTES, FLOATS, body_frames, frames, scene, wobbler};
 use super::compare::{ExtraTolerance, compare_outputs, picture_comparison, texel_comparison};
 use super::passes::POISON;
 use super::{Check, DeviceUnderTest, Findings, render};
-use crate::gpu::resources::shape_size;
 use crate::gpu::{GpuError, Renderer, RendererOptions};
 use crate::passes::shade::SHADOW;
 use crate::passes::slots::Format;
@@ -466,7 +465,7 @@ fn shadow_of_a_hill(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     let writes = SHADOW.writes(&scene, &args);
     for bind in &writes {
-        expected.insert(bind.name, Texels::untouched(shape_size(Slot::Shadow.shape(&scene)), 1));
+        expected.insert(bind.name, Texels::untouched(Slot::Shadow.array_size(&scene), 1));
     }
     SHADOW.expected(&scene, &args, &inputs, &mut expected);
     let got = dut.pass_runner()?.run(&scene, &SHADOW, &args, &inputs, POISON)?;

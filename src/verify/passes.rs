@@ -6,7 +6,6 @@ use super::compare::{Comparison, ExtraTolerance, compare_outputs, texel_comparis
 use super::{Check, DeviceUnderTest, Findings};
 use crate::gpu::GpuError;
 use crate::gpu::pass_runner::PassRunner;
-use crate::gpu::resources::shape_size;
 use crate::passes::preprocess::PACKED_NEIGHBOURS;
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{Arrays, Bind, DispatchArgs, MISS, PASSES, Part, Pass, Slot, Texels};
@@ -51,7 +50,7 @@ pub fn run_with_reference(
     let mut expected = Arrays::default();
     for bind in &writes {
         let channels = bind.slot.format(scene).channels();
-        expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
+        expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
     }
     pass.expected(scene, &args, &inputs, &mut expected);
     let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
@@ -188,7 +187,7 @@ pub(crate) const KINDS: [&str; 4] = ["noise", "zero", "one", "hot"];
 
 fn input(scene: &Scene, bind: &Bind, kind: &str, noise: &mut Noise) -> Texels {
     let format = bind.slot.format(scene);
-    let mut size = shape_size(bind.slot.shape(scene));
+    let mut size = bind.slot.array_size(scene);
     if bind.part == Part::Layer {
         size[2] = 1;
     }
@@ -257,7 +256,7 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
         }
         for bind in step.pass.writes(scene, &args) {
             let channels = bind.slot.format(scene).channels();
-            outputs.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(scene)), channels));
+            outputs.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
         }
         step.pass.reference(scene, &args, &inputs, &mut outputs);
         for bind in step.pass.writes(scene, &args) {
@@ -271,9 +270,12 @@ fn empty_space_of(scene: &Scene, slot: Slot, volume: &Texels) -> Texels {
     slots.remove(&slot).unwrap_or_else(|| Texels::untouched([0; 3], 1))
 }
 
-/// Dispatch arguments that are not the first of anything.
+/// Dispatch arguments that are not the first of anything: of the visible slices, which are stored.
 pub fn dispatch_args_of(scene: &Scene, iteration: u32) -> DispatchArgs {
-    DispatchArgs { layer: 2, slice: scene.slices() / 2, slices: scene.slices().div_ceil(3), iteration, image: 0 }
+    let visible = scene.visible_bounds.slices();
+    let slice = (visible.start + visible.end) / 2;
+    let slices = scene.slices().div_ceil(3).min(visible.end - slice);
+    DispatchArgs { layer: 2, slice, slices, iteration, image: 0 }
 }
 
 /// Inputs of a pass, of one of [`KINDS`]. Arrays that an earlier pass computes are derived from the others.
@@ -294,8 +296,7 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
         let mut packed = Arrays::default();
         let channels = Slot::PackedNeighbours.format(scene).channels();
-        packed
-            .insert("packed_neighbours", Texels::untouched(shape_size(Slot::PackedNeighbours.shape(scene)), channels));
+        packed.insert("packed_neighbours", Texels::untouched(Slot::PackedNeighbours.array_size(scene), channels));
         let all = DispatchArgs { slices: scene.slices(), ..DispatchArgs::default() };
         PACKED_NEIGHBOURS.reference(scene, &all, &inputs, &mut packed);
         inputs.insert("packed_neighbours", packed.get("packed_neighbours").clone());

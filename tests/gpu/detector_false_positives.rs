@@ -3,7 +3,6 @@
 use crate::common::gpu::*;
 use crate::detector::{STEP, columns, depths, ramp};
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::resources::shape_size;
 use echolume::passes::slots::Initializer;
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, is_hit};
 use echolume::probe::{Geometry, Grid};
@@ -322,7 +321,7 @@ fn every_detector_matches_its_reference_in_noise() {
             let value = |[x, y, z]: [usize; 3]| 0.6 * columns[z * width + x].0[(y + 17) % DEPTH] + 0.2 * blob(y);
             let mut inputs = Arrays::default();
             for bind in pass.reads(&scene, &args) {
-                let size = shape_size(bind.slot.shape(&scene));
+                let size = bind.slot.array_size(&scene);
                 let mut texels = Texels::from_fn(size, bind.slot.format(&scene).channels(), |at, _| match bind.slot {
                     Slot::Volume => f64::from(value(at) as f32),
                     _ => 0.0,
@@ -336,7 +335,7 @@ fn every_detector_matches_its_reference_in_noise() {
             let mut expected = Arrays::default();
             for bind in pass.writes(&scene, &args) {
                 let channels = bind.slot.format(&scene).channels();
-                expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(&scene)), channels));
+                expected.insert(bind.name, Texels::untouched(bind.slot.array_size(&scene), channels));
             }
             let mut mistaken = expected.clone();
             pass.reference(&scene, &args, &inputs, &mut expected);

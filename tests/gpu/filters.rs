@@ -3,7 +3,6 @@
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::resources::shape_size;
 use echolume::passes::{Arrays, DispatchArgs, Frequency, MISS, Pass, Slot, Texels, by_name, is_hit};
 use echolume::plan::Plan;
 use echolume::scene::Scene;
@@ -65,7 +64,7 @@ pub fn by_reference(scene: &Scene, name: &str, source: &Texels) -> Texels {
 fn reference(scene: &Scene, pass: &Pass, args: &DispatchArgs, inputs: &Arrays) -> Arrays {
     let mut written = Arrays::default();
     for bind in pass.writes(scene, args) {
-        let size = shape_size(bind.slot.shape(scene));
+        let size = bind.slot.array_size(scene);
         written.insert(bind.name, Texels::untouched(size, bind.slot.format(scene).channels()));
     }
     pass.reference(scene, args, inputs, &mut written);

@@ -36,6 +36,7 @@ mod sector;
 mod self_test;
 mod shading;
 mod sliding;
+mod stored_volume;
 mod tiles;
 mod timing;
 mod truth;

@@ -3,7 +3,6 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::PassRunner;
-use echolume::gpu::resources::shape_size;
 use echolume::gpu::{ContextOptions, Renderer, RendererOptions, TexelAccess};
 use echolume::passes::slots::Shape;
 use echolume::passes::{Arrays, DispatchArgs, PASSES, Slot, Texels, measure};
@@ -139,7 +138,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
         let mut expected = Arrays::default();
         for bind in &right.writes {
             let channels = bind.slot.format(told).channels();
-            expected.insert(bind.name, Texels::untouched(shape_size(bind.slot.shape(told)), channels));
+            expected.insert(bind.name, Texels::untouched(bind.slot.array_size(told), channels));
         }
         pass.reference(wrong, &args, &right.inputs, &mut expected);
         let compared = verify::compare_outputs(
@@ -162,7 +161,7 @@ fn a_perturbed_input_swapped_parameters_and_half_a_pixel_are_each_noticed() {
     (0..2).for_each(|dy| source.values[middle + dy * source.size[0]..][..3].fill(1.0));
     inputs.insert("source", source);
     let mut expected = Arrays::default();
-    expected.insert("target", Texels::untouched(shape_size(right.writes[0].slot.shape(&base)), 1));
+    expected.insert("target", Texels::untouched(right.writes[0].slot.array_size(&base), 1));
     pass.reference(&base, &DispatchArgs::default(), &inputs, &mut expected);
     let compared =
         verify::compare_outputs(pass, &base, ExtraTolerance::default(), POISON, &expected, &right.got, &right.writes);

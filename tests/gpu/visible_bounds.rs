@@ -14,7 +14,7 @@ fn moved(probe: Probe) -> Probe {
     Probe { advance: Advance::Same(0.7 * probe.slices.pitch()), ..probe }
 }
 
-fn geometries() -> Vec<(&'static str, Geometry)> {
+pub fn geometries() -> Vec<(&'static str, Geometry)> {
     let each = (0..9).map(|k| if k % 3 == 0 { 0.03 } else { -0.02 }).collect();
     vec![
         ("Cartesian", cartesian([61, 70, 9])),
@@ -202,7 +202,7 @@ fn each_side_of_a_region_cuts_its_own_side_of_the_volume() {
     assert_eq!(cuts("region.lateral = [-5, 5]\nslices.everything = true"), [0; 0]);
 }
 
-const FILTERS: [(&str, &str); 11] = [
+pub const FILTERS: [(&str, &str); 11] = [
     ("none", ""),
     ("median", "median = true"),
     ("Nagao-Matsuyama", "estimator = 'nagao-matsuyama'"),
@@ -224,7 +224,7 @@ const FILTERS: [(&str, &str); 11] = [
 ];
 
 /// Windows on the volume, in depths below the face or along the axes of the Cartesian one.
-const WINDOWS: [&str; 8] = [
+pub const WINDOWS: [&str; 8] = [
     "mode = 'plane'\nplanes = { tilt = 8, thickness = 1.5 }",
     "mode = 'plane'\nplanes = { plane = 'c', zoom = 2.0 }",
     "mode = 'tomography'\nplanes = { plane = 'b', columns = 2, rows = 1, spacing = 3.0 }\nregion = { depth = [8, 22] }",
@@ -235,7 +235,7 @@ const WINDOWS: [&str; 8] = [
     "mode = 'cube'\ncube.inset.right = 3\nregion = { depth = [8, 22], elevation = [-1, 2] }",
 ];
 
-fn speckle(scene: &Scene) -> Vec<Texels> {
+pub fn speckle(scene: &Scene) -> Vec<Texels> {
     let mut noise = Noise(23);
     let mut frames = body_frames(scene, |p| 0.35 + 0.3 * (0.4 * (p.x + 1.3 * p.y + 0.7 * p.z)).sin());
     frames.iter_mut().flat_map(|f| &mut f.values).for_each(|v| *v = (*v + 0.3 * noise.next()).clamp(0.0, 1.0));

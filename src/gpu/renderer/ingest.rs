@@ -38,7 +38,7 @@ impl InFlight {
         if let Some(target) = slots.image(place.slot, place.copy) {
             let InFlight { copier, recorder, staging } = self;
             let by = copier.as_mut().unwrap_or(recorder);
-            by.copy_in(barriers, staging, target, place);
+            by.copy_in(barriers, (staging, BufferLayout::default()), target, place);
             by.stamp("upload");
         }
         if let Some(copier) = &mut self.copier {
@@ -103,14 +103,13 @@ impl Renderer {
             None => 0,
         };
         let staging = self.ring[self.ring_index].staging.bytes_mut();
-        let (from, to) = (offset + at, offset + at + bytes.len());
-        let is_clamped = self.scene.input.stored == StoredType::F32 && chain::copied(&self.scene).is_some();
-        self.timings.host("stage", || match is_clamped {
-            true => copy_clamped(bytes, &mut staging[from..to]),
-            false => staging[from..to].copy_from_slice(bytes),
-        });
+        let staged = staged_bytes(&self.scene) as usize;
+        let widening = staged / frame_bytes;
+        let (from, to) = (offset + widening * at, offset + widening * (at + bytes.len()));
+        let stage = stage_of(&self.scene);
+        self.timings.host("stage", || stage(bytes, &mut staging[from..to]));
         if at + bytes.len() == frame_bytes {
-            self.context.faults.frame(&self.scene, &mut staging[offset..offset + frame_bytes]);
+            self.context.faults.frame(&self.scene, &mut staging[offset..offset + staged]);
         }
         if at + bytes.len() < frame_bytes {
             self.partial = Some(PartialFrame { slice, image, received: at + bytes.len() });
@@ -161,6 +160,33 @@ impl Renderer {
     }
 }
 
+/// Bytes of a frame in the staging buffer: where it is copied into the volume, in the volume's format.
+fn staged_bytes(scene: &Scene) -> u64 {
+    let [width, height] = scene.frame_size().map(u64::from);
+    chain::copied(scene).map_or(frame_bytes(scene), |slot| width * height * slot.format(scene).texel_bytes() as u64)
+}
+
+/// How samples are written into the staging buffer. A format that holds v/255 or v/65535 only rounded gets the nearest value to it.
+fn stage_of(scene: &Scene) -> fn(&[u8], &mut [u8]) {
+    match (scene.input.stored, chain::copied(scene).map(|slot| slot.format(scene))) {
+        // 65535 is 255 times 257.
+        (StoredType::U8, Some(Format::R16)) => |from, to| widen(from, to, |[v]| (257 * u16::from(v)).to_ne_bytes()),
+        (StoredType::U8, Some(Format::R32f)) => |from, to| widen(from, to, |[v]| (f32::from(v) / 255.0).to_ne_bytes()),
+        (StoredType::U16, Some(Format::R32f)) => {
+            |from, to| widen(from, to, |v| (f32::from(u16::from_ne_bytes(v)) / 65535.0).to_ne_bytes())
+        }
+        (StoredType::F32, Some(_)) => copy_clamped,
+        _ => |from, to| to.copy_from_slice(from),
+    }
+}
+
+/// Writes each sample of N bytes as one of M bytes.
+fn widen<const N: usize, const M: usize>(from: &[u8], to: &mut [u8], wide: impl Fn([u8; N]) -> [u8; M]) {
+    let (from, _) = from.as_chunks::<N>();
+    let (to, _) = to.as_chunks_mut::<M>();
+    from.iter().zip(to).for_each(|(from, to)| *to = wide(*from));
+}
+
 /// Copies 32-bit floats, as 0..1: no pass clamps them where they are stored unchanged.
 fn copy_clamped(from: &[u8], to: &mut [u8]) {
     for (from, to) in from.chunks_exact(4).zip(to.chunks_exact_mut(4)) {
@@ -176,7 +202,7 @@ const BATCH_BYTES: u64 = 4 << 20;
 /// Number of frames that the staging buffer of a ring entry holds.
 fn frames_per_upload(scene: &Scene) -> u64 {
     match chain::copied(scene) {
-        Some(_) => (BATCH_BYTES / frame_bytes(scene)).clamp(1, u64::from(scene.slices())),
+        Some(_) => (BATCH_BYTES / staged_bytes(scene)).clamp(1, u64::from(scene.slices())),
         None => 1,
     }
 }
@@ -185,7 +211,7 @@ impl Renderer {
     /// Allocates the ring.
     pub(super) fn new_ring(&self) -> Result<Vec<InFlight>, GpuError> {
         let (context, count) = (&self.context, self.barriers.queues.count());
-        let bytes = frames_per_upload(&self.scene) * frame_bytes(&self.scene);
+        let bytes = frames_per_upload(&self.scene) * staged_bytes(&self.scene);
         let (copy, ingest) = (QueueRole::Copy.queue(count), QueueRole::Ingest.queue(count));
         // Slices of a 3D image are not subresources: not every queue can copy a single one.
         let copies = copy != ingest && (chain::copied(&self.scene).is_none() || context.queue(copy).copies_slices);
@@ -213,14 +239,14 @@ impl Renderer {
             self.wait_for_ring()?;
         }
         let batch = self.batch.get_or_insert(SliceBatch { image, first: slice, count: 0 });
-        Ok(batch.count as usize * frame_bytes(&self.scene) as usize)
+        Ok(batch.count as usize * staged_bytes(&self.scene) as usize)
     }
 
     /// Adds a complete slice to the batch, and submits the batch when it is full.
     fn extend_batch(&mut self) -> Result<(), GpuError> {
         let Some(batch) = &mut self.batch else { return Ok(()) };
         batch.count += 1;
-        let next = (u64::from(batch.count) + 1) * frame_bytes(&self.scene);
+        let next = (u64::from(batch.count) + 1) * staged_bytes(&self.scene);
         match next > self.ring[self.ring_index].staging.size {
             true => self.flush(),
             false => Ok(()),
@@ -235,12 +261,19 @@ impl Renderer {
         };
         let from = self.ring_index;
         self.ring_index = (from + 1) % FRAMES_IN_FLIGHT as usize;
-        let place = SlotParts { slot, copy: image, parts: first..first + count };
+        let [column, row, slice] = slot.first_texel(&self.scene);
+        let place = SlotParts { slot, copy: image, parts: first - slice..first - slice + count };
+        // Of each frame what is stored.
+        let [row_length, image_height] = self.scene.frame_size();
+        let texel = u64::from(row) * u64::from(row_length) + u64::from(column);
+        let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
+        let layout = BufferLayout { offset, row_length, image_height };
         let entry = &mut self.ring[from];
-        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, place, &mut self.timings)?;
+        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)?;
         let Some((slice, image, received)) = self.partial.as_ref().map(PartialFrame::place) else { return Ok(()) };
         self.wait_for_ring()?;
-        let at = count as usize * frame_bytes(&self.scene) as usize;
+        let staged = staged_bytes(&self.scene) as usize;
+        let (at, received) = (count as usize * staged, received * (staged / self.frame_bytes()));
         let lines = self.ring[from].staging.bytes()[at..at + received].to_vec();
         self.ring[self.ring_index].staging.bytes_mut()[..received].copy_from_slice(&lines);
         self.batch = Some(SliceBatch { image, first: slice, count: 0 });
@@ -255,13 +288,13 @@ impl InFlight {
         barriers: &mut BarrierRecorder,
         timelines: &mut Timelines,
         slots: &SlotResources,
-        place: SlotParts,
+        (place, layout): (SlotParts, BufferLayout),
         timings: &mut Timings,
     ) -> Result<(), GpuError> {
         let by = self.copier.as_mut().unwrap_or(&mut self.recorder);
         by.begin(barriers, timelines)?;
         if let Some(target) = slots.image(place.slot, place.copy) {
-            by.copy_in(barriers, &self.staging, target, place);
+            by.copy_in(barriers, (&self.staging, layout), target, place);
             by.stamp("upload");
         }
         timings.host("submit", || by.submit(barriers, timelines))

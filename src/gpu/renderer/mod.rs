@@ -8,8 +8,8 @@ use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake, embedded};
-use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, SlotResources, shape_size};
+use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
+use super::resources::{Buffer, Purpose, SlotResources};
 use super::timeline::Timelines;
 use super::timing::Timings;
 use crate::passes::chain;
@@ -272,7 +272,7 @@ impl Renderer {
         self.picture.begin(&mut self.barriers, &self.timelines)?;
         self.picture.copy_in(
             &mut self.barriers,
-            &staging,
+            (&staging, BufferLayout::default()),
             image,
             SlotParts { slot, copy, parts: 0..image.shape.parts() },
         );
@@ -340,11 +340,15 @@ impl Renderer {
     /// If a shader does not compile or the device can never hold a slot, the old scene stays in use. If memory runs out
     /// halfway, nothing can be drawn until another change succeeds; that one rebuilds everything.
     pub fn change(&mut self, scene: Scene) -> Result<Rerun, GpuError> {
-        let scene = formats::adapt_scene(&self.context, self.texel_access, scene);
+        let mut scene = formats::adapt_scene(&self.context, self.texel_access, scene.keeping(&self.scene));
         let plan = Plan::new(&scene);
         // After the visible region shrank, the volume still holds the larger one.
         let before = Scene { visible_bounds: self.filtered_bounds, ..self.scene.clone() };
         let rerun = if self.broken.is_some() { Rerun::Everything } else { plan.rerun(&before, &scene) };
+        let sends_frames = !matches!(rerun, Rerun::Steps { .. });
+        if sends_frames {
+            scene.kept_bounds = VisibleBounds::default();
+        }
         formats::check(&self.context, &plan, &scene)?;
         let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
         // Frames in flight use nothing that such a change touches, so only the picture is waited for.
@@ -358,11 +362,12 @@ impl Renderer {
         }
         let kept: Vec<_> = self.plan.steps.iter().zip(&self.stale).filter(|s| *s.1).map(|s| s.0.id()).collect();
         self.stale = plan.steps.iter().map(|s| kept.contains(&s.id())).collect();
+        // Of frames that were not sent, none may be counted on where smoothing across slices reaches further than it did for them.
+        if sends_frames || scene.smoothing_radius() != self.scene.smoothing_radius() {
+            self.filtered_bounds = scene.visible_bounds;
+        }
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;
-        if !matches!(rerun, Rerun::Steps { .. }) {
-            self.filtered_bounds = self.scene.visible_bounds;
-        }
         self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
         Ok(rerun)
     }
@@ -426,13 +431,14 @@ impl Renderer {
 }
 
 impl Renderer {
-    /// The current content of an image slot. `None` for a slot that is not in the plan, and for a lookup table in a buffer.
+    /// The current content of an image slot; of the volume all of it, zeros where nothing is stored. `None` for a slot that is not in the plan, and for a lookup table in a buffer.
     ///
     /// # Errors
     /// A device that fails; a failed change of scene.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
-        let there = self.bring_back(slot)?;
-        Ok(there.map(|(buffer, size, format)| Texels::decode(size, format, buffer.bytes())))
+        let there = self.bring_back(slot)?.map(|(buffer, size, format)| Texels::decode(size, format, buffer.bytes()));
+        // What is not stored of a volume is what no pass would have written.
+        Ok(there.map(|part| part.with_outside(slot, &self.scene, 0.0)))
     }
 
     /// The current bytes of an image slot, its texels along x, y, z, and their format.
@@ -441,7 +447,7 @@ impl Renderer {
         self.flush()?;
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
         let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
-        let (format, size) = (image.format, shape_size(image.shape));
+        let (format, size) = (image.format, image.shape.size());
         let copy = if slot.is_multibuffered() { self.shown } else { 0 };
         self.picture.collect(&self.timelines, &mut self.timings)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;

@@ -105,7 +105,6 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
     }
     let [clip_0, clip_1, clip_2, clip_3] = clips;
     let bricks = scene.bricks();
-    let first_packed = if scene.packs() { scene.visible_rectangle([0; 2]).first } else { [0; 2] };
     let params = ray_params(scene)
         .vec3("brick_low", scene.to_local(bricks.low))
         .vec3("brick_density", bricks.edge.recip())
@@ -118,8 +117,8 @@ pub(super) fn params(scene: &Scene, view: View, step: f64) -> Params {
         .vec3("box_low", scene.to_local(view.low))
         .vec3("box_high", scene.to_local(scene.high))
         .f32("step_length", step)
-        .i32("first_packed_column", first_packed[0])
-        .i32("first_packed_row", first_packed[1])
+        .first_stored(scene)
+        .f32("last_slice", f64::from(scene.slices() - 1))
         .f32("window_low", window_low)
         .f32("window_scale", 1.0 / (window_high - window_low))
         .vec2("grid_origin", [grid.origin[0] - local.x, grid.origin[1] - local.y])

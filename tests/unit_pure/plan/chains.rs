@@ -56,7 +56,7 @@ fn an_empty_chain_leaves_its_slot_unchanged() {
 }
 
 #[test]
-fn frames_are_copied_where_the_volume_has_their_format() {
+fn frames_are_copied_where_the_volume_stores_them_without_loss() {
     let of = |stored, range, toml: &str| copied(&scenes::scene(voxels([8, 8, 5]), Input { stored, range }, toml));
     let (bytes, words) = ([0.0, 255.0], [0.0, 65535.0]);
     let format = |format: &str| format!("slices = {{ format = '{format}' }}");
@@ -66,8 +66,15 @@ fn frames_are_copied_where_the_volume_has_their_format() {
     assert_eq!(of(StoredType::U8, bytes, smoothed), Some(Slot::SharpVolume));
     assert_eq!(of(StoredType::U8, [0.0, 200.0], &format("r8")), None);
     assert_eq!(of(StoredType::U16, [0.0, 4095.0], &format("r16")), None);
-    assert_eq!(of(StoredType::U8, bytes, &format("r16")), None);
+    for (stored, range, wider) in
+        [(StoredType::U8, bytes, "r16"), (StoredType::U8, bytes, "r32f"), (StoredType::U16, words, "r32f")]
+    {
+        assert_eq!(of(stored, range, &format(wider)), Some(Slot::Volume), "{wider} holds them");
+        assert_eq!(of(stored, [0.0, 100.0], &format(wider)), None, "scaled");
+        assert_eq!(of(stored, range, &format("r16f")), None, "16-bit floats round");
+    }
     assert_eq!(of(StoredType::U16, words, &format("r8")), None);
+    assert_eq!(of(StoredType::F32, [0.0, 1.0], &format("r16")), None);
     assert_eq!(of(StoredType::F32, [0.0, 1.0], &format("r32f")), Some(Slot::Volume));
     assert_eq!(of(StoredType::F32, [0.0, 2.0], &format("r32f")), None);
     assert_eq!(of(StoredType::U8, bytes, "slices = { format = 'r8', median = true }"), None);
