@@ -434,6 +434,10 @@ impl Scene {
         if !is_whole {
             return Err("no whole ray is composited");
         }
+        if settings.ray.sliding == 0 && !self.is_pair() {
+            // Measured: docs/performance.md, "One march for surface and volume".
+            return Err("two passes: where samples are cheap (no ray.sliding) they are no slower than one march");
+        }
         if matches!(settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential) {
             return Err(
                 "two passes: this compositing takes samples at the ends of steps, the detector in their middles",
