@@ -147,6 +147,7 @@ fn meaning(slot: Slot) -> (&'static [&'static str], &'static str) {
         }
         Slot::SliceShares | Slot::PictureShares | Slot::Shadow | Slot::Occlusion => (GREY, "share, 0..1"),
         Slot::VolumeLayer
+        | Slot::VolumeBesideSurface
         | Slot::Rendered
         | Slot::Planes
         | Slot::Picture

@@ -116,6 +116,12 @@ pub const SCENES: &[Stated] = &[
     sweep("three planes in floats", &["mode=orthogonal", "post.floats=true"], &["raycast_planes"]),
     sweep("slabs of 3 mm", &["mode=tomography", "planes.thickness=3"], &["raycast_planes_toned"]),
     sweep("block", &["mode=cube", "cube.inset.near=5", "camera.azimuth=30", "camera.elevation=20"], &["raycast_cube"]),
+    sweep(
+        "surface and volume of one march",
+        &["surface.colour=rendered", "ray.sliding=3"],
+        &["raycast_surface_and_volume"],
+    ),
+    sweep("pair, two rays", &["layout=pair", "ray.rays=2"], &["raycast_surface_and_volume", "assemble"]),
     sweep("4-up, two rays", &["layout=four", "ray.rays=2"], &["assemble"]),
     Stated {
         name: "Cartesian",

@@ -2,6 +2,9 @@
 layout(constant_id = 23) const int SKIP = 0; // 0 take every sample; 1 skip by the kinds of bricks and their distances; 2 by their value ranges
 
 uniform texture3D bricks;
+#ifdef TWO_KINDS
+uniform texture3D volume_bricks; // the kinds to compositing, where `bricks` are those to the surface detector
+#endif
 
 // Samples between two look-ups of a brick. The count is the same for all rays, because the rays of a subgroup wait for the one that
 // takes most samples.
@@ -16,25 +19,51 @@ struct RaySegment {
     int stop;
 };
 
-// The segment from sample i, which is `at` of a step after the beginning of step i.
-RaySegment segment_at(Ray ray, int i, float at) {
-    float along = offset_of(ray, float(i) + at);
-    vec3 q = (ray.origin + ray.direction * (ray.enter + along) - brick_low) * brick_density;
+// A sample's place among the bricks.
+struct BrickPlace {
+    float along; // distance from the ray's entry, mm
+    vec3 q;      // in bricks
+    ivec3 cell;
+    ivec3 clamped; // the nearest brick
+    bool within;
+};
+
+// The place of sample i, which is `at` of a step after the beginning of step i.
+BrickPlace brick_place(Ray ray, int i, float at) {
+    BrickPlace b;
+    b.along = offset_of(ray, float(i) + at);
+    b.q = (ray.origin + ray.direction * (ray.enter + b.along) - brick_low) * brick_density;
     ivec3 size = textureSize(bricks, 0);
-    ivec3 cell = ivec3(floor(q));
-    bool within = all(greaterThanEqual(cell, ivec3(0))) && all(lessThan(cell, size));
-    vec2 texel = texelFetch(bricks, clamp(cell, ivec3(0), size - 1), 0).xy;
+    b.cell = ivec3(floor(b.q));
+    b.within = all(greaterThanEqual(b.cell, ivec3(0))) && all(lessThan(b.cell, size));
+    b.clamped = clamp(b.cell, ivec3(0), size - 1);
+    return b;
+}
+
+// The segment from sample i, whose brick has this texel.
+RaySegment segment_of(Ray ray, int i, float at, BrickPlace b, vec2 texel) {
     int code = int(texel.x * 255.0 + 0.5);
     // All bricks nearer than this are of one kind.
     int apart = SKIP == 1 ? max(code & 63, 1) : 1;
     vec3 each = ray.direction * brick_density;
     vec3 d = mix(each, vec3(1e-12), lessThan(abs(each), vec3(1e-12)));
-    vec3 ahead = vec3(cell) + mix(vec3(1 - apart), vec3(apart), greaterThan(d, vec3(0.0)));
-    vec3 steps_ahead = (ahead - q) / d;
-    float steps = steps_to(ray, along + min(steps_ahead.x, min(steps_ahead.y, steps_ahead.z))) - at - 1e-3;
+    vec3 ahead = vec3(b.cell) + mix(vec3(1 - apart), vec3(apart), greaterThan(d, vec3(0.0)));
+    vec3 steps_ahead = (ahead - b.q) / d;
+    float steps = steps_to(ray, b.along + min(steps_ahead.x, min(steps_ahead.y, steps_ahead.z))) - at - 1e-3;
     RaySegment s;
-    s.kind = within && SKIP == 1 ? code >> 6 : ACTIVE;
-    s.range = within ? texel : vec2(0.0, 1.0);
-    s.stop = within ? int(floor(clamp(steps, float(i), 1e8))) + 1 : i + 1;
+    s.kind = b.within && SKIP == 1 ? code >> 6 : ACTIVE;
+    s.range = b.within ? texel : vec2(0.0, 1.0);
+    s.stop = b.within ? int(floor(clamp(steps, float(i), 1e8))) + 1 : i + 1;
     return s;
 }
+
+RaySegment segment_at(Ray ray, int i, float at) {
+    BrickPlace b = brick_place(ray, i, at);
+    return segment_of(ray, i, at, b, texelFetch(bricks, b.clamped, 0).xy);
+}
+#ifdef TWO_KINDS
+RaySegment volume_segment_at(Ray ray, int i, float at) {
+    BrickPlace b = brick_place(ray, i, at);
+    return segment_of(ray, i, at, b, texelFetch(volume_bricks, b.clamped, 0).xy);
+}
+#endif

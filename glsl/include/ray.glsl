@@ -61,8 +61,18 @@ float widening(vec3 p) {
 }
 
 // Distance from the ray's entry after n steps, mm.
+//
+// `precise` here and below: a compiler may fuse a multiplication with an addition or not, as the code around it decides. Passes that
+// share samples are to have the same samples to the last bit.
 float offset_of(Ray ray, float n) {
-    return SPREAD == 0 ? n * step_length : ray.first * n * growth_over(n * ray.growth) / growth_over(ray.growth);
+    precise float even = n * step_length;
+    return SPREAD == 0 ? even : ray.first * n * growth_over(n * ray.growth) / growth_over(ray.growth);
+}
+
+// The place that many mm behind the ray's entry.
+vec3 place_at(Ray ray, float along) {
+    precise vec3 p = ray.origin + ray.direction * (ray.enter + along);
+    return p;
 }
 
 // Length of the step that begins after n steps, mm.
@@ -245,5 +255,11 @@ float raw_volume(vec3 texel) {
     return mix(row.x, row.y, w.y) * NEIGHBOUR_UNIT;
 }
 
-float windowed(float value) { return clamp((value - window_low) * window_scale, 0.0, 1.0); }
+// A sample stretched by a grey window that begins at `low`.
+float stretched(float value, float low, float scale) {
+    precise float share = (value - low) * scale;
+    return clamp(share, 0.0, 1.0);
+}
+
+float windowed(float value) { return stretched(value, window_low, window_scale); }
 float sample_volume(vec3 texel) { return windowed(raw_volume(texel)); }

@@ -33,7 +33,7 @@ vec2 front_slice(Ray ray, int i, float sample_at) {
 
 Slices no_slices() { return Slices(vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), vec2(0.0), -0x40000000); }
 
-// The filtered sample i of a ray. Steps may be skipped or taken back: missing slices are summed again.
+// The filtered sample i of a ray, before the grey window. Steps may be skipped or taken back: missing slices are summed again.
 //
 // The slices are shifted before the loop, and the loop only fills empty places. llvmpipe (Mesa 22.3) miscompiles a loop that
 // shifts them, as `a = b; b = c; ...`, and that rays leave after different numbers of iterations: a value used after the loop
@@ -57,10 +57,15 @@ float slid(Ray ray, int i, float sample_at, inout Slices s) {
     }
     float near = tap_weight(1), far = SLIDING == 5 ? tap_weight(2) : 0.0;
     vec2 sum = SLIDING == 5 ? s.c + near * (s.b + s.d) + far * (s.a + s.e) : s.d + near * (s.c + s.e);
-    return sum.y > 0.0 ? windowed(sum.x / sum.y) : 0.0;
+    return sum.y > 0.0 ? sum.x / sum.y : 0.0;
 }
 
-// Sample i, which has these texture indices.
+// Sample i, which has these texture indices, before the grey window.
+float raw_along(Ray ray, int i, float sample_at, vec3 texel, inout Slices s) {
+    return SLIDING == 0 ? raw_volume(texel) : slid(ray, i, sample_at, s);
+}
+
+// The same after the window.
 float sample_along(Ray ray, int i, float sample_at, vec3 texel, inout Slices s) {
-    return SLIDING == 0 ? sample_volume(texel) : slid(ray, i, sample_at, s);
+    return windowed(raw_along(ray, i, sample_at, texel, s));
 }

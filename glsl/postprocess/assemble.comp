@@ -1,6 +1,6 @@
 // The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes four
-// pixels; in a 4-up picture, the rendering next to the planes.
-// variants: alone; four FOUR
+// pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
+// variants: alone; four FOUR; pair PAIR
 #version 460
 #include "common.glsl"
 layout(constant_id = 0) const int RAYS = 1; // along each edge of a pixel
@@ -9,7 +9,20 @@ uniform texture2D rendered;
 #ifdef FOUR
 uniform texture2D planes;
 #endif
+#ifdef PAIR
+uniform texture2D composited;
+#endif
 uniform writeonly image2D picture;
+
+#ifdef PAIR
+bool is_volume = false;
+vec4 ray_at(ivec2 at) {
+    if (is_volume) return texelFetch(composited, at, 0);
+    return texelFetch(rendered, at, 0);
+}
+#else
+vec4 ray_at(ivec2 at) { return texelFetch(rendered, at, 0); }
+#endif
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -24,18 +37,23 @@ void main() {
         return;
     }
 #endif
+#ifdef PAIR
+    // The volume is the left half.
+    is_volume = pixel.x < size.x / 2;
+    if (!is_volume) at.x -= size.x / 2;
+#endif
     // Colours are already multiplied by their opacity.
     if (HALF == 1) {
         ivec2 last = textureSize(rendered, 0) - 1;
         vec2 place = clamp(0.5 * vec2(at) - 0.25, vec2(0.0), vec2(last));
         ivec2 low = ivec2(place), high = min(low + 1, last);
         vec2 share = place - vec2(low);
-        vec4 above = mix(texelFetch(rendered, low, 0), texelFetch(rendered, ivec2(high.x, low.y), 0), share.x);
-        vec4 below = mix(texelFetch(rendered, ivec2(low.x, high.y), 0), texelFetch(rendered, high, 0), share.x);
+        vec4 above = mix(ray_at(low), ray_at(ivec2(high.x, low.y)), share.x);
+        vec4 below = mix(ray_at(ivec2(low.x, high.y)), ray_at(high), share.x);
         imageStore(picture, pixel, mix(above, below, share.y));
         return;
     }
     vec4 sum = vec4(0.0);
-    for (int i = 0; i < RAYS * RAYS; ++i) sum += texelFetch(rendered, at * RAYS + ivec2(i % RAYS, i / RAYS), 0);
+    for (int i = 0; i < RAYS * RAYS; ++i) sum += ray_at(at * RAYS + ivec2(i % RAYS, i / RAYS));
     imageStore(picture, pixel, sum / float(RAYS * RAYS));
 }

@@ -5,20 +5,10 @@
 // variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION; layer_plain LAYER; layer_uniform LAYER SWEPT; layer_intra_frame_motion LAYER SWEPT INTRA_FRAME_MOTION; layer_non_uniform LAYER SWEPT NON_UNIFORM; layer_non_uniform_intra_frame_motion LAYER SWEPT NON_UNIFORM INTRA_FRAME_MOTION; behind_plain BEHIND; behind_uniform BEHIND SWEPT; behind_intra_frame_motion BEHIND SWEPT INTRA_FRAME_MOTION; behind_non_uniform BEHIND SWEPT NON_UNIFORM; behind_non_uniform_intra_frame_motion BEHIND SWEPT NON_UNIFORM INTRA_FRAME_MOTION; hit_plain HIT; hit_uniform HIT SWEPT; hit_intra_frame_motion HIT SWEPT INTRA_FRAME_MOTION; hit_non_uniform HIT SWEPT NON_UNIFORM; hit_non_uniform_intra_frame_motion HIT SWEPT NON_UNIFORM INTRA_FRAME_MOTION
 #version 460
 #include "common.glsl"
-layout(constant_id = 3) const int EARLY_END = 1;
-layout(constant_id = 4) const int COMPOSITING = 1; // 0 a = y, 1 a = 1 - exp(-y), 2 the same between two samples,
-                                           // 3 light and opacity of the step between two samples
-layout(constant_id = 5) const int DEPTH_CODED = 0; // 1: colours go from near to far tint
-layout(constant_id = 6) const int ENTRIES = 256;   // of the transfer table, along each side
 layout(scalar) uniform Params {
 #include "ray_params.glsl"
-    float absorption_scale; // step divided by the length that opacities refer to
-    float opaque_enough;    // a ray ends at this opacity
+#include "compositing_params.glsl"
     float hit_opacity;      // a hit is recorded at this opacity
-    vec3 near_tint;
-    vec3 far_tint;
-    vec3 depth_axis; // depth along the view: dot(place, axis) - depth_near is 0 at the nearest, 1 at the farthest
-    float depth_near;
 #ifdef BEHIND
     float colour_depth; // behind the surface, mm
 #endif
@@ -26,9 +16,7 @@ layout(scalar) uniform Params {
 #include "ray.glsl"
 #include "sliding.glsl"
 #include "empty_space.glsl"
-// Colour and absorption over the sample value; pre-integrated: their mean between two values, one row per front value;
-// exponential: premultiplied colour and opacity of a complete step between them, then colour and absorption over the value.
-readonly buffer TransferTable { vec4 entry[]; } transfer;
+#include "compositing.glsl"
 uniform writeonly image2D picture;
 #if defined(LAYER) || defined(BEHIND)
 uniform texture2D distance_map;
@@ -36,18 +24,6 @@ uniform texture2D distance_map;
 #ifdef HIT
 uniform writeonly image2D distance_map;
 #endif
-
-// 1 - exp(-y) without losing a small y: seven terms of the Taylor series below one half.
-float opacity_of(float y) {
-    float series = y * (1.0 - y / 2.0 * (1.0 - y / 3.0 * (1.0 - y / 4.0 * (1.0 - y / 5.0 * (1.0 - y / 6.0 * (1.0 - y / 7.0))))));
-    return y < 0.5 ? series : 1.0 - exp(-y);
-}
-
-vec4 looked_up(float value) {
-    float e = value * float(ENTRIES - 1);
-    int n = min(int(e), ENTRIES - 2);
-    return mix(transfer.entry[n], transfer.entry[n + 1], e - float(n));
-}
 
 vec4 looked_up_between(float front, float back) {
     vec2 e = vec2(front, back) * float(ENTRIES - 1);
@@ -136,7 +112,7 @@ void main() {
                 // Midpoints of the steps, or their ends. The last step has the remaining length.
                 float from = offset_of(ray, float(i));
                 float length = min(length_of(ray, float(i)), path - from);
-                vec3 p = ray.origin + ray.direction * (ray.enter + from + (between ? 1.0 : 0.5) * length);
+                vec3 p = place_at(ray, between ? from + length : middle_of(ray, i, length, i < complete));
                 vec3 texel;
                 vec4 place;
                 bool inside = locate(p, texel, place);
@@ -162,14 +138,8 @@ void main() {
                     if (!inside) continue;
                     entry = looked_up(sample_along(ray, i, sample_at, texel, slices));
                 }
-                float y = entry.a * absorption_scale * (length / step_length);
-                float a = COMPOSITING == 3 ? entry.a : COMPOSITING == 0 ? min(y, 1.0) : opacity_of(y);
-                // The exponential rule's colour is premultiplied.
-                float emitted = COMPOSITING == 3 ? 1.0 : a;
-                if (DEPTH_CODED == 1) entry.rgb *= mix(near_tint, far_tint, clamp(dot(p, depth_axis) - depth_near, 0.0, 1.0));
                 float before = opacity;
-                colour += (1.0 - opacity) * emitted * entry.rgb;
-                opacity += (1.0 - opacity) * a;
+                add_step(entry, length, p, colour, opacity);
 #ifdef HIT
                 // Interpolated between two samples, so that the surface has no terraces.
                 if (hit == MISS && opacity >= hit_opacity) {

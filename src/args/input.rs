@@ -121,7 +121,7 @@ pub struct SceneArgs {
     /// vr (volume), sr (surface), mixed, mip, minip, xray (mean), mpr (plane), orthogonal, tomography, cube
     #[arg(long)]
     mode: Option<String>,
-    /// single, or 4up: three orthogonal planes and the rendering
+    /// single; 4up: three orthogonal planes and the rendering; pair: volume and surface of one march side by side
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
     /// Transfer function: grey, sepia, skin, bone, cool, warm, or a .toml file of points

@@ -49,7 +49,15 @@ pub fn cost(scene: &Scene) -> f64 {
 /// Replaces the reference of a pass of stage 2: writes what it writes. False for a pass that casts no ray through the volume.
 pub fn replace(scene: &Scene, pass: &str, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) -> bool {
     match pass {
-        "raycast_volume" => volume(scene, reads, writes, effort),
+        "raycast_volume" => {
+            let surface = &scene.settings.surface;
+            let is_behind = scene.settings.mode == Mode::Surface && surface.colour == SurfaceColour::Behind;
+            volume(scene, reads, writes, effort, is_behind);
+        }
+        "raycast_surface_and_volume" => {
+            surfaces(scene, reads, writes, effort);
+            volume(scene, reads, writes, effort, false);
+        }
         "raycast_projection" => projection(scene, reads, writes, effort),
         "raycast_surface" => surfaces(scene, reads, writes, effort),
         _ => return false,
@@ -81,12 +89,12 @@ fn rms(errors: impl ExactSizeIterator<Item = f64>) -> f64 {
     (errors.map(|e| e * e).sum::<f64>() / count).sqrt()
 }
 
-fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort) {
+/// `is_behind`: only what lies behind the surface is composited.
+fn volume(scene: &Scene, reads: &Arrays, writes: &mut Arrays, effort: &mut Effort, is_behind: bool) {
     let texels = reads.get("volume");
     let view = scene.volume_view();
     let size = writes.get("picture").size;
     let surface = &scene.settings.surface;
-    let is_behind = scene.settings.mode == Mode::Surface && surface.colour == SurfaceColour::Behind;
     let map: Option<&Texels> = (scene.settings.mode == Mode::Mixed || is_behind).then(|| reads.get("distance_map"));
     let lights = for_each_ray(scene, view, size, |[x, y], line, path, enter| {
         let ends = match map.map(|map| map.one(x, y, 0) - enter) {

@@ -11,7 +11,7 @@ use crate::spirv::{self, Access, Dimension, Kind, Member, Module};
 
 /// Textures that a shader declares and a pass may not bind: bricks, packed neighbours, and the echo at a surface. Specialization
 /// constants say whether they are read or written.
-const OPTIONAL: [&str; 3] = ["bricks", "packed_neighbours", "surface"];
+const OPTIONAL: [&str; 4] = ["bricks", "packed_neighbours", "surface", "volume_bricks"];
 
 /// A pass's shader without the textures that this scene does not have.
 ///

@@ -30,6 +30,7 @@ pub mod raycast {
     pub mod projection;
     pub mod ray;
     pub mod surface;
+    pub mod surface_and_volume;
     pub mod survey;
     pub mod volume;
 }
@@ -65,6 +66,7 @@ pub const PASSES: &[Pass] = &[
     raycast::surface::PASS,
     empty_space::CLASSIFY_VOLUME,
     empty_space::DISTANCE_VOLUME,
+    raycast::surface_and_volume::PASS,
     raycast::volume::PASS,
     raycast::projection::PASS,
     raycast::planes::PASS,

@@ -1,6 +1,7 @@
 //! What a pass declares: one compute dispatch, its slots, numbers and reference. The files of the passes import this module
 //! and no list of passes; what follows from a pass's place in [`PASSES`](super::PASSES) is in [`chain`](super::chain).
 
+pub(super) use super::slots::composited_beside_surface;
 pub use super::slots::{Slot, rendered};
 pub use super::texels::{Arrays, Texels};
 use crate::scene::Scene;

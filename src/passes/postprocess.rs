@@ -132,7 +132,7 @@ fn distance(plane: &Plane, other: &Plane, place: DVec3) -> f64 {
 }
 
 /// The picture from the rendering: the mean of several rays per pixel, or interpolation between the rays where one ray makes
-/// four pixels; in a 4-up picture, the rendering next to the planes.
+/// four pixels; in a 4-up picture, the rendering next to the planes; in a pair, the composited volume next to the lit surface.
 pub const ASSEMBLE: Pass = Pass {
     name: "assemble",
     stage: Stage::Postprocess,
@@ -141,16 +141,19 @@ pub const ASSEMBLE: Pass = Pass {
     shader: |s, _| match s.settings.layout {
         Layout::Single => "postprocess/assemble.alone",
         Layout::Four => "postprocess/assemble.four",
+        Layout::Pair => "postprocess/assemble.pair",
     },
     needed: |s| match (rendered(s), s.settings.layout) {
         (Slot::Picture, _) => Err("one ray makes a pixel of the whole picture"),
         (_, Layout::Four) => Ok("the rendering stands beside three planes"),
+        (_, Layout::Pair) => Ok("the volume stands beside the surface"),
         (_, Layout::Single) if s.settings.ray.half => Ok("one ray makes four pixels"),
         (_, Layout::Single) => Ok("several rays make a pixel"),
     },
     reads: |s, _| {
         let mut reads = vec![whole("rendered", Slot::Rendered)];
         reads.extend((s.settings.layout == Layout::Four).then_some(whole("planes", Slot::Planes)));
+        reads.extend(s.is_pair().then_some(whole("composited", composited_beside_surface(s))));
         reads
     },
     writes: |_, _| vec![whole("picture", Slot::Picture)],
@@ -165,28 +168,34 @@ pub const ASSEMBLE: Pass = Pass {
         why: "a mean of at most 16 colours in f32; R16F stores 1 to 4.9e-4",
     },
     reference: |scene, _, reads, writes| {
-        let rendered = reads.get("rendered");
         let picture = writes.get_mut("picture");
         let rays = scene.settings.ray.rays as usize;
         let corner = match scene.settings.layout {
             Layout::Single => [0, 0],
             // The lower right tile.
             Layout::Four => [picture.size[0] / 2, picture.size[1] / 2],
+            // The right half.
+            Layout::Pair => [picture.size[0] / 2, 0],
         };
         for y in 0..picture.size[1] {
             for x in 0..picture.size[0] {
-                if x < corner[0] || y < corner[1] {
+                let is_rendering = x >= corner[0] && y >= corner[1];
+                if !is_rendering && scene.cuts_planes() {
                     let plane = reads.get("planes").get([x, y, 0]).to_vec();
                     picture.set([x, y, 0], &plane);
                     continue;
                 }
+                let (shown, corner) = match is_rendering {
+                    true => (reads.get("rendered"), corner),
+                    false => (reads.get("composited"), [0, 0]),
+                };
                 if scene.settings.ray.half {
-                    picture.set([x, y, 0], &between(rendered, x - corner[0], y - corner[1]));
+                    picture.set([x, y, 0], &between(shown, x - corner[0], y - corner[1]));
                     continue;
                 }
                 let mut mean = [0.0; 4];
                 for (i, j) in (0..rays * rays).map(|n| (n % rays, n / rays)) {
-                    let ray = rendered.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
+                    let ray = shown.get([(x - corner[0]) * rays + i, (y - corner[1]) * rays + j, 0]);
                     mean.iter_mut().zip(ray).for_each(|(m, v)| *m += v / (rays * rays) as f64);
                 }
                 picture.set([x, y, 0], &mean);

@@ -3,7 +3,7 @@
 
 use super::lookup_tables;
 use crate::scene::planes::TILE_VECTORS;
-use crate::scene::{Layout, Scene, VolumeFormat};
+use crate::scene::{Layout, Scene, SurfaceColour, VolumeFormat};
 use crate::source::StoredType;
 
 /// Frames that may be uploaded at once: layers of the frame array, and slots of the staging ring.
@@ -232,6 +232,8 @@ slots! {
     Occlusion = D::image("occlusion", per_ray, |_| Format::R16f);
     /// The composited volume, where stage 3 lights it or shows it in front of a surface.
     VolumeLayer = D::image("volume_layer", per_ray, |_| Format::Rgba16f);
+    /// The volume that is shown beside a surface, where the volume layer is the surface's colour.
+    VolumeBesideSurface = D::image("volume_beside_surface", per_ray, |_| Format::Rgba16f);
     /// What stages 2 and 3 render, where it becomes the picture only by averaging or next to planes.
     Rendered = D::image("rendered", per_ray, |_| Format::Rgba16f);
     /// The planes of a 4-up picture; black where the rendering goes.
@@ -380,11 +382,18 @@ impl Slot {
 }
 
 /// The slot that stages 2 and 3 render into: the picture itself, unless several rays make a pixel, one ray makes four, or planes
-/// are shown next to the rendering.
+/// or the volume are shown next to the rendering.
 pub fn rendered(scene: &Scene) -> Slot {
     let is_picture =
         scene.settings.ray.rays == 1 && !scene.settings.ray.half && scene.settings.layout == Layout::Single;
     if is_picture || scene.is_flat() { Slot::Picture } else { Slot::Rendered }
+}
+
+/// The slot of whole rays that are composited for a picture or a colour of a surface: the volume layer, unless that holds what lies
+/// behind the surface.
+pub(super) fn composited_beside_surface(scene: &Scene) -> Slot {
+    let is_behind = scene.settings.surface.colour == SurfaceColour::Behind;
+    if scene.is_pair() && is_behind { Slot::VolumeBesideSurface } else { Slot::VolumeLayer }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -37,8 +37,8 @@ impl Rays {
     }
 }
 
-/// Number of rays along each axis: a quarter of a 4-up picture (rounded up), times the rays per pixel, or half (rounded up) with half
-/// resolution.
+/// Number of rays along each axis: a quarter of a 4-up picture or half of a pair (rounded up), times the rays per pixel, or half
+/// (rounded up) with half resolution.
 pub fn ray_size(settings: &Settings) -> [u32; 2] {
     let full = full_size(settings);
     if settings.ray.half { full.map(|n| n.div_ceil(2)) } else { full }
@@ -48,6 +48,7 @@ fn full_size(settings: &Settings) -> [u32; 2] {
     let tile = match settings.layout {
         Layout::Single => settings.picture.size,
         Layout::Four => settings.picture.size.map(|n| n.div_ceil(2)),
+        Layout::Pair => [settings.picture.size[0].div_ceil(2), settings.picture.size[1]],
     };
     tile.map(|n| n * settings.ray.rays)
 }

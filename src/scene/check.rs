@@ -37,6 +37,9 @@ pub(super) fn check(settings: &Settings) -> Result<(), SceneError> {
     if settings.layout == Layout::Four && settings.mode.is_flat() {
         return refuse("layout", "four shows three planes and a rendering: the mode must be one that renders");
     }
+    if settings.layout == Layout::Pair && settings.mode != Mode::Surface {
+        return refuse("layout", "pair shows a volume and the surface found in the same march: set mode=surface");
+    }
     let s = &settings.slices;
     within("slices.pixels", f64::from(s.pixels), 2.0, 4096.0)?;
     if let Some(smooth) = s.smooth {

@@ -260,6 +260,14 @@ impl Scene {
                 "makes steps of different lengths, and volume.compositing=exponential takes one: set ray.spread=0, or another compositing",
             );
         }
+        let is_behind = scene.settings.surface.colour == SurfaceColour::Behind;
+        if scene.is_pair() && is_behind && scene.marches_once().is_err() {
+            return refuse(
+                "surface.colour",
+                "'behind' in layout pair needs the volume of the surface's own march: set volume.compositing=corrected, ray.spread=0 and \
+                 the same start depth of volume and surface, or another colour",
+            );
+        }
         scene.apron = 2.0 + scene.filter_reach();
         check::check_planes_resolved(&scene)?;
         scene.visible_bounds = visible_bounds::of(&scene);
@@ -406,12 +414,45 @@ impl Scene {
 
     /// True if samples are composited through the transfer function.
     pub fn composites(&self) -> bool {
-        matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface()
+        matches!(self.settings.mode, Mode::Volume | Mode::Mixed) || self.colours_surface() || self.is_pair()
     }
 
     /// True if the volume gives the surface its colour.
     pub fn colours_surface(&self) -> bool {
         self.settings.mode == Mode::Surface && self.settings.surface.colour != SurfaceColour::Constant
+    }
+
+    /// True if the volume and the surface are shown side by side.
+    pub fn is_pair(&self) -> bool {
+        self.settings.layout == Layout::Pair
+    }
+
+    /// Whether one march finds the surface and composites the whole ray, and why, or why not (thesis 4.4.2).
+    pub fn marches_once(&self) -> Result<&'static str, &'static str> {
+        let settings = &self.settings;
+        let is_whole = settings.surface.colour == SurfaceColour::Rendered || self.is_pair();
+        if settings.mode != Mode::Surface {
+            return Err("no surface is found and no whole ray composited in this mode");
+        }
+        if !is_whole {
+            return Err("no whole ray is composited");
+        }
+        if settings.ray.sliding == 0 && !self.is_pair() {
+            // Measured: docs/performance.md, "One march for surface and volume".
+            return Err("two passes: where samples are cheap (no ray.sliding) they are no slower than one march");
+        }
+        if matches!(settings.volume.compositing, Compositing::PreIntegrated | Compositing::Exponential) {
+            return Err(
+                "two passes: this compositing takes samples at the ends of steps, the detector in their middles",
+            );
+        }
+        if self.spreads() {
+            return Err("two passes: steps that grow have no sample of the detector in their middles");
+        }
+        if self.surface_view().low != self.volume_view().low {
+            return Err("two passes: rays of the volume and of the surface start at different depths");
+        }
+        Ok("one march finds the surface and composites the whole ray")
     }
 
     /// True if the mode is a projection: one value per ray.

@@ -126,6 +126,7 @@ pub const KEY_BINDINGS: &[Binding] = &[
     on(Char('0'), "block", Command::Mode(Mode::Cube)),
     on(Key::Tab, "three planes and the rendering", Command::Layout(Layout::Four)),
     on(Function(4), "three planes and the rendering", Command::Layout(Layout::Four)),
+    on(Char('v'), "volume and surface side by side", Command::Layout(Layout::Pair)),
     shift(Key::Tab, "one picture", Command::Layout(Layout::Single)),
     shift(Function(4), "one picture", Command::Layout(Layout::Single)),
     // What a drag does.
@@ -279,7 +280,7 @@ mod tests {
         use Mode::*;
         let modes = [Volume, Surface, Mixed, Mip, MinIp, Mean, Plane, Orthogonal, Tomography, Cube].map(Command::Mode);
         let tools = [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip, Tool::Plane].map(Command::Tool);
-        let layouts = [Layout::Single, Layout::Four].map(Command::Layout);
+        let layouts = [Layout::Single, Layout::Four, Layout::Pair].map(Command::Layout);
         let planes = [PlaneName::A, PlaneName::B, PlaneName::C].map(Command::Plane);
         for command in modes.iter().chain(&tools).chain(&layouts).chain(&planes) {
             assert!(KEY_BINDINGS.iter().any(|b| b.command == *command), "{command:?}");

@@ -120,6 +120,9 @@ impl Controls {
                 if layout == Layout::Four && new.mode.is_flat() {
                     new.mode = self.rendered;
                 }
+                if layout == Layout::Pair {
+                    new.mode = Mode::Surface;
+                }
             }
             Command::Rotate(by) if finite(&by) && !now.is_flat() => {
                 new.camera = view::rotate(now, by);
@@ -182,7 +185,7 @@ impl Controls {
 
     fn set_mode(&self, settings: &mut Settings, mode: Mode) {
         settings.mode = mode;
-        if mode.is_flat() {
+        if mode.is_flat() || (settings.layout == Layout::Pair && mode != Mode::Surface) {
             settings.layout = Layout::Single;
         }
     }

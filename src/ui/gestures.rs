@@ -256,6 +256,8 @@ struct Press {
     pane: Pane,
     start: [f64; 2],
     last: [f64; 2],
+    /// See [`Viewport::columns_to_surface`]; a drag that leaves its half stays on the same rays.
+    columns_to_surface: f64,
     /// The press becomes a drag after it moved so far, pixels of the window.
     slop: f64,
     is_drag: bool,
@@ -269,7 +271,9 @@ impl Press {
     /// A press of a button; a finger is the left one.
     fn new(button: Button, tool: Tool, held: Modifiers, slop: f64, at: [f64; 2], viewport: &Viewport) -> Option<Press> {
         let pane = viewport.pane_at(at)?;
-        let (scene, pixel) = viewport.pixel_at(at)?;
+        let (scene, mut pixel) = viewport.pixel_at(at)?;
+        let columns_to_surface = viewport.columns_to_surface(at);
+        pixel[0] += columns_to_surface;
         // Only a plain press can be a click: any other one drags at once.
         let is_plain = button == Button::Left && !held.shift && !held.control;
         let drag = match (pane, tool) {
@@ -299,7 +303,18 @@ impl Press {
         };
         let travel = if let Drag::Face(face) = drag { view::face_travel(scene, face) } else { [0.0; 2] };
         let slop = if is_plain { slop } else { 0.0 };
-        Some(Press { drag, pane, start: at, last: at, slop, is_drag: !is_plain, grabbed: None, travel, moved_mm: 0.0 })
+        Some(Press {
+            drag,
+            pane,
+            start: at,
+            last: at,
+            columns_to_surface,
+            slop,
+            is_drag: !is_plain,
+            grabbed: None,
+            travel,
+            moved_mm: 0.0,
+        })
     }
 
     /// Position and pane of the press, if it did not become a drag.
@@ -323,7 +338,8 @@ impl Press {
     }
 
     fn dragged(&mut self, from: [f64; 2], to: [f64; 2], viewport: &Viewport) -> Option<Command> {
-        let (scene, pixel) = viewport.pixel_at(to)?;
+        let to_surface = |[x, y]: [f64; 2]| [x + self.columns_to_surface, y];
+        let (scene, pixel) = viewport.pixel_at(to).map(|(scene, pixel)| (scene, to_surface(pixel)))?;
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
         let of_picture = |n: f64| n / viewport.size[1];
         let degrees = |x: f64, y: f64| [x, y].map(|n| n / viewport.pane_height(self.pane) * DEGREES_PER_HEIGHT);
@@ -349,7 +365,7 @@ impl Press {
                 // Positions count along the axis from the origin, which does not move with the face.
                 let position = |pixel| closest_along((line.0 - line.1 * line.0.dot(line.1), line.1), picker.ray(pixel));
                 if self.grabbed.is_none() {
-                    self.grabbed = position(viewport.pixel_at(from)?.1);
+                    self.grabbed = position(to_surface(viewport.pixel_at(from)?.1));
                 }
                 // Relative to where the face was grabbed: beyond its range the face waits for the pointer to come back.
                 let moved = (position(pixel)? - self.grabbed?).clamp(self.travel[0], self.travel[1]);
@@ -385,7 +401,7 @@ fn pinch(old: [[f64; 2]; 2], new: [[f64; 2]; 2], pane: Pane, viewport: &Viewport
         Pane::Plane(_) => commands.extend([Command::Zoom(factor), Command::Roll(angle.to_degrees())]),
         Pane::Rendering => {
             // Zoom and roll are about the centre of the rendering; the pan makes up for the rest.
-            let centre = viewport.rendering_centre();
+            let centre = viewport.rendering_centre(old[0]);
             let from_centre = |[a, b]: [[f64; 2]; 2]| [0, 1].map(|i| (a[i] + b[i]) / 2.0 - centre[i]);
             let ([x, y], [to_x, to_y]) = (from_centre(old), from_centre(new));
             let (sin, cos) = angle.sin_cos();

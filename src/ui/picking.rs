@@ -8,7 +8,7 @@ use std::time::Duration;
 /// The projection of the rendered part of the picture. Positions are in pixels of the picture from its upper left corner.
 pub(super) struct Picker<'a> {
     rays: &'a Rays,
-    /// Columns and rows of the picture before the rendered part.
+    /// Columns and rows of the picture before the rendered part; in a pair, the surface.
     corner: [f64; 2],
     size: [f64; 2],
     /// Rays along each edge of a pixel; 0.5 at half resolution.
@@ -18,7 +18,11 @@ pub(super) struct Picker<'a> {
 impl<'a> Picker<'a> {
     pub(super) fn of(scene: &'a Scene) -> Picker<'a> {
         let size = scene.picture_size();
-        let corner = if scene.settings.layout == Layout::Four { size.map(|n| cell(n, 1, 2)) } else { [0, 0] };
+        let corner = match scene.settings.layout {
+            Layout::Single => [0, 0],
+            Layout::Four => size.map(|n| cell(n, 1, 2)),
+            Layout::Pair => [cell(size[0], 1, 2), 0],
+        };
         let ray = &scene.settings.ray;
         Picker {
             rays: &scene.rays,
@@ -117,6 +121,15 @@ impl<'a> Viewport<'a> {
         Some((scene, self.pixel_of(scene, at)?))
     }
 
+    /// Columns of the picture from the volume of a pair to the surface on the same rays, where a position is on the volume; 0 elsewhere.
+    /// Both halves show the same rays: what is pressed on the volume acts as if it were pressed on the surface.
+    pub(super) fn columns_to_surface(&self, at: [f64; 2]) -> f64 {
+        match self.pixel_at(at) {
+            Some((scene, [x, _])) if scene.is_pair() && x < Picker::of(scene).corner[0] => Picker::of(scene).corner[0],
+            _ => 0.0,
+        }
+    }
+
     /// The pane at a position in the window; none outside of the picture and in empty cells.
     pub(super) fn pane_at(&self, at: [f64; 2]) -> Option<Pane> {
         let (scene, pixel) = self.pixel_at(at)?;
@@ -159,9 +172,10 @@ impl<'a> Viewport<'a> {
         if scale > 0.0 { pixels.max(1.0) / scale } else { f64::INFINITY }
     }
 
-    /// The centre of the rendered part, pixels of the window.
-    pub(super) fn rendering_centre(&self) -> [f64; 2] {
-        let (scale, centre) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Picker::of(scene).centre()));
+    /// The centre of the rendered part, pixels of the window; in a pair, of the half at this position.
+    pub(super) fn rendering_centre(&self, at: [f64; 2]) -> [f64; 2] {
+        let (scale, mut centre) = (self.scale(), self.scene.map_or([0.0; 2], |scene| Picker::of(scene).centre()));
+        centre[0] -= self.columns_to_surface(at);
         std::array::from_fn(|a| self.corner[a] + if scale > 0.0 { centre[a] / scale } else { 0.0 })
     }
 

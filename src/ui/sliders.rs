@@ -199,23 +199,23 @@ pub const SLIDERS: &[Slider] = &[
         |s, v| s.volume.hit = v,
     ),
     slider("Veil", "", Volume, [0.0, 1.0], 0.05).of(is_mixed, |s| s.volume.veil, |s, v| s.volume.veil = v),
-    slider("Veil threshold", "", Volume, [0.0, 1.0], 0.01).of(
-        is_mixed,
+    slider("Volume threshold", "", Volume, [0.0, 1.0], 0.01).of(
+        has_own_volume,
         |s| s.volume.threshold,
         |s, v| s.volume.threshold = v,
     ),
-    slider("Veil window low", "", Volume, [0.0, 1.0], 0.01).of(
-        is_mixed,
+    slider("Volume window low", "", Volume, [0.0, 1.0], 0.01).of(
+        has_own_volume,
         |s| s.volume.window[0],
         |s, v| set_low(&mut s.volume.window, v),
     ),
-    slider("Veil window high", "", Volume, [0.0, 1.0], 0.01).of(
-        is_mixed,
+    slider("Volume window high", "", Volume, [0.0, 1.0], 0.01).of(
+        has_own_volume,
         |s| s.volume.window[1],
         |s, v| set_high(&mut s.volume.window, v),
     ),
-    slider("Veil start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
-        is_mixed,
+    slider("Volume start depth", "mm", Volume, [0.0, 400.0], 1.0).within(depth_limits).reruns().of(
+        has_own_volume,
         |s| s.volume.start_depth.unwrap_or(0.0),
         |s, v| s.volume.start_depth = above(v, 1e-9),
     ),
@@ -312,6 +312,11 @@ fn is_four(s: &Settings) -> bool {
 
 fn is_cube(s: &Settings) -> bool {
     s.mode == Mode::Cube
+}
+
+/// A volume shown with a surface has a window, a threshold and a start depth of its own.
+fn has_own_volume(s: &Settings) -> bool {
+    s.mode == Mode::Mixed || s.layout == Layout::Pair
 }
 
 fn is_mixed(s: &Settings) -> bool {
@@ -446,7 +451,7 @@ fn opacity(s: &Settings) -> f64 {
 }
 
 fn has_opacity(s: &Settings) -> bool {
-    matches!(s.mode, Mode::Volume | Mode::Mixed) && opacity(s) > 0.0
+    (s.mode == Mode::Volume || has_own_volume(s)) && opacity(s) > 0.0
 }
 
 fn set_opacity(s: &mut Settings, value: f64) {

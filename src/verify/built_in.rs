@@ -157,7 +157,7 @@ pub fn body_frames(scene: &Scene, body: impl Fn(DVec3) -> f64) -> Vec<Texels> {
 }
 
 /// Names of modes with their settings.
-const MODES: [(&str, &str); 15] = [
+const MODES: [(&str, &str); 16] = [
     ("vr", "mode = 'vr'"),
     ("vr, pre-integrated", "mode = 'vr'\nvolume = { compositing = 'pre-integrated', shading = 'depth-coded' }"),
     ("vr, exponential", "mode = 'vr'\nvolume = { compositing = 'exponential', transfer = 'bone' }"),
@@ -173,6 +173,7 @@ const MODES: [(&str, &str); 15] = [
     ("cube", "mode = 'cube'"),
     ("4-up, sr", "mode = 'sr'\nlayout = 'four'"),
     ("4-up, vr", "mode = 'vr'\nlayout = 'four'"),
+    ("pair", "mode = 'sr'\nlayout = 'pair'"),
 ];
 
 /// Every mode once, each with filters of every stage, in one small sweep.
@@ -267,6 +268,9 @@ fn moved(mut probe: Probe, share: f64) -> Probe {
 /// A mode and its settings: a surface with the volume's colour behind it.
 const BEHIND: &str = "'sr'\nsurface = { colour = 'behind', colour_depth = 4 }";
 
+/// The same: a surface and a volume of one march.
+const PAIR: &str = "'sr'\nlayout = 'pair'";
+
 fn ray_scenes() -> Vec<SceneSpec> {
     let mut scenes = Vec::new();
     let mut add = |name: &str, geometry: &Geometry, input: Input, toml: &str| {
@@ -274,9 +278,13 @@ fn ray_scenes() -> Vec<SceneSpec> {
             scenes.push(SceneSpec::new(name, geometry, input, toml.into()));
             return;
         }
-        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }", BEHIND] {
+        for mode in ["'sr'", "'vr'", "'mip'", "'mixed'", "'vr'\nvolume = { shading = 'first-hit' }", BEHIND, PAIR] {
             // A scene of its own for the maps of a fan, and only where the table of surfaces is free.
             if mode == BEHIND && (!name.starts_with("fan") || toml.contains("surface")) {
+                continue;
+            }
+            // Every variant of the geometry once.
+            if mode == PAIR && !["fan", "linear", "single", "Cartesian"].iter().any(|shape| name.starts_with(shape)) {
                 continue;
             }
             let toml = format!("mode = {mode}\n{toml}");
@@ -433,6 +441,30 @@ fn ray_scenes() -> Vec<SceneSpec> {
         (
             "colours behind the surface, shadow and occlusion",
             "mode = 'sr'\nsurface = { colour = 'behind' }\nlight = { shadow = {}, occlusion = {} }\nslices = { pixels = 30 }",
+        ),
+        (
+            "pair, three rays, first crossing, roughest",
+            "mode = 'sr'\nlayout = 'pair'\nray = { rays = 3 }\nvolume = { compositing = 'riemann', window = [0.2, 0.9], threshold = 0.3 }\n\
+             surface = { place = 'first-crossing', rough = 8, threshold = 0.05, colour = 'rendered' }\nslices = { pixels = 30 }",
+        ),
+        (
+            "pair, half the rays, colours behind a second surface",
+            "mode = 'sr'\nlayout = 'pair'\nray = { half = true }\nvolume = { shading = 'depth-coded' }\n\
+             surface = { number = 2, threshold = 0.05, rough = 2, colour = 'behind' }\nlight = { skin = {}, texture = 0.5 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "pair, lasting, sliding, from inside",
+            "mode = 'sr'\nlayout = 'pair'\ncamera = { field_of_view = 90, zoom = 20 }\nray = { sliding = 3 }\n\
+             surface = { detector = 'lasting', threshold = 0.02, noise = 1.0, rough = 2 }\nslices = { pixels = 30 }",
+        ),
+        (
+            "pair, adaptive, long ring, clipped",
+            "mode = 'sr'\nlayout = 'pair'\nsurface = { edge = 8, detector = 'adaptive', threshold = 0.02, place = 'middle' }\nslices = { pixels = 60 }\n\
+             clip = [{ at = [0, 25, 0], normal = [0.3, -1, 0.2] }]",
+        ),
+        (
+            "pair of two passes",
+            "mode = 'sr'\nlayout = 'pair'\nvolume = { compositing = 'pre-integrated' }\nslices = { pixels = 30 }",
         ),
         ("veil and shadow", "mode = 'mixed'\nlight = { shadow = {} }\nslices = { pixels = 30 }"),
         ("lit volume, shadow", "mode = 'vr'\nvolume = { shading = 'first-hit' }\nlight = { shadow = {}, skin = {} }\nslices = { pixels = 12 }"),

@@ -288,10 +288,10 @@ pub fn inputs_of(scene: &Scene, pass: &Pass, args: &DispatchArgs, kind: &str, se
         let made = reads[..n].iter().find(|b| b.slot == bind.slot).map(|b| inputs.get(b.name).clone());
         inputs.insert(bind.name, made.unwrap_or_else(|| input(scene, bind, kind, &mut noise)));
     }
-    if let Some(bricks) = reads.iter().find(|b| b.name == "bricks") {
+    for bricks in reads.iter().filter(|b| matches!(b.name, "bricks" | "volume_bricks")) {
         // Empty space must be consistent with the volume.
         let distances = empty_space_of(scene, bricks.slot, inputs.get("volume"));
-        inputs.insert("bricks", distances);
+        inputs.insert(bricks.name, distances);
     }
     if reads.iter().any(|b| b.slot == Slot::PackedNeighbours) {
         let mut packed = Arrays::default();

@@ -11,7 +11,7 @@ use crate::verify::report::{Figure, Level};
 
 /// Scenes that together need every pass, with pictures as large as a tile of a small display. A pass is timed in the first scene that
 /// needs it.
-const SCENES: [&str; 14] = [
+const SCENES: [&str; 15] = [
     "mode = 'sr'",
     "mode = 'vr'",
     "mode = 'mip'",
@@ -19,6 +19,7 @@ const SCENES: [&str; 14] = [
     "mode = 'orthogonal'\npost = { floats = true }",
     "mode = 'cube'",
     "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'sr'\nlayout = 'pair'",
     "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { blur = true, smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\nray = { sampling = 'quads' }",
     "mode = 'vr'\nconditioning = { samples = 120, low_pass = 1.0, dynamic_range = 50 }\nslices = { estimator = 'median' }",
     "mode = 'sr'\nslices = { enhanced_sigma = { window = 5, largest = 9, sigma = 0.1, growth = true }, perona_malik = { repeat = 2 } }\n\

@@ -13,7 +13,7 @@ const SCENES: u64 = 40;
 /// Settings and their values, of sizes that a software device draws in milliseconds.
 const SETTINGS: &[(&str, &[&str])] = &[
     ("mode", &["vr", "sr", "mixed", "mip", "minip", "xray", "mpr", "orthogonal", "tomography", "cube"]),
-    ("layout", &["single", "four"]),
+    ("layout", &["single", "four", "pair"]),
     ("volume.shading", &["none", "depth-coded", "first-hit"]),
     ("volume.compositing", &["riemann", "corrected", "pre-integrated", "exponential"]),
     ("volume.transfer", &["grey", "bone", "warm", "[{at=0,colour=[0,0,0],opacity=0},{at=1,colour=[1,0,2],opacity=1}]"]),
@@ -31,6 +31,7 @@ const SETTINGS: &[(&str, &[&str])] = &[
     ("surface.colour_depth", &["0.01", "1000"]),
     ("light.shadow", &["{}", "{dims='pixel'}"]),
     ("surface.start_depth", &["0", "10", "400"]),
+    ("volume.start_depth", &["0", "10"]),
     ("projection.start_depth", &["5"]),
     ("slices.median", &["true"]),
     ("slices.blur", &["true"]),

@@ -53,7 +53,7 @@ fn geometries() -> Vec<(&'static str, Geometry)> {
     ]
 }
 
-const MODES: [&str; 27] = [
+const MODES: [&str; 31] = [
     "mode = 'sr'\nsurface = { threshold = 0.2 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 1 }",
     "mode = 'sr'\nsurface = { threshold = 0.2, rough = 4, rough_threshold = 0.1, number = 2 }",
@@ -78,6 +78,10 @@ const MODES: [&str; 27] = [
     "mode = 'mean'",
     "mode = 'mean'\nprojection = { window = [0.05, 0.8] }",
     "mode = 'sr'\nsurface = { threshold = 0.2, colour = 'rendered' }\nvolume = { threshold = 0.3 }",
+    "mode = 'sr'\nsurface = { threshold = 0.2, rough = 2, place = 'first-crossing', colour = 'rendered' }\nvolume = { threshold = 0.3 }",
+    "mode = 'sr'\nlayout = 'pair'\nsurface = { threshold = 0.2 }\nvolume = { threshold = 0.55, transfer = 'warm', compositing = 'riemann' }",
+    "mode = 'sr'\nlayout = 'pair'\nsurface = { threshold = 0.2, sign = 'dark', number = 2, colour = 'behind' }\nvolume = { window = [0.3, 1] }",
+    "mode = 'sr'\nlayout = 'pair'\nsurface = { detector = 'lasting', threshold = 0.1, rough = 4 }\nvolume = { threshold = 0.3, shading = 'depth-coded' }",
     "mode = 'sr'\nsurface = { threshold = 0.2, colour = 'behind' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
     "mode = 'mixed'\nsurface = { threshold = 0.2 }\nvolume = { threshold = 0.3 }",
     "mode = 'mixed'\nsurface = { threshold = 0.2, sign = 'dark' }\nvolume = { threshold = 0.3, compositing = 'pre-integrated' }",
@@ -97,8 +101,15 @@ const CAMERAS: [&str; 3] =
     ["azimuth = 25, elevation = -15, field_of_view = 35", "elevation = 90", "azimuth = 170, elevation = 3, zoom = 2"];
 
 /// The results of stage 2 that the scene has.
-const RESULTS: [Slot; 6] =
-    [Slot::Distance, Slot::Surface, Slot::VolumeLayer, Slot::Rendered, Slot::Picture, Slot::Screen];
+const RESULTS: [Slot; 7] = [
+    Slot::Distance,
+    Slot::Surface,
+    Slot::VolumeLayer,
+    Slot::VolumeBesideSurface,
+    Slot::Rendered,
+    Slot::Picture,
+    Slot::Screen,
+];
 
 fn results(renderer: &mut Renderer) -> Vec<(Slot, Vec<u64>)> {
     renderer.picture().expect("picture");

@@ -26,6 +26,7 @@ mod live_control;
 mod live_failures;
 mod modes;
 mod motion;
+mod pair;
 mod passes;
 mod pictures;
 mod planes;

@@ -44,6 +44,11 @@ const MODES: &[(&str, &str, &str)] = &[
         "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
     ),
     (
+        "mode = 'sr'\nsurface = { colour = 'rendered' }\nray = { sliding = 3 }",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
+    ),
+    (
         "mode = 'mixed'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_volume light tone",
         "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer picture screen",
@@ -84,6 +89,16 @@ const MODES: &[(&str, &str, &str)] = &[
         "mode = 'sr'\nlayout = '4up'",
         "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface raycast_surface raycast_planes light assemble tone",
         "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances sweep_lut tiles distance_map rendered planes picture screen",
+    ),
+    (
+        "mode = 'sr'\nlayout = 'pair'",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer rendered picture screen",
+    ),
+    (
+        "mode = 'sr'\nlayout = 'pair'\nsurface = { colour = 'behind' }",
+        "scan_convert tile_ranges brick_ranges classify_bricks_surface brick_distance_surface brick_distance_surface brick_distance_surface classify_bricks_volume brick_distance_volume brick_distance_volume brick_distance_volume raycast_surface_and_volume raycast_volume light assemble tone",
+        "frames scan_lut volume tile_ranges brick_table brick_ranges brick_kinds brick_distances_x brick_distances_xy surface_brick_distances volume_brick_distances opaque_before sweep_lut transfer distance_map volume_layer volume_beside_surface rendered picture screen",
     ),
 ];
 

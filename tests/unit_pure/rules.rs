@@ -219,6 +219,7 @@ fn scenes() -> Vec<Scene> {
                 "'mixed'",
                 "'vr'\nvolume = { shading = 'first-hit' }",
                 "'vr'\nlayout = 'four'",
+                "'sr'\nlayout = 'pair'",
             ] {
                 scenes.push(scene(geometry.clone(), BYTES, &format!("mode = {mode}\n{filters}")));
             }

@@ -12,47 +12,17 @@ pub const PASS: Pass = Pass {
     frequency: Frequency::Picture,
     link: Link::None,
     shader: |s, _| ray::variant!(s, "raycast/surface"),
-    needed: |s| if s.detects_surface() { Ok("the mode shows a surface") } else { Err("no surface in this mode") },
-    reads: |s, _| ray::marching_reads(s, empty_space::surface_skipping(s)),
-    writes: |s, _| {
-        let mut writes = vec![whole("distance_map", Slot::Distance)];
-        writes.extend(s.lights_by_echo().then_some(whole("surface", Slot::Surface)));
-        writes
+    needed: |s| match (s.detects_surface(), s.marches_once()) {
+        (false, _) => Err("no surface in this mode"),
+        (true, Ok(_)) => Err("found in the march that composites"),
+        (true, Err(_)) => Ok("the mode shows a surface"),
     },
+    reads: |s, _| ray::marching_reads(s, empty_space::surface_skipping(s)),
+    writes: |s, _| writes(s),
     extent: ray_extent,
     repeat: once,
-    params: |s, _| {
-        let surface = &s.settings.surface;
-        ray::params(s, s.surface_view(), s.ring.step)
-            .f32("threshold", surface.threshold)
-            .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
-            .f32("polarity", polarity(s))
-            .f32("noise", surface.noise)
-            .f32("quiet_level", empty_space::quiet_level(s))
-            .f32("behind_step", s.step_behind())
-    },
-    constants: |s, _| {
-        let mut constants = ray::marching_constants(s, empty_space::surface_skipping(s));
-        let detector = match s.settings.surface.detector {
-            Detector::Threshold => 0,
-            Detector::Adaptive => 1,
-            Detector::Lasting => 2,
-        };
-        constants.push(("ROUGH", s.settings.surface.rough as i32));
-        let place = match s.settings.surface.place {
-            Place::FirstCrossing => 0,
-            Place::Peak => 1,
-            Place::Middle => 2,
-        };
-        constants.push(("PLACE", place));
-        constants.push(("HALF", s.ring.half as i32));
-        constants.push(("FOLLOW_LENGTH", s.ring.follow as i32));
-        constants.push(("NUMBER", s.settings.surface.number as i32));
-        constants.push(("DETECTOR", detector));
-        constants.push(("BEHIND", s.samples_behind() as i32));
-        constants.push(("ECHO", s.lights_by_echo() as i32));
-        constants
-    },
+    params: |s, _| params(s),
+    constants: |s, _| constants(s),
     tolerance: Tolerance {
         absolute: 2e-3,
         relative: 1e-5,
@@ -63,34 +33,83 @@ pub const PASS: Pass = Pass {
     reference: |scene, _, reads, writes| {
         let volume = reads.get("volume");
         let size = writes.get("distance_map").size;
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                let ray = ray::Ray::cast(scene, volume, scene.surface_view(), scene.ring.step, x, y);
-                let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
-                // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
-                let half = i64::from(scene.ring.half * scene.settings.surface.rough);
-                let first = (-half).max((ray.steps_to(-ray.enter) - 0.5).ceil() as i64);
-                let end = if count > 0 { count + half + i64::from(scene.ring.samples()) } else { first };
-                let samples: Vec<Option<f64>> =
-                    (first..end).map(|i| i as f64 + 0.5).map(|n| ray.sample(ray.offset(n), n)).collect();
-                let within = |place: f64| (0.0..=ray.path()).contains(&ray.offset(place + 0.5));
-                let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
-                let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
-                    Some((place, echo)) => {
-                        let distance = ray.enter + ray.offset(place + 0.5);
-                        (distance, [echo, 1.0, behind(scene, &ray, distance), 0.0])
-                    }
-                    None => (MISS, [0.0; 4]),
-                };
-                writes.get_mut("distance_map").set([x, y, 0], &[distance]);
-                if scene.lights_by_echo() {
-                    let map = writes.get_mut("surface");
-                    map.set([x, y, 0], &surface[..map.channels]);
-                }
-            }
+        for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+            reference_ray(scene, volume, writes, x, y);
         }
     },
 };
+
+/// What the detector writes.
+pub(super) fn writes(scene: &Scene) -> Vec<Bind> {
+    let mut writes = vec![whole("distance_map", Slot::Distance)];
+    writes.extend(scene.lights_by_echo().then_some(whole("surface", Slot::Surface)));
+    writes
+}
+
+/// Parameters of the detector and its rays.
+pub(super) fn params(scene: &Scene) -> Params {
+    let surface = &scene.settings.surface;
+    ray::params(scene, scene.surface_view(), scene.ring.step)
+        .f32("threshold", surface.threshold)
+        .f32("rough_threshold", surface.rough_threshold.unwrap_or(surface.threshold))
+        .f32("polarity", polarity(scene))
+        .f32("noise", surface.noise)
+        .f32("quiet_level", empty_space::quiet_level(scene))
+        .f32("behind_step", scene.step_behind())
+}
+
+/// Constants of the detector and its rays.
+pub(super) fn constants(scene: &Scene) -> Vec<(&'static str, i32)> {
+    let surface = &scene.settings.surface;
+    let mut constants = ray::marching_constants(scene, empty_space::surface_skipping(scene));
+    let detector = match surface.detector {
+        Detector::Threshold => 0,
+        Detector::Adaptive => 1,
+        Detector::Lasting => 2,
+    };
+    let place = match surface.place {
+        Place::FirstCrossing => 0,
+        Place::Peak => 1,
+        Place::Middle => 2,
+    };
+    constants.extend([
+        ("ROUGH", surface.rough as i32),
+        ("PLACE", place),
+        ("HALF", scene.ring.half as i32),
+        ("FOLLOW_LENGTH", scene.ring.follow as i32),
+        ("NUMBER", surface.number as i32),
+        ("DETECTOR", detector),
+        ("BEHIND", scene.samples_behind() as i32),
+        ("ECHO", scene.lights_by_echo() as i32),
+    ]);
+    constants
+}
+
+/// Finds the surface on a pixel's ray, and writes its distance, and its echo where the scene stores it.
+pub(super) fn reference_ray(scene: &Scene, volume: &Texels, writes: &mut Arrays, x: usize, y: usize) {
+    let ray = ray::Ray::cast(scene, volume, scene.surface_view(), scene.ring.step, x, y);
+    let count = ray.steps_to(ray.path().max(0.0)).floor() as i64;
+    // Half a rough ring before the region, and behind it that and a ring to follow an edge to its peak.
+    let half = i64::from(scene.ring.half * scene.settings.surface.rough);
+    let first = (-half).max((ray.steps_to(-ray.enter) - 0.5).ceil() as i64);
+    let end = if count > 0 { count + half + i64::from(scene.ring.samples()) } else { first };
+    let samples: Vec<Option<f64>> =
+        (first..end).map(|i| i as f64 + 0.5).map(|n| ray.sample(ray.offset(n), n)).collect();
+    let within = |place: f64| (0.0..=ray.path()).contains(&ray.offset(place + 0.5));
+    let found = detect(scene, &samples, first).map(|(place, echo)| (place + first as f64, echo));
+    let (distance, surface) = match found.filter(|(place, _)| within(*place)) {
+        Some((place, echo)) => {
+            let distance = ray.enter + ray.offset(place + 0.5);
+            (distance, [echo, 1.0, behind(scene, &ray, distance), 0.0])
+        }
+        None => (MISS, [0.0; 4]),
+    };
+    writes.get_mut("distance_map").set([x, y, 0], &[distance]);
+    if scene.lights_by_echo() {
+        let map = writes.get_mut("surface");
+        map.set([x, y, 0], &surface[..map.channels]);
+    }
+}
 
 /// Mean echo over the depth behind the surface that skin shading needs.
 fn behind(scene: &Scene, ray: &ray::Ray, distance: f64) -> f64 {

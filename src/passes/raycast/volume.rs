@@ -18,7 +18,11 @@ pub const PASS: Pass = Pass {
         Kind::Layer => ray::variant!(s, "raycast/volume", "layer_"),
         Kind::Hit => ray::variant!(s, "raycast/volume", "hit_"),
     },
-    needed: |s| if s.composites() { Ok("samples are composited") } else { Err("nothing is composited in this mode") },
+    needed: |s| match (s.composites(), s.marches_once()) {
+        (false, _) => Err("nothing is composited in this mode"),
+        (true, Ok(_)) if kind(s) == Kind::Colour => Err("composited in the march that finds the surface"),
+        (true, _) => Ok("samples are composited"),
+    },
     reads: |s, _| {
         let mut reads = ray::marching_reads(s, empty_space::volume_skipping(s));
         reads.push(match s.settings.volume.compositing {
@@ -38,17 +42,8 @@ pub const PASS: Pass = Pass {
     extent: ray_extent,
     repeat: once,
     params: |s, _| {
-        let volume = &s.settings.volume;
-        let (axis, near) = depth_axis(s);
-        let near = s.limit_to_local(axis, near);
-        let params = ray::params(s, s.volume_view(), s.step)
-            .f32("absorption_scale", s.optical_step())
-            .f32("opaque_enough", 1.0 - s.settings.ray.early_end)
-            .f32("hit_opacity", volume.hit)
-            .vec3("near_tint", volume.near_tint)
-            .vec3("far_tint", volume.far_tint)
-            .vec3("depth_axis", axis)
-            .f32("depth_near", near);
+        let params = ray::params(s, s.volume_view(), s.step);
+        let params = compositing_params(s, params, s.step).f32("hit_opacity", s.settings.volume.hit);
         match kind(s) {
             Kind::Behind => params.f32("colour_depth", s.settings.surface.colour_depth),
             _ => params,
@@ -56,16 +51,7 @@ pub const PASS: Pass = Pass {
     },
     constants: |s, _| {
         let mut constants = ray::marching_constants(s, empty_space::volume_skipping(s));
-        let compositing = match s.settings.volume.compositing {
-            Compositing::Riemann => 0,
-            Compositing::Corrected => 1,
-            Compositing::PreIntegrated => 2,
-            Compositing::Exponential => 3,
-        };
-        constants.push(("EARLY_END", (s.settings.ray.early_end > 0.0) as i32));
-        constants.push(("COMPOSITING", compositing));
-        constants.push(("DEPTH_CODED", (s.settings.volume.shading == Shading::DepthCoded) as i32));
-        constants.push(("ENTRIES", s.transfer_entries() as i32));
+        constants.extend(compositing_constants(s));
         constants
     },
     tolerance: Tolerance {
@@ -102,6 +88,41 @@ pub const PASS: Pass = Pass {
         }
     },
 };
+
+/// Adds the numbers of compositing with this step, mm, to those of a pass.
+pub(super) fn compositing_params(scene: &Scene, params: Params, step: f64) -> Params {
+    let volume = &scene.settings.volume;
+    let (axis, near) = depth_axis(scene);
+    params
+        .f32("absorption_scale", step / reference_length(scene))
+        .f32("opaque_enough", 1.0 - scene.settings.ray.early_end)
+        .vec3("near_tint", volume.near_tint)
+        .vec3("far_tint", volume.far_tint)
+        .vec3("depth_axis", axis)
+        .f32("depth_near", scene.limit_to_local(axis, near))
+}
+
+/// Constants of compositing.
+pub(super) fn compositing_constants(scene: &Scene) -> [(&'static str, i32); 4] {
+    let compositing = match scene.settings.volume.compositing {
+        Compositing::Riemann => 0,
+        Compositing::Corrected => 1,
+        Compositing::PreIntegrated => 2,
+        Compositing::Exponential => 3,
+    };
+    [
+        ("EARLY_END", (scene.settings.ray.early_end > 0.0) as i32),
+        ("COMPOSITING", compositing),
+        ("DEPTH_CODED", (scene.settings.volume.shading == Shading::DepthCoded) as i32),
+        ("ENTRIES", scene.transfer_entries() as i32),
+    ]
+}
+
+/// Red, green, blue and opacity of a whole ray with this step, mm, through the table of the transfer function over the value.
+pub(super) fn composited(scene: &Scene, volume: &Texels, transfer: &Texels, step: f64, [x, y]: [usize; 2]) -> [f64; 4] {
+    let ray = ray::Ray::cast(scene, volume, scene.volume_view(), step, x, y);
+    composite(scene, &ray, &Tables { of_steps: transfer, curve: Vec::new() }).0
+}
 
 #[derive(PartialEq)]
 enum Kind {

@@ -111,6 +111,8 @@ pub enum Layout {
     /// 4-up: the three orthogonal planes and the rendering of the mode.
     #[serde(alias = "4up", alias = "4-up")]
     Four,
+    /// Volume rendering on the left and surface rendering on the right, of one march along the same rays. Mode surface only.
+    Pair,
 }
 
 /// The picture.

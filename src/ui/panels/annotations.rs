@@ -39,8 +39,12 @@ pub(super) fn paint(ui: &Ui, state: &PanelState, scale: f32) {
         }
     }
     if !scene.is_flat() {
-        let split = if scene.settings.layout == Layout::Four { 2.0 } else { 1.0 };
-        let corner = [(width - width / split).floor(), (height - height / split).floor()];
+        let [columns, rows] = match scene.settings.layout {
+            Layout::Single => [1.0, 1.0],
+            Layout::Four => [2.0, 2.0],
+            Layout::Pair => [2.0, 1.0],
+        };
+        let corner = [(width - width / columns).floor(), (height - height / rows).floor()];
         let area = tile(corner, [width - corner[0], height - corner[1]]);
         bar(&painter, area, rendered_pixel(scene, width - corner[0]) * f64::from(scale));
         axes(&painter, area, scene);
@@ -153,6 +157,7 @@ fn colours(painter: &Painter, picture: Rect, scene: &Scene) {
     let window = match settings.mode {
         // The colours of a lit surface do not stand for values.
         Mode::Surface if settings.layout == Layout::Single => return,
+        Mode::Surface if settings.layout == Layout::Pair => settings.volume.window,
         Mode::Volume | Mode::Mixed => settings.volume.window,
         Mode::Mip | Mode::MinIp | Mode::Mean => settings.projection.window,
         Mode::Cube => settings.cube.window,

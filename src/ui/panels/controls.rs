@@ -39,7 +39,7 @@ pub(super) fn show_modes(ui: &mut Ui, state: &PanelState, execute: &mut dyn FnMu
         heading(ui, "Mode");
         pairs(ui, &MODES, |mode| settings.mode == mode, |mode| execute(Command::Mode(mode)));
         heading(ui, "Layout");
-        let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up")];
+        let layouts = [(Layout::Single, "Single"), (Layout::Four, "4-up"), (Layout::Pair, "VR | SR")];
         pairs(ui, &layouts, |layout| settings.layout == layout, |layout| execute(Command::Layout(layout)));
         heading(ui, "Drag");
         pairs(ui, &TOOLS, |tool| state.controls.tool() == tool, |tool| execute(Command::Tool(tool)));

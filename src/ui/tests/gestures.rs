@@ -263,11 +263,40 @@ fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
+/// Both halves of a pair show the same rays: a press on the volume acts like one on the surface, also where it leaves its half.
+#[test]
+fn a_gesture_on_the_volume_of_a_pair_acts_like_the_same_on_the_surface() {
+    let settings = |tool: Tool, columns: f64| {
+        let mut window = TestWindow::new("layout='pair'\ncamera.azimuth=35\ncamera.elevation=20\ncamera.roll=10");
+        window.tool(tool);
+        window.drag(Button::Left, [columns + 60.0, 120.0], [columns + 330.0, 190.0]);
+        for (n, at) in [[60.0, 200.0], [150.0, 260.0]].into_iter().enumerate() {
+            touch(&mut window, n as u64, Phase::Down, [columns + at[0], at[1]]);
+        }
+        touch(&mut window, 0, Phase::Moved, [columns + 20.0, 170.0]);
+        let s = window.controls.settings();
+        let target = s.camera.target.unwrap_or_default();
+        let region = [s.region.lateral, s.region.depth, s.region.elevation].map(Option::unwrap_or_default);
+        let clip = s.clip.first().map_or([0.0; 3], |clip| clip.at);
+        let camera = [s.camera.azimuth, s.camera.elevation, s.camera.roll, s.camera.zoom];
+        [target.as_slice(), region.as_flattened(), &clip, &camera].concat()
+    };
+    for tool in [Tool::Rotate, Tool::Light, Tool::Region, Tool::Clip] {
+        let (volume, surface) = (settings(tool, 0.0), settings(tool, 256.0));
+        let off = volume.iter().zip(&surface).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{tool:?}: {volume:?}, {surface:?}");
+    }
+}
+
 #[test]
 fn the_points_under_two_fingers_stay_under_them() {
-    for toml in
-        ["", "camera.azimuth=40\ncamera.elevation=-30\ncamera.roll=20\nray.half=true", "layout='four'", "ray.rays=2"]
-    {
+    for toml in [
+        "",
+        "camera.azimuth=40\ncamera.elevation=-30\ncamera.roll=20\nray.half=true",
+        "layout='four'",
+        "layout='pair'",
+        "ray.rays=2",
+    ] {
         let mut window = TestWindow::new(toml);
         let [x, y] = Picker::of(&window.scene()).centre();
         let from = [[x + 10.0, y - 40.0], [x + 60.0, y + 30.0]];

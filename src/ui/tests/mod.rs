@@ -240,6 +240,27 @@ fn planes_and_the_4_up_layout_lead_to_each_other() {
 }
 
 #[test]
+fn the_pair_is_of_the_surface_and_other_modes_leave_it() {
+    let mut window = TestWindow::new("mode='volume'");
+    let shows = |window: &TestWindow| (window.controls.settings().mode, window.controls.settings().layout);
+    apply(&mut window, Command::Layout(Layout::Pair));
+    assert_eq!(shows(&window), (Mode::Surface, Layout::Pair));
+    apply(&mut window, Command::Mode(Mode::Surface));
+    assert_eq!(shows(&window), (Mode::Surface, Layout::Pair));
+    for mode in [Mode::Volume, Mode::Mixed, Mode::Tomography, Mode::Cube] {
+        apply(&mut window, Command::Layout(Layout::Pair));
+        apply(&mut window, Command::Mode(mode));
+        assert_eq!(shows(&window), (mode, Layout::Single));
+    }
+    apply(&mut window, Command::Layout(Layout::Pair));
+    apply(&mut window, Command::Plane(PlaneName::B));
+    assert_eq!(shows(&window), (Mode::Plane, Layout::Single));
+    apply(&mut window, Command::Layout(Layout::Pair));
+    apply(&mut window, Command::Layout(Layout::Four));
+    assert_eq!(shows(&window), (Mode::Surface, Layout::Four));
+}
+
+#[test]
 fn values_of_a_mode_that_do_not_fit_do_not_block_its_key() {
     let mut window =
         TestWindow::new("projection.start_depth=500\ncube.inset.near=900\nplanes.columns=64\nplanes.rows=64");

@@ -1,0 +1,86 @@
+// SR and VR of one march (thesis 4.4.2): the surface detector finds the distance of the first surface in the samples that are
+// composited along the whole ray. Each sample is taken once, where the detector does not step back. Compositing takes every sample of
+// the detector's lattice once and in order, whatever the detector does.
+// variants: plain; uniform SWEPT; intra_frame_motion SWEPT INTRA_FRAME_MOTION; non_uniform SWEPT NON_UNIFORM; non_uniform_intra_frame_motion SWEPT NON_UNIFORM INTRA_FRAME_MOTION
+#version 460
+#include "common.glsl"
+#define TWO_KINDS
+layout(constant_id = 15) const int ECHO = 1;  // 0: nothing reads the echo at the surface, and it is not stored
+layout(scalar) uniform Params {
+#include "ray_params.glsl"
+#include "surface_params.glsl"
+#include "compositing_params.glsl"
+    float volume_window_low; // the grey window of compositing
+    float volume_window_scale;
+};
+#include "ray.glsl"
+#include "sliding.glsl"
+#include "detector.glsl"
+#include "empty_space.glsl"
+#include "compositing.glsl"
+const bool COMPOSITES = true;
+int to_composite = NEVER;
+#include "surface_march.glsl"
+uniform writeonly image2D distance_map;
+uniform writeonly image2D surface; // echo at the surface, 1 where one was found, mean echo behind it
+uniform writeonly image2D picture; // the composited volume
+
+vec3 colour = vec3(0.0);
+float opacity = 0.0;
+int complete = 0; // steps of full length; one more may follow
+
+// Composites step i, with the sample before the window.
+void composite(Ray ray, int i, vec3 p, float raw) {
+    float length = min(step_length, ray.leave - ray.enter - offset_of(ray, float(i)));
+    if (length > 0.0) add_step(looked_up(stretched(raw, volume_window_low, volume_window_scale)), length, p, colour, opacity);
+}
+
+bool is_opaque() { return EARLY_END == 1 && opacity >= opaque_enough; }
+
+bool take(Ray ray, int i, inout Slices slices, out float value) {
+    vec3 p = place_of(ray, i);
+    vec3 texel;
+    bool inside = locate(p, texel);
+    value = 0.0;
+    bool composited = i == to_composite;
+    if (inside) {
+        float raw = raw_along(ray, i, SAMPLE_AT, texel, slices);
+        value = windowed(raw);
+        if (composited) composite(ray, i, p, raw);
+    }
+    if (composited) to_composite = i + 1 < complete && !is_opaque() ? i + 1 : NEVER;
+    return inside;
+}
+
+void skip_transparent(Ray ray) {
+    // The last complete step is always taken, as in volume.comp.
+    int last = complete - 1;
+    if (to_composite >= last) return;
+    RaySegment here = volume_segment_at(ray, to_composite, SAMPLE_AT);
+    while (here.kind == EMPTY && to_composite < last) {
+        to_composite = min(here.stop, last);
+        here = volume_segment_at(ray, to_composite, SAMPLE_AT);
+    }
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(pixel, imageSize(distance_map)))) return;
+    Ray ray = ray_of(pixel);
+    Slices slices = no_slices();
+    complete = complete_steps(ray);
+    to_composite = complete > 0 ? 0 : NEVER;
+    vec3 echo;
+    float distance = find_surface(ray, slices, echo);
+    // The last step has the length that is left: the detector has no sample in its middle.
+    float path = ray.leave - ray.enter;
+    float left = min(step_length, path - offset_of(ray, float(complete)));
+    if (path > 0.0 && left > 0.0 && !is_opaque()) {
+        vec3 p = place_at(ray, middle_of(ray, complete, left, false));
+        vec3 texel;
+        if (locate(p, texel)) composite(ray, complete, p, raw_along(ray, complete, SAMPLE_AT, texel, slices));
+    }
+    imageStore(distance_map, pixel, vec4(distance, 0.0, 0.0, 0.0));
+    if (ECHO == 1) imageStore(surface, pixel, vec4(echo, 0.0));
+    imageStore(picture, pixel, vec4(colour, opacity));
+}

@@ -1,0 +1,52 @@
+//! SR and VR in one march (thesis 4.4.2): the whole ray is composited, and the distance of its surface is found in the same samples. They
+//! lie in the middles of the detector's steps, so opacities are corrected for that step. Compositing takes each of them once and in
+//! order, whatever the detector does, which steps back where it fires.
+
+use super::{ray, surface, volume};
+use crate::passes::empty_space;
+use crate::passes::pass::*;
+
+pub const PASS: Pass = Pass {
+    name: "raycast_surface_and_volume",
+    shader: |s, _| ray::variant!(s, "raycast/surface_and_volume"),
+    needed: |s| s.marches_once(),
+    reads: |s, _| {
+        let mut reads = ray::marching_reads(s, empty_space::surface_skipping(s));
+        // What either of the two need not see is left out of that one.
+        reads.extend(empty_space::volume_skipping(s).slot().map(|slot| whole("volume_bricks", slot)));
+        reads.push(whole("transfer", Slot::Transfer));
+        reads
+    },
+    writes: |s, _| {
+        let mut writes = surface::writes(s);
+        writes.push(whole("picture", composited_beside_surface(s)));
+        writes
+    },
+    params: |s, _| {
+        let [low, high] = s.volume_view().window;
+        volume::compositing_params(s, surface::params(s), s.ring.step)
+            .f32("volume_window_low", low)
+            .f32("volume_window_scale", 1.0 / (high - low))
+    },
+    constants: |s, _| {
+        let mut constants = surface::constants(s);
+        constants.extend(volume::compositing_constants(s));
+        constants
+    },
+    tolerance: Tolerance {
+        absolute: 4e-3,
+        relative: 1e-5,
+        outliers: 2e-2,
+        why: "of distances, the tolerance of raycast_surface; of colours, that of raycast_volume, on the same samples",
+    },
+    reference: |scene, _, reads, writes| {
+        let (texels, transfer) = (reads.get("volume"), reads.get("transfer"));
+        let size = writes.get("picture").size;
+        for (x, y) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y))) {
+            surface::reference_ray(scene, texels, writes, x, y);
+            let colour = volume::composited(scene, texels, transfer, scene.ring.step, [x, y]);
+            writes.get_mut("picture").set([x, y, 0], &colour);
+        }
+    },
+    ..surface::PASS
+};
