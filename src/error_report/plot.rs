@@ -55,7 +55,15 @@ fn check([width, height]: [u32; 2]) -> Result<(), String> {
 /// The size at which every panel has room for its names, pixels.
 pub fn size(report: &Report) -> [u32; 2] {
     let rows = (report.dials.len() + 1).div_ceil(COLUMNS).clamp(1, 12) as u32;
-    [PANEL[0] * COLUMNS as u32, (HEAD as u32 + PANEL[1] * rows).max(MIN_SIZE[1])]
+    let key = key_height(&combinations(report, Measure::Rmse).key) as u32;
+    [PANEL[0] * COLUMNS as u32, (HEAD as u32 + PANEL[1] * rows + key).clamp(MIN_SIZE[1], MAX_SIZE)]
+}
+
+/// Height of a line of the key below the panels, pixels.
+const KEY_LINE: f64 = 16.0;
+
+fn key_height(key: &[String]) -> f64 {
+    if key.is_empty() { 0.0 } else { KEY_LINE * (key.len() + 1) as f64 }
 }
 
 /// A point of a panel.
@@ -76,6 +84,8 @@ struct Panel {
     colour: usize,
     /// In the order of the line that joins them.
     points: Vec<PlottedPoint>,
+    /// Names of the points that are numbered, a line each.
+    key: Vec<String>,
 }
 
 fn panels(report: &Report, measure: Measure) -> Vec<Panel> {
@@ -94,15 +104,23 @@ fn combinations(report: &Report, measure: Measure) -> Panel {
                 choice.changed.iter().map(|(dial, label)| format!("{dial} {label}")).collect::<Vec<_>>().join(", ")
             }
         };
-        let on_front = front.contains(&i);
-        // Only the front is named: what others change says nothing.
-        let name = if on_front || choice.changed.is_empty() { name } else { String::new() };
         let (error, time) = (measure.of(&choice.errors)?, of_total(&choice.times?));
-        Some(PlottedPoint { name, time, error, is_default: choice.changed.is_empty(), on_front })
+        Some(PlottedPoint { name, time, error, is_default: choice.changed.is_empty(), on_front: front.contains(&i) })
     });
     let mut points: Vec<_> = points.filter(|p| p.time[0] > 0.0).collect();
     points.sort_by(|a, b| a.time[1].total_cmp(&b.time[1]));
+    // Names of many changes, or many names, fit into no panel: they are numbered from the fastest on.
+    const LONGEST: usize = 40;
+    const MOST: usize = 14;
+    let mut key = Vec::new();
+    if points.len() > MOST || points.iter().any(|p| p.name.chars().count() > LONGEST) {
+        for (n, point) in points.iter_mut().enumerate() {
+            key.push(format!("{}: {}", n + 1, point.name));
+            point.name = (n + 1).to_string();
+        }
+    }
     Panel {
+        key,
         title: "combinations".into(),
         notes: vec!["rings: Pareto front".into()],
         time_axis: "volume and picture (ms)",
@@ -147,6 +165,7 @@ fn of_dial(index: usize, dial: &Dial, measure: Measure) -> Panel {
         time_axis: if of_picture { "picture (ms)" } else { "volume (ms)" },
         colour: index,
         points,
+        key: Vec::new(),
     }
 }
 
@@ -167,7 +186,17 @@ impl Drawing for Diagram<'_> {
         head(canvas, report, measure, width)?;
         let columns = ((width / f64::from(PANEL[0])).floor() as usize).clamp(1, all.len());
         let rows = all.len().div_ceil(columns);
-        let [across, down] = [width / columns as f64, (height - HEAD) / rows as f64];
+        let key: Vec<String> = all.iter().flat_map(|panel| panel.key.clone()).collect();
+        // A diagram too low for its key loses the key's end, not its panels.
+        let foot = height - key_height(&key).min(height / 3.0);
+        let [across, down] = [width / columns as f64, (foot - HEAD) / rows as f64];
+        for (n, line) in key.iter().enumerate() {
+            let top = foot + KEY_LINE * n as f64;
+            if top + KEY_LINE > height {
+                break;
+            }
+            canvas.text(&canvas.cut(line, 12, width - 48.0)?, [24.0, top], 12, INK, [0, 0])?;
+        }
         for (i, panel) in all.iter().enumerate() {
             let (left, top) = ((i % columns) as f64 * across, HEAD + (i / columns) as f64 * down);
             panel.draw(canvas, [left + 56.0, top + 40.0, left + across - 14.0, top + down - 44.0])?;
@@ -361,7 +390,10 @@ fn ticks([low, high]: [f64; 2]) -> Vec<(f64, bool)> {
 fn number(value: f64) -> String {
     match value {
         v if (0.000_99..9_999.0).contains(&v) => format!("{}", (v * 1e6).round() / 1e6),
-        v => format!("{v:.0e}"),
+        v => {
+            let first = v / 10f64.powf(v.log10().floor());
+            if (first - first.round()).abs() < 0.02 { format!("{v:.0e}") } else { format!("{v:.1e}") }
+        }
     }
 }
 
