@@ -248,8 +248,9 @@ fn packed_neighbours_give_the_samples_of_eight_texels() {
     let device = Device::new();
     let geometries = [Geometry::Sweep(wobbler()), Geometry::Sweep(uneven(linear())), cartesian([24, 33, 11])];
     for (g, geometry) in geometries.into_iter().enumerate() {
-        for format in ["r8", "r16", "r16f"] {
-            for mode in MODES {
+        for (f, format) in ["r8", "r16", "r16f"].into_iter().enumerate() {
+            // Every mode with every format, each in one geometry.
+            for mode in MODES.into_iter().enumerate().filter(|(m, _)| (m + f + g) % 3 == 0).map(|(_, mode)| mode) {
                 let of = |sampling: &str| {
                     let set = format!("{mode}\nray.sampling = '{sampling}'\nslices.format = '{format}'\n{LOOK}");
                     scene(geometry.clone(), BYTES, &set)
