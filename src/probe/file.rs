@@ -540,7 +540,7 @@ mod tests {
             ("fan_angle_deg = 60", "fan_angle_deg = 60\npitch_mm = 1", "motion.pitch_mm"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\nspeed_ratio = 1.5", "motion.speed_ratio"),
             ("fan_angle_deg = 60", "fan_angle_deg = 60\n[samples]\nrange = [1, 1]", "samples.range"),
-            ("sector_angle_deg = 70", "sector_angle_deg = 190", "sector angle"),
+            ("sector_angle_deg = 70", "sector_angle_deg = 370", "sector angle"),
             ("wobble_radius_mm = 25", "wobble_radius_mm = -1", "wobble"),
             ("kind = 'fan'", "kind = 'helix'", "helix"),
         ];

@@ -300,7 +300,10 @@ mod tests {
                 ("few", 4, true),
                 ("slice", 8, false),
                 ("first_column", 12, false),
-                ("first_row", 16, false)
+                ("first_row", 16, false),
+                ("first_stored_column", 20, false),
+                ("first_stored_row", 24, false),
+                ("first_stored_slice", 28, false)
             ]
         );
         let target = module.bindings.iter().find(|b| b.name == "target").unwrap();
