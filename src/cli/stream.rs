@@ -18,7 +18,8 @@ const INTERVAL: Duration = Duration::from_secs(1);
 #[derive(clap::Args)]
 #[command(
     after_help = "One line per second: frames, volumes and pictures per second, dropped volumes, latency from the arrival of a frame to \
-                        the pixels that show it, and the mean time and number of runs of every pass.\n\nExamples:\n  \
+                        the pixels that show it, and the mean time and number of pictures, of conversions of frames, and of copies on a \
+                        queue of their own; with --timings of every pass.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
@@ -68,8 +69,8 @@ impl Stream {
         let mut context = self.scene.open_device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let (images, queues) = (self.stream.images, self.stream.queues());
-        let options = StreamOptions { update, images, queues, ..StreamOptions::default() };
+        let (images, queues, time_stamps) = (self.stream.images, self.stream.queues(), self.stream.time_stamps());
+        let options = StreamOptions { update, images, queues, time_stamps, ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.run_stream(&mut stream, update, &mut context);
         drop(stream);

@@ -63,6 +63,17 @@ pub struct Presentation {
     pub displays: Option<ash::khr::display::Instance>,
 }
 
+/// A reading of the device's clock and the host's.
+pub(super) struct ClockReading {
+    pub ticks: u64,
+    /// The host's monotonic clock, ns, if the driver reads it in the same call.
+    pub monotonic: Option<u64>,
+    /// The host's clock around the call.
+    pub at: Instant,
+    /// The largest time between the readings, ns.
+    pub deviation: u64,
+}
+
 /// Counts, since the start, of costly operations that must not happen for every frame.
 #[derive(Debug, Default)]
 pub struct Counts {
@@ -83,7 +94,7 @@ pub struct Counts {
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
     let instance = create_instance(&entry, None, false, None)?;
-    let candidates = device_selection::candidates(&instance);
+    let candidates = device_selection::candidates(&entry, &instance);
     // SAFETY: nothing made from the instance is left.
     unsafe { instance.destroy_instance(None) };
     candidates
@@ -135,7 +146,7 @@ impl Context {
         layer: Option<Layer>,
         target: Option<&Target>,
     ) -> Result<Arc<Context>, GpuError> {
-        let mut candidates = device_selection::candidates(instance)?;
+        let mut candidates = device_selection::candidates(&entry, instance)?;
         if let Some(target) = target {
             candidates.iter_mut().for_each(|candidate| target.check_support(&entry, instance, candidate));
         }
@@ -228,14 +239,42 @@ impl Context {
         own.map(|heap| heap.size).sum()
     }
 
-    /// A time stamp of the device, and the time at which the host read it; `None` if the device's clock cannot be read.
-    pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
+    /// The clock of the device and that of the host, read by one call; `None` if the device's clock cannot be read.
+    pub(super) fn device_ticks(&self) -> Option<ClockReading> {
         let clock = self.clock.as_ref()?;
-        let info = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let domain = |domain| vk::CalibratedTimestampInfoEXT::default().time_domain(domain);
+        let both = [domain(vk::TimeDomainEXT::DEVICE), domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
+        let asked = if self.candidate.reads_monotonic { &both[..] } else { &both[..1] };
         let before = Instant::now();
-        // SAFETY: the extension is enabled; the device's own domain is always among its domains.
-        let (ticks, _) = unsafe { clock.get_calibrated_timestamps(&info) }.ok()?;
-        Some((*ticks.first()?, before + before.elapsed() / 2))
+        // SAFETY: the extension is enabled; the device's own domain is always among its domains, the other one was listed.
+        let (read, deviation) = unsafe { clock.get_calibrated_timestamps(asked) }.ok()?;
+        let took = before.elapsed();
+        // Without the host's clock in the same call, the device's was read at some time during it.
+        let around = if self.candidate.reads_monotonic { 0 } else { took.as_nanos() as u64 / 2 };
+        Some(ClockReading {
+            ticks: *read.first()?,
+            monotonic: read.get(1).copied(),
+            at: before + took / 2,
+            deviation: deviation.saturating_add(around),
+        })
+    }
+
+    /// The host's clock, and the same instant on the monotonic clock that the driver reads, ns, if it does.
+    pub(super) fn clocks_now(&self) -> (Instant, Option<u64>) {
+        let asked = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
+        let read = || {
+            let clock = self.clock.as_ref().filter(|_| self.candidate.reads_monotonic)?;
+            let before = Instant::now();
+            // SAFETY: the extension is enabled and the domain was listed.
+            let (read, _) = unsafe { clock.get_calibrated_timestamps(&asked) }.ok()?;
+            let took = before.elapsed();
+            Some((took, before + took / 2, *read.first()?))
+        };
+        // The shortest of a few calls relates both best.
+        match (0..8).filter_map(|_| read()).min_by_key(|(took, ..)| *took) {
+            Some((_, at, monotonic)) => (at, Some(monotonic)),
+            None => (Instant::now(), None),
+        }
     }
 
     /// Features of a format with optimal tiling.

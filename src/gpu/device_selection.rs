@@ -41,6 +41,8 @@ pub struct Candidate {
     pub queues: Vec<QueueInfo>,
     /// Time stamps can be converted to the host's clock.
     pub calibrated_timestamps: bool,
+    /// The same call reads the host's monotonic clock.
+    pub reads_monotonic: bool,
     /// Supports push descriptors.
     pub push_descriptors: bool,
     /// Can count shader invocations.
@@ -108,14 +110,14 @@ impl Candidate {
 }
 
 /// Every device of an instance, in the driver's order.
-pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
+pub fn candidates(entry: &ash::Entry, instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     // SAFETY: the instance is alive; the call only reads.
     let handles = unsafe { instance.enumerate_physical_devices() }
         .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;
-    Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
+    Ok(handles.into_iter().map(|handle| candidate(entry, instance, handle)).collect())
 }
 
-fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
+fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -170,6 +172,10 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         missing_optional
             .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
     }
+    let reads_monotonic = calibrated_timestamps && reads_monotonic(entry, instance, handle);
+    if calibrated_timestamps && !reads_monotonic {
+        missing_optional.push("CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other");
+    }
     let push_descriptors = has(ash::khr::push_descriptor::NAME);
     if !push_descriptors {
         missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
@@ -196,6 +202,7 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         missing_optional,
         queues,
         calibrated_timestamps,
+        reads_monotonic,
         push_descriptors,
         pipeline_statistics,
         can_present,
@@ -203,6 +210,14 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
+}
+
+/// True if the device's clock and the host's monotonic clock can be read in one call.
+fn reads_monotonic(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalDevice) -> bool {
+    let clocks = ash::ext::calibrated_timestamps::Instance::new(entry, instance);
+    // SAFETY: `handle` comes from this instance and has the extension; the call only reads.
+    let there = unsafe { clocks.get_physical_device_calibrateable_time_domains(handle) }.unwrap_or_default();
+    there.contains(&vk::TimeDomainEXT::CLOCK_MONOTONIC)
 }
 
 /// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
@@ -286,6 +301,7 @@ mod tests {
             missing_optional: vec![],
             queues: vec![],
             calibrated_timestamps: true,
+            reads_monotonic: true,
             push_descriptors: true,
             pipeline_statistics: true,
             can_present: true,

@@ -2,6 +2,7 @@
 //! every test, and any message fails the test that caused it.
 
 mod any_scene;
+mod bands;
 #[path = "../common/mod.rs"]
 mod common;
 mod conditioning;
