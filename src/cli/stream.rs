@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// A device that is lost so often in a row is given up.
+const MAX_LOSSES: u32 = 6;
 /// Interval of the statistics lines.
 const INTERVAL: Duration = Duration::from_secs(1);
 
@@ -87,15 +89,16 @@ impl Stream {
         let signals = Held::first();
         let began = Instant::now();
         let (mut last_status, mut all, mut memory) = (began, Statistics::default(), None);
-        let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
+        let (mut pictures, mut losses, mut enough_at) = (0, 0, None);
         // Said of the first picture that is wholly one colour, not of every one.
         let mut explained = false;
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
-                // A device that is lost again before its first picture is given up.
-                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && lost_at != Some(pictures) => {
+                // Each time the work is divided into smaller parts. A device that is lost all the same, without a picture in between, is
+                // given up.
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
                     tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume");
-                    lost_at = Some(pictures);
+                    losses += 1;
                     *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
                     continue;
@@ -110,6 +113,7 @@ impl Stream {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
                     pictures += 1;
+                    losses = 0;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
                 Step::Progress => {}

@@ -1,9 +1,11 @@
 //! Instance, device, queues and memory allocator. Everything made from a context holds an `Arc` of it, and its `Drop` destroys them in
 //! order.
 
+use super::budget::MemoryBudget;
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
+use super::lost_device::LossReporting;
 use super::validation::{self, Layer, Messenger};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
@@ -44,6 +46,8 @@ pub struct Context {
     /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
+    /// Reports why the device was lost.
+    pub(super) loss: LossReporting,
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
     queues: Vec<Mutex<vk::Queue>>,
     /// The queue families that share slots used on several queues.
@@ -61,6 +65,8 @@ pub struct Presentation {
     pub swapchains: ash::khr::swapchain::Device,
     /// If the target is a monitor.
     pub displays: Option<ash::khr::display::Instance>,
+    /// Waits until a picture is on the monitor, if the device can.
+    pub waits: Option<ash::khr::present_wait::Device>,
 }
 
 /// A reading of the device's clock and the host's.
@@ -183,6 +189,11 @@ impl Context {
             clock: (candidate.calibrated_timestamps)
                 .then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
+            loss: LossReporting {
+                faults: candidate.device_fault.then(|| ash::ext::device_fault::Device::new(instance, &device)),
+                checkpoints: (candidate.checkpoints)
+                    .then(|| ash::nv::device_diagnostic_checkpoints::Device::new(instance, &device)),
+            },
             queues: {
                 // SAFETY: the device was created with these queues.
                 let get = |q: &QueueInfo| unsafe { device.get_device_queue(q.family, q.index) };
@@ -194,6 +205,7 @@ impl Context {
                 surfaces: ash::khr::surface::Instance::new(&entry, instance),
                 swapchains: ash::khr::swapchain::Device::new(instance, &device),
                 displays: target.is_monitor().then(|| ash::khr::display::Instance::new(&entry, instance)),
+                waits: candidate.present_wait.then(|| ash::khr::present_wait::Device::new(instance, &device)),
             }),
             instance: instance.clone(),
             entry,
@@ -341,6 +353,26 @@ impl Context {
                 unsafe { self.device.queue_submit2(*queue, &[*submit], done) }
             })
             .context(operation)
+            .map_err(|error| self.explain(error))
+    }
+
+    /// An error with the report of the driver, if the device is lost and its driver reports anything.
+    pub(super) fn explain(&self, error: GpuError) -> GpuError {
+        let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
+        let report = self.faults.loss_report().unwrap_or_else(|| {
+            let queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+            self.loss.read(self.device.handle(), &queues.iter().map(|q| **q).collect::<Vec<_>>())
+        });
+        match report.is_empty() {
+            true => GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST },
+            false => GpuError::Lost { operation, report: report.to_string() },
+        }
+    }
+
+    /// The current budget of the device's memory; `None` if the device reports none.
+    pub(super) fn memory_budget(&self) -> Option<MemoryBudget> {
+        let read = || self.candidate.budget.as_ref().map(|_| MemoryBudget::read(&self.instance, self.candidate.handle));
+        self.faults.budget().or_else(read)
     }
 
     /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].
@@ -445,6 +477,13 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
     extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     extensions.extend(presents.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    extensions.extend(candidate.budget.is_some().then_some(ash::ext::memory_budget::NAME.as_ptr()));
+    extensions.extend(candidate.device_fault.then_some(ash::ext::device_fault::NAME.as_ptr()));
+    extensions.extend(candidate.checkpoints.then_some(ash::nv::device_diagnostic_checkpoints::NAME.as_ptr()));
+    let waits = presents && candidate.present_wait;
+    if waits {
+        extensions.extend([ash::khr::present_id::NAME.as_ptr(), ash::khr::present_wait::NAME.as_ptr()]);
+    }
     let core = vk::PhysicalDeviceFeatures::default()
         .pipeline_statistics_query(candidate.pipeline_statistics)
         .shader_storage_image_extended_formats(true)
@@ -457,12 +496,21 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
         .synchronization2(true)
         .maintenance4(true)
         .dynamic_rendering(presents);
-    let create = vk::DeviceCreateInfo::default()
+    let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
+    let mut present_id = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
+    let mut present_wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
+    let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .enabled_features(&core)
         .push_next(&mut v12)
         .push_next(&mut v13);
+    if candidate.device_fault {
+        create = create.push_next(&mut fault);
+    }
+    if waits {
+        create = create.push_next(&mut present_id).push_next(&mut present_wait);
+    }
     // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
     unsafe { instance.create_device(candidate.handle, &create, None) }
         .context(|| format!("create device '{}'", candidate.name))

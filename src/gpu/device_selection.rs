@@ -1,5 +1,6 @@
 //! Device selection: the properties of each device, what it lacks, and which one is used.
 
+use super::budget::MemoryBudget;
 use super::error::GpuError;
 use ash::vk;
 use std::borrow::Cow;
@@ -49,6 +50,14 @@ pub struct Candidate {
     pub pipeline_statistics: bool,
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
+    /// Reports when a picture is on the monitor.
+    pub present_wait: bool,
+    /// Reports why it was lost.
+    pub device_fault: bool,
+    /// Reports the passes that its queues had reached when it was lost.
+    pub checkpoints: bool,
+    /// The budget of its memory when it was listed, if it reports one.
+    pub budget: Option<MemoryBudget>,
     pub limits: vk::PhysicalDeviceLimits,
     /// The smaller of the largest allocation and the largest buffer, bytes.
     pub max_bytes: u64,
@@ -189,8 +198,35 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
     if !can_present {
         missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
     }
-    if !has(ash::ext::memory_budget::NAME) {
-        missing_optional.push("VK_EXT_memory_budget");
+    let budget = has(ash::ext::memory_budget::NAME).then(|| MemoryBudget::read(instance, handle));
+    if budget.is_none() {
+        missing_optional.push("VK_EXT_memory_budget: memory is allocated until the driver refuses");
+    }
+    let (mut present_wait, mut device_fault) = (false, false);
+    if properties.api_version >= vk::API_VERSION_1_3 {
+        let mut id = vk::PhysicalDevicePresentIdFeaturesKHR::default();
+        let mut wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default();
+        let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default();
+        let mut features =
+            vk::PhysicalDeviceFeatures2::default().push_next(&mut id).push_next(&mut wait).push_next(&mut fault);
+        // SAFETY: as above. A driver ignores structures of extensions that it does not have.
+        unsafe { instance.get_physical_device_features2(handle, &mut features) };
+        present_wait = can_present
+            && has(ash::khr::present_id::NAME)
+            && has(ash::khr::present_wait::NAME)
+            && id.present_id == vk::TRUE
+            && wait.present_wait == vk::TRUE;
+        device_fault = has(ash::ext::device_fault::NAME) && fault.device_fault == vk::TRUE;
+    }
+    if !present_wait {
+        missing_optional.push("VK_KHR_present_wait: the time from a picture to the monitor is not known");
+    }
+    if !device_fault {
+        missing_optional.push("VK_EXT_device_fault: the driver does not report why a device was lost");
+    }
+    let checkpoints = has(ash::nv::device_diagnostic_checkpoints::NAME);
+    if !checkpoints {
+        missing_optional.push("VK_NV_device_diagnostic_checkpoints: no report of the pass in which a device was lost");
     }
     Candidate {
         handle,
@@ -206,6 +242,10 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
         push_descriptors,
         pipeline_statistics,
         can_present,
+        present_wait,
+        device_fault,
+        checkpoints,
+        budget,
         limits: properties.limits,
         // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
@@ -305,6 +345,10 @@ mod tests {
             push_descriptors: true,
             pipeline_statistics: true,
             can_present: true,
+            present_wait: true,
+            device_fault: true,
+            checkpoints: true,
+            budget: None,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }

@@ -5,15 +5,18 @@
 //! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done.
 //!   `bands` divides dispatches that a watchdog might end.
+//! - `lost_device` reports why a device was lost, `budget` how much memory it has left.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
 mod bands;
+pub mod budget;
 pub mod context;
 pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
+pub mod lost_device;
 pub mod pass_runner;
 mod pipelines;
 mod recorder;

@@ -350,6 +350,7 @@ impl Recorder {
             };
             self.barrier(barriers, &accesses);
             self.context.begin_label(self.commands, pass.name);
+            self.context.loss.mark(self.commands, pass.name);
             self.bind(dispatch, offset, block.len() as u64)?;
             self.dispatch_band(barriers, dispatch, band, work);
             self.context.end_label(self.commands);

@@ -3,14 +3,50 @@
 use crate::common::gpu::*;
 use echolume::gpu::{Bands, Renderer, RendererOptions};
 use echolume::passes::{DispatchArgs, Frequency, PASSES, Slot, Texels, by_name};
-use echolume::probe::Geometry;
+use echolume::probe::{Axis, Geometry, Probe};
 use echolume::queues::oracle::Event;
 use echolume::scene::Scene;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
-/// Small enough that each pass over pictures of this test has several bands, none of which is a divisor of the picture.
-const INVOCATIONS: u64 = 700;
+/// One workgroup: bands are as small as they can be, a row of workgroups.
+const INVOCATIONS: u64 = 64;
+
+/// Together they need every pass, each with several rows of workgroups.
+const SCENES: [&str; 12] = [
+    ALL_FILTERS,
+    "mode = 'vr'\nray = { brick = 4 }",
+    "mode = 'sr'\nray = { brick = 4 }",
+    "mode = 'mip'",
+    "mode = 'orthogonal'",
+    "mode = 'orthogonal'\npost = { floats = true }",
+    "mode = 'cube'",
+    "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'sr'\nlayout = 'pair'",
+    "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { smooth = { elevation = 1.0 } }\n\
+     ray = { sampling = 'quads' }",
+    "mode = 'sr'\nslices = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\n\
+     distance = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }\n\
+     post = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }",
+    "mode = 'sr'\npost = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }",
+];
+
+fn band_scenes() -> Vec<Scene> {
+    let probe = Probe {
+        lines: Axis::centred(1.1 / 95.0, 96),
+        slices: Axis::centred(0.8 / 32.0, 33),
+        sample_pitch: 0.25,
+        samples: 240,
+        ..wobbler()
+    };
+    let build = |toml: &&str| {
+        let mut built = scene(Geometry::Sweep(probe.clone()), BYTES, toml);
+        built.settings.picture.size = [84, 76];
+        built.settings.slices.pixels = 200;
+        Scene::new(built.geometry, built.input, built.settings).expect("scene")
+    };
+    SCENES.iter().map(build).collect()
+}
 
 fn frames_of(scene: &Scene) -> Vec<Texels> {
     let mut noise = Noise(5);
@@ -48,7 +84,7 @@ fn invocations(extent: [u32; 3]) -> u64 {
 fn bands_leave_the_bits_of_one_dispatch_in_every_pass() {
     let device = Device::new();
     let mut divided: BTreeMap<&str, bool> = BTreeMap::new();
-    for (name, scene) in scenes() {
+    for (name, scene) in SCENES.iter().zip(band_scenes()) {
         let (whole, dispatched) = made(&mut renderer(&device, &scene, &RendererOptions::default()));
         let bands = Bands::Fixed(INVOCATIONS);
         let (parts, in_bands) = made(&mut renderer(&device, &scene, &RendererOptions { bands, ..Default::default() }));

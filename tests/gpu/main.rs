@@ -25,6 +25,7 @@ mod known_answers;
 mod live;
 mod live_control;
 mod live_failures;
+mod lost_device;
 mod modes;
 mod motion;
 mod pair;

@@ -1,5 +1,6 @@
 //! The swapchain: the images of a surface.
 
+use super::present_wait::PresentWaiter;
 use super::target::Target;
 use crate::gpu::context::{Context, Presentation};
 use crate::gpu::error::{ErrorContext, GpuError};
@@ -7,6 +8,7 @@ use crate::gpu::faults::InjectionPoint;
 use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// When a picture is presented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +43,8 @@ pub struct Swapchain {
     pub format: vk::Format,
     pub size: [u32; 2],
     present_mode: PresentMode,
+    /// Measures when the pictures of `handle` are on the monitor, if the device can.
+    waiter: Option<PresentWaiter>,
 }
 
 /// An image of a swapchain.
@@ -62,8 +66,17 @@ impl Swapchain {
     pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
-        let mut made =
-            Swapchain { context: context.clone(), target, surface, handle, images, format, size: [0; 2], present_mode };
+        let mut made = Swapchain {
+            context: context.clone(),
+            target,
+            surface,
+            handle,
+            images,
+            format,
+            size: [0; 2],
+            present_mode,
+            waiter: None,
+        };
         made.format = made.choose_format()?;
         Ok(made)
     }
@@ -109,6 +122,8 @@ impl Swapchain {
     /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false
     /// if the surface is empty, as with a minimised window. Nothing may be in flight.
     pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
+        // It waits with the swapchain that is replaced.
+        self.waiter = None;
         let presentation = self.presentation()?;
         let device = self.context.candidate.handle;
         // SAFETY: surface and device belong to this instance; the calls only read.
@@ -161,6 +176,7 @@ impl Swapchain {
             unsafe { presentation.swapchains.create_swapchain(&create, None) }.context(|| "create a swapchain".into());
         self.drop_images();
         self.handle = made?;
+        self.waiter = PresentWaiter::new(&self.context, self.handle);
         // SAFETY: the swapchain is alive.
         let images = unsafe { self.presentation()?.swapchains.get_swapchain_images(self.handle) }
             .context(|| "list the images of the swapchain".into())?;
@@ -208,15 +224,32 @@ impl Swapchain {
     }
 
     /// Presents an image when it has been drawn. Returns true if the swapchain should be recreated.
-    pub fn present(&self, image: u32) -> Result<bool, vk::Result> {
+    pub fn present(&mut self, image: u32) -> Result<bool, vk::Result> {
         let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);
-        let present = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        let number = [self.waiter.as_mut().map_or(0, PresentWaiter::number)];
+        let mut numbered = vk::PresentIdKHR::default().present_ids(&number);
+        let mut present =
+            vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        if self.waiter.is_some() {
+            present = present.push_next(&mut numbered);
+        }
+        let at = Instant::now();
         // SAFETY: the image was acquired and a submission in flight signals `drawn`.
-        self.context.on_queue(|queue| unsafe { presentation.swapchains.queue_present(queue, &present) })
+        let outcome = self.context.on_queue(|queue| unsafe { presentation.swapchains.queue_present(queue, &present) });
+        if let (Ok(_), Some(waiter)) = (&outcome, &mut self.waiter) {
+            waiter.presented(number[0], at);
+        }
+        outcome
+    }
+
+    /// Times from presentation to the monitor that were measured since the last call.
+    pub fn take_latencies(&mut self) -> Vec<Duration> {
+        self.waiter.as_mut().map(PresentWaiter::take).unwrap_or_default()
     }
 
     fn drop_images(&mut self) {
+        self.waiter = None;
         // SAFETY: nothing is in flight.
         unsafe {
             for SwapchainImage { view, drawn, .. } in self.images.drain(..) {
