@@ -5,6 +5,7 @@ use crate::live::*;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::live::{self, Step};
 use echolume::probe::Geometry;
+use echolume::scene::Scene;
 use echolume::source::Frame;
 use echolume::source::live::Event;
 use echolume::source::recorder::Header;
