@@ -13,7 +13,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::CString;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -55,6 +55,8 @@ pub struct Context {
     /// Taken in `drop`, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
+    /// The window shows more than 8 bits a channel.
+    pub is_deep: AtomicBool,
     pub faults: Faults,
     pub counts: Counts,
 }
@@ -215,6 +217,7 @@ impl Context {
             device,
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
+            is_deep: AtomicBool::new(false),
             faults: Faults::default(),
             counts: Counts::default(),
         });

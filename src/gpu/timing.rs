@@ -47,6 +47,8 @@ struct Interval {
     /// The query that counted its invocations.
     counted: Option<u32>,
     work: Vec<Work>,
+    /// It goes on in the next submission.
+    is_part: bool,
 }
 
 /// The work between two time stamps, in ticks of the device.
@@ -56,6 +58,8 @@ pub struct Stamp {
     pub from: u64,
     pub to: u64,
     pub invocations: Option<u64>,
+    /// The work goes on in the next submission, so that this is no run of its own.
+    pub is_part: bool,
 }
 
 /// Time between two stamps, ns. The counter has `valid_bits` bits and wraps; `period` is ns per tick.
@@ -139,10 +143,15 @@ impl Stamps {
         self.since = self.stamp(commands);
         match (from, self.since) {
             (Some(from), Some(to)) => {
-                self.intervals.push(Interval { name, stamps: [from, to], counted: None, work });
+                self.intervals.push(Interval { name, stamps: [from, to], counted: None, work, is_part: false });
             }
             _ => self.left_out += 1,
         }
+    }
+
+    /// The last interval goes on in the next submission.
+    pub(super) fn continues(&mut self) {
+        self.intervals.iter_mut().last().into_iter().for_each(|last| last.is_part = true);
     }
 
     /// Records a dispatch with `record`, writes a stamp, and counts invocations if enabled.
@@ -202,7 +211,7 @@ impl Stamps {
             let [from, to] = interval.stamps.map(|at| ticks.get(at as usize).copied().unwrap_or(0));
             bands::measured(&interval.work, elapsed(from, to, valid_bits, period));
             let invocations = interval.counted.and_then(|q| counts.get(q as usize).copied());
-            Stamp { name: interval.name, from, to, invocations }
+            Stamp { name: interval.name, from, to, invocations, is_part: interval.is_part }
         };
         Ok(self.intervals.iter().map(stamp).collect())
     }
@@ -288,10 +297,13 @@ impl Timings {
             let ns = elapsed(stamp.from, stamp.to, valid_bits, period);
             match self.times.iter_mut().find(|t| t.name == stamp.name) {
                 Some(time) => {
-                    time.runs += 1;
+                    time.runs += u32::from(!stamp.is_part);
                     time.total += ns;
                 }
-                None => self.times.push(PassTime { name: stamp.name, runs: 1, total: ns }),
+                None => {
+                    let runs = u32::from(!stamp.is_part);
+                    self.times.push(PassTime { name: stamp.name, runs, total: ns });
+                }
             }
             if let Some(spans) = &mut self.spans {
                 let begin = spans.on_host_clock(stamp.from, valid_bits, period);
@@ -375,10 +387,13 @@ mod tests {
     #[test]
     fn runs_of_one_pass_are_added_up() {
         let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None };
-        let stamp = |name, from, to| Stamp { name, from, to, invocations: None };
+        let stamp = |name, from, to| Stamp { name, from, to, invocations: None, is_part: false };
         timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
         timings.add(&[stamp("a", 5, 8)], 64, 1.0);
         assert_eq!(timings.take_times()[0], PassTime { name: "a", runs: 2, total: 4.0 });
         assert!(timings.take_times().is_empty() && timings.take_spans().is_empty());
+        let part = Stamp { is_part: true, ..stamp("a", 0, 5) };
+        timings.add(&[part, stamp("a", 6, 8)], 64, 1.0);
+        assert_eq!(timings.take_times(), [PassTime { name: "a", runs: 1, total: 7.0 }], "one run in two submissions");
     }
 }

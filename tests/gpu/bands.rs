@@ -155,7 +155,11 @@ fn each_band_is_a_submission_and_all_are_ordered() {
         let submitted = renderer.log().expect("log").submissions.len();
         let steps: Vec<_> =
             renderer.plan().steps.iter().filter(|s| s.pass.frequency != Frequency::Frame).map(|s| s.pass.name).collect();
+        renderer.take_times().expect("idle");
         let dispatched = renderer.dispatch_extents(|r| r.picture()).expect("picture");
+        let times = renderer.take_times().expect("times");
+        let pictures: Vec<_> = times.iter().map(|t| (t.name, t.runs)).collect();
+        assert_eq!(pictures, [("picture", 1)], "one run, in whatever submissions");
         let log = renderer.log().expect("log");
         let cuts = dispatched.len() - steps.len();
         assert!(cuts > 20, "{cuts}");

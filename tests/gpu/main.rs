@@ -9,6 +9,7 @@ mod conditioning;
 #[cfg(feature = "view")]
 mod console;
 mod cube;
+mod deep_pictures;
 mod detector;
 mod detector_convergence;
 mod detector_false_positives;

@@ -64,9 +64,17 @@ impl Renderer {
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
         self.wait_drawn()?;
         let [width, height] = self.scene.picture_size();
+        // A deep picture is rounded here, where a window shows more.
+        let in_8_bits = |bytes: &[u8], format| match format {
+            Format::Rgba8 => bytes.to_vec(),
+            _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
+        };
         let rgba = match &self.readback {
-            Some(buffer) => buffer.bytes().to_vec(),
-            None => self.bring_back(Slot::Screen)?.map_or(Vec::new(), |(buffer, ..)| buffer.bytes().to_vec()),
+            Some(buffer) => in_8_bits(buffer.bytes(), Slot::Screen.format(&self.scene)),
+            None => {
+                let there = self.bring_back(Slot::Screen)?;
+                there.map_or(Vec::new(), |(buffer, _, format)| in_8_bits(buffer.bytes(), format))
+            }
         };
         Ok(Picture { width, height, rgba })
     }

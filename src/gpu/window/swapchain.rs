@@ -8,6 +8,7 @@ use crate::gpu::faults::InjectionPoint;
 use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// When a picture is presented.
@@ -55,8 +56,18 @@ pub struct SwapchainImage {
     pub drawn: vk::Semaphore,
 }
 
+/// Formats that pass values of 10 bits to the monitor unchanged: four times as many levels of grey.
+const DEEP: [vk::Format; 2] = [vk::Format::A2B10G10R10_UNORM_PACK32, vk::Format::A2R10G10B10_UNORM_PACK32];
 /// Formats that pass 8-bit values to the monitor unchanged.
 const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
+
+/// The deepest format that the surface offers and for which `can_draw` says that pictures can be copied and panels drawn.
+fn choose(offered: &[vk::SurfaceFormatKHR], can_draw: impl Fn(vk::Format) -> bool) -> Option<vk::Format> {
+    let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
+    let is_offered = |format: &vk::Format| offered.iter().any(|o| o.format == *format && is_plain(o));
+    let deep = DEEP.into_iter().filter(|format| can_draw(*format));
+    deep.chain(FORMATS).find(is_offered)
+}
 
 impl Swapchain {
     /// A surface without images; [`Swapchain::fit`] creates them.
@@ -104,9 +115,12 @@ impl Swapchain {
                 .get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
         }
         .context(|| "list the formats of the surface".into())?;
-        let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
-        let found = FORMATS.into_iter().find(|f| there.iter().any(|t| t.format == *f && is_plain(t)));
-        found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))
+        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
+        let found = choose(&there, |format| self.context.format_features(format).contains(needed));
+        let found = found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))?;
+        // Pictures are made with as many bits from the next change of the scene on.
+        self.context.is_deep.store(DEEP.contains(&found), Ordering::Relaxed);
+        Ok(found)
     }
 
     /// Replaces a lost surface by a new one on the same target.
@@ -277,5 +291,25 @@ impl Drop for Swapchain {
     fn drop(&mut self) {
         self.context.wait_idle();
         self.destroy();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_format_of_10_bits_is_preferred_where_it_can_be_drawn_on() {
+        let plain = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
+        let [deep, other] = DEEP;
+        let [usual, swapped] = FORMATS;
+        let all = [plain(swapped), plain(usual), plain(other), plain(deep)];
+        assert_eq!(choose(&all, |_| true), Some(deep));
+        assert_eq!(choose(&all, |format| format != deep), Some(other));
+        assert_eq!(choose(&all, |_| false), Some(usual));
+        assert_eq!(choose(&all[..1], |_| true), Some(swapped));
+        let wide = vk::SurfaceFormatKHR { format: deep, color_space: vk::ColorSpaceKHR::HDR10_ST2084_EXT };
+        assert_eq!(choose(&[wide, plain(usual)], |_| true), Some(usual), "a monitor would show other levels");
+        assert_eq!(choose(&[plain(vk::Format::B8G8R8A8_SRGB)], |_| true), None);
     }
 }
