@@ -183,7 +183,8 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
     }
     let reads_monotonic = calibrated_timestamps && reads_monotonic(entry, instance, handle);
     if calibrated_timestamps && !reads_monotonic {
-        missing_optional.push("CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other");
+        missing_optional
+            .push("CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other");
     }
     let push_descriptors = has(ash::khr::push_descriptor::NAME);
     if !push_descriptors {

@@ -347,11 +347,7 @@ impl Recorder {
                 (band.groups[i] * local[i]).min(extent[i].saturating_sub(from))
             });
             let share = invocations(size) as f64 / invocations(extent).max(1) as f64;
-            let work = Work {
-                time: pipeline.time.clone(),
-                expected: share * expected,
-                invocations: invocations(size),
-            };
+            let work = Work { time: pipeline.time.clone(), expected: share * expected, invocations: invocations(size) };
             self.barrier(barriers, &accesses);
             self.context.begin_label(self.commands, pass.name);
             self.context.loss.mark(self.commands, pass.name);

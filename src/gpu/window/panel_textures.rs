@@ -67,10 +67,8 @@ impl PanelTextures {
             in_flight: Vec::new(),
             freed: Vec::new(),
         };
-        let sizes = [vk::DescriptorPoolSize {
-            ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-            descriptor_count: MAX_TEXTURES,
-        }];
+        let sizes =
+            [vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: MAX_TEXTURES }];
         let pool = vk::DescriptorPoolCreateInfo::default()
             .pool_sizes(&sizes)
             .max_sets(MAX_TEXTURES)
@@ -171,8 +169,8 @@ impl PanelTextures {
             .subresource_range(WHOLE);
         // SAFETY: the image is bound to memory and alive.
         texture.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
-        texture.set = create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler)
-            .map_err(failed)?;
+        texture.set =
+            create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler).map_err(failed)?;
         texture.drawn_as = renderer.add_user_texture(texture.set);
         self.context.name(image, "panel texture");
         Ok(texture)
