@@ -1,7 +1,6 @@
 //! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
-use super::screen::failed;
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::resources::{self, Buffer, Purpose, WHOLE};
@@ -52,6 +51,16 @@ struct Upload {
     staging: Buffer,
     at: [u32; 2],
     size: [u32; 2],
+}
+
+/// An error of the library that draws the panels.
+pub(super) fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
+    match error {
+        egui_ash_renderer::RendererError::Vulkan(result) => {
+            GpuError::Vulkan { operation: "draw the panels".into(), result }
+        }
+        other => GpuError::Window(format!("the panels cannot be drawn: {other}")),
+    }
 }
 
 impl PanelTextures {
