@@ -74,6 +74,8 @@ impl Poison {
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
+    /// Submissions left until the device hangs.
+    hang: Mutex<Option<u32>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
     change: OnceLock<Change>,
@@ -99,6 +101,24 @@ impl Faults {
                 Ok(())
             }
             _ => Ok(()),
+        }
+    }
+
+    /// The `after`-th submission from now (0: the next) and all later ones never reach the device, as if it hung.
+    pub fn hang(&self, after: u32) {
+        *self.hang.lock().unwrap_or_else(|e| e.into_inner()) = Some(after);
+    }
+
+    /// True if the device hangs at this submission.
+    pub(super) fn keeps_submission(&self) -> bool {
+        let mut hang = self.hang.lock().unwrap_or_else(|e| e.into_inner());
+        match hang.as_mut() {
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+            None => false,
         }
     }
 

@@ -3,7 +3,8 @@
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
 //! - `resources` are images and buffers, also those of a scene's slots, `formats` what the device can do with them.
 //! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
-//! - `recorder` records one command buffer with its barriers and the time stamps of `timing`; `timeline` says when a submission is done.
+//! - `recorder` records one command buffer with its barriers and the time stamps of `timing`; `timeline` says when a submission is done,
+//!   and `watchdog` gives up a device that does not finish.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
@@ -21,6 +22,7 @@ pub mod shader_reload;
 mod timeline;
 mod timing;
 mod validation;
+mod watchdog;
 pub mod window;
 
 pub use context::{Context, ContextOptions};
@@ -29,3 +31,4 @@ pub use error::GpuError;
 pub use formats::TexelAccess;
 pub use pipelines::{Shaders, Wake};
 pub use renderer::{Renderer, RendererOptions};
+pub use watchdog::Deadline;

@@ -153,6 +153,9 @@ impl Pipelines {
 impl Drop for Pipelines {
     fn drop(&mut self) {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).clear();
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
         unsafe { self.context.device.destroy_sampler(self.sampler, None) };
     }
@@ -236,6 +239,9 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: whoever drops the last reference has waited for the device; null handles are allowed.
         unsafe {
             self.context.device.destroy_pipeline(self.handle, None);
@@ -429,6 +435,9 @@ impl DescriptorSets {
 
 impl Drop for DescriptorSets {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         for pool in &self.pools {
             // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
             unsafe { self.context.device.destroy_descriptor_pool(*pool, None) };

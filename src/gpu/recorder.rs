@@ -225,8 +225,7 @@ impl Recorder {
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(&signal);
         self.context.submit(self.queue, &submit, vk::Fence::null(), || format!("submit '{}'", self.label))?;
-        timeline.submitted += 1;
-        timeline.label = self.label.to_string();
+        timeline.advance(self.label);
         self.done_at = timeline.submitted;
         barriers.submitted(self.queue, &waits, self.done_at);
         Ok(())
@@ -517,6 +516,9 @@ fn region(image: &Image, part: u32, parts: u32, layout: BufferLayout) -> vk::Buf
 
 impl Drop for Recorder {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
         unsafe { self.context.device.destroy_command_pool(self.pool, None) };
     }

@@ -51,6 +51,11 @@ impl Renderer {
         Ok(self.drawing && !self.picture.is_done(&self.timelines)?)
     }
 
+    /// How long the device has been at work without finishing anything; zero if it is idle.
+    pub fn busy_for(&self) -> Duration {
+        self.timelines.busy_for()
+    }
+
     /// True if there is a picture of the current size, done or in flight.
     pub fn has_drawn(&self) -> bool {
         self.drawn

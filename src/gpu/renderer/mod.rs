@@ -22,6 +22,7 @@ use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
 use std::collections::HashSet;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// How a [`Renderer`] runs.
 #[derive(Clone)]
