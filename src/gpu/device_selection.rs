@@ -48,8 +48,10 @@ pub struct Candidate {
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
     pub limits: vk::PhysicalDeviceLimits,
-    /// The smaller of the largest allocation and the largest buffer, bytes.
-    pub max_bytes: u64,
+    /// The largest allocation, bytes: the limit of an image.
+    pub max_allocation: u64,
+    /// The largest buffer, bytes. Several drivers allow 2 GiB only, and far larger images.
+    pub max_buffer: u64,
 }
 
 /// A queue of a device.
@@ -201,7 +203,8 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         can_present,
         limits: properties.limits,
         // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
-        max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
+        max_allocation: v11.max_memory_allocation_size,
+        max_buffer: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
 }
 
@@ -290,7 +293,8 @@ mod tests {
             pipeline_statistics: true,
             can_present: true,
             limits: vk::PhysicalDeviceLimits::default(),
-            max_bytes: u64::MAX,
+            max_allocation: u64::MAX,
+            max_buffer: u64::MAX,
         }
     }
 

@@ -6,6 +6,7 @@ use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use ash::vk;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
@@ -204,8 +205,18 @@ impl Faults {
         values
     }
 
-    pub(super) fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
+    fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
         self.apply(|change| change.frame(scene, bytes));
+    }
+
+    /// The bytes of a frame that is uploaded.
+    pub(super) fn changed_frame<'a>(&self, scene: &Scene, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+        if !matches!(self.change.get(), Some(Change::Frame(_))) {
+            return Cow::Borrowed(bytes);
+        }
+        let mut changed = bytes.to_vec();
+        self.frame(scene, &mut changed);
+        Cow::Owned(changed)
     }
 
     /// The input bytes of a slot for a single pass.

@@ -1,13 +1,15 @@
 //! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
-//! - `resources` are images and buffers, also those of a scene's slots, `formats` what the device can do with them.
+//! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `formats` what the device can do with
+//!   them.
 //! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
 //! - `recorder` records one command buffer with its barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
+mod buffers;
 pub mod context;
 pub(crate) mod device_selection;
 pub(crate) mod error;

@@ -1,10 +1,10 @@
 //! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants; a thread that
 //! compiles them in the background, so that drawing goes on meanwhile; and their descriptor sets.
 
+use super::buffers::has_texels;
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
-use super::resources::has_texels;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;

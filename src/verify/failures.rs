@@ -306,7 +306,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     // Every edge is within the limits, but the volume exceeds the maximum allocation.
     let floats = format!("{small}\nslices = {{ format = 'r32f' }}");
-    let bytes = context.candidate.max_bytes;
+    let bytes = context.candidate.max_allocation;
     if 4 * (three as u64).pow(3) > bytes {
         let scene = cartesian_scene([three; 3], &floats)?;
         refused(&mut findings, context, "a volume larger than an allocation", scene, ["image", &bytes.to_string()]);
@@ -319,7 +319,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     // A context with lower limits.
     let lesser = IsolatedContext::lacking(dut, |context| {
         context.limits.max_image_dimension2_d = 64;
-        context.candidate.max_bytes = 1 << 20;
+        context.candidate.max_allocation = 1 << 20;
     })?;
     let wide = cartesian_scene([4; 3], "mode = 'vr'\npicture = { size = [65, 8] }")?;
     refused(&mut findings, &lesser.context, "a picture wider than a device's images", wide, ["image", "64"]);

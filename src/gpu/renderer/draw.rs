@@ -70,8 +70,11 @@ impl Renderer {
         self.wait_drawn()?;
         let [width, height] = self.scene.picture_size();
         let rgba = match &self.readback {
-            Some(buffer) => buffer.bytes().to_vec(),
-            None => self.bring_back(Slot::Screen)?.map_or(Vec::new(), |(buffer, ..)| buffer.bytes().to_vec()),
+            Some(readback) => readback.bytes()?.into_owned(),
+            None => match self.bring_back(Slot::Screen)? {
+                Some((readback, ..)) => readback.bytes()?.into_owned(),
+                None => Vec::new(),
+            },
         };
         Ok(Picture { width, height, rgba })
     }
