@@ -55,6 +55,19 @@ pub(super) fn reserve(
         return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
     };
     let Reserve { name, requirements, location, linear } = wanted;
+    if let Some(budget) = context.memory_budget() {
+        let required = match location {
+            MemoryLocation::GpuOnly => vk::MemoryPropertyFlags::DEVICE_LOCAL,
+            _ => vk::MemoryPropertyFlags::HOST_VISIBLE,
+        };
+        let check =
+            |reserve| budget.check(operation, requirements.size, requirements.memory_type_bits, required, reserve);
+        // What is allocated and free is only added up where it decides.
+        if check(0).is_err() {
+            let report = allocator.generate_report();
+            check(report.total_capacity_bytes.saturating_sub(report.total_allocated_bytes))?;
+        }
+    }
     allocator
         .allocate(&AllocationCreateDesc {
             name,

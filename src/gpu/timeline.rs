@@ -74,13 +74,14 @@ impl Timeline {
         let operation = || self.operation();
         match self.context.faults.check(InjectionPoint::Wait) {
             Err(vk::Result::TIMEOUT) => return Err(self.context.watchdog.inject_lateness(operation)),
-            other => other.context(operation)?,
+            other => other.context(operation).map_err(|error| self.context.explain(error))?,
         }
         let (semaphores, values) = ([self.semaphore], [value]);
         let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive; the arrays outlive the call.
         let attempt = |ns| unsafe { self.context.device.wait_semaphores(&wait, ns) };
-        self.context.watchdog.wait(&operation, || self.busy_since(), attempt)?;
+        let done = self.context.watchdog.wait(&operation, || self.busy_since(), attempt);
+        done.map_err(|error| self.context.explain(error))?;
         self.progress(|progress| progress.reached(value, Instant::now()));
         Ok(())
     }
@@ -95,7 +96,8 @@ impl Timeline {
     /// A device that fails, or is given up because it does not finish.
     pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
         self.context.watchdog.check(|| self.operation())?;
-        if self.reached().context(|| self.operation())? >= value {
+        let reached = self.reached().context(|| self.operation()).map_err(|error| self.context.explain(error))?;
+        if reached >= value {
             return Ok(true);
         }
         self.context.watchdog.check_deadline(self.busy_since(), || self.operation())?;

@@ -23,6 +23,7 @@ mod support_bundle;
 mod verify;
 #[cfg(feature = "view")]
 mod view;
+mod watchdog;
 
 use common::program::*;
 use std::collections::BTreeSet;
