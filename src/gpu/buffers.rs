@@ -3,7 +3,7 @@
 
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
-use super::resources::{Image, Reserve, free, reserve};
+use super::memory::{Reserve, free, reserve};
 use crate::passes::slots::Shape;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -207,18 +207,19 @@ pub struct Upload {
 }
 
 impl Upload {
-    /// `bytes`: the texels of the parts, slice by slice; what is missing at their end stays undefined.
+    /// For an image of this shape and these bytes per texel. `bytes`: the texels of the parts, slice by slice; what is missing at their
+    /// end stays undefined.
     ///
     /// # Errors
     /// Out of memory; a device that fails.
     pub fn new(
         context: &Arc<Context>,
         name: &str,
-        image: &Image,
+        (shape, texel_bytes): (Shape, usize),
         parts: Range<u32>,
         bytes: &[u8],
     ) -> Result<Upload, GpuError> {
-        let cut = pieces(image.shape, image.format.texel_bytes(), parts, context.candidate.max_buffer);
+        let cut = pieces(shape, texel_bytes, parts, context.candidate.max_buffer);
         let filled = |piece: Piece| {
             let Range { start, end } = piece.bytes;
             let mut buffer = Buffer::new(context, name, end - start, Purpose::Staging)?;

@@ -416,7 +416,7 @@ impl Context {
     ///
     /// # Errors
     /// A device that fails or is given up.
-    pub(super) fn wait_queue(&self, queue: usize) -> Result<(), GpuError> {
+    fn wait_queue(&self, queue: usize) -> Result<(), GpuError> {
         let (begun, operation) = (Instant::now(), || "wait for an idle queue".to_string());
         // vkQueueWaitIdle has no time-out; a fence behind everything that was submitted has one.
         // SAFETY: the create structure is complete.

@@ -1,8 +1,8 @@
 //! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
-//! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `formats` what the device can do with
-//!   them.
+//! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
+//!   the device can do with them.
 //! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
@@ -19,6 +19,7 @@ pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
 pub mod lost_device;
+mod memory;
 pub mod pass_runner;
 mod pipelines;
 mod recorder;

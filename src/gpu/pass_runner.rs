@@ -94,7 +94,7 @@ impl PassRunner {
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            let upload = Upload::new(&self.context, "input", image, parts.clone(), &bytes)?;
+            let upload = Upload::new(&self.context, "input", image.layout(), parts.clone(), &bytes)?;
             recorder.upload(&mut barriers, &upload, image, SlotParts { slot: bind.slot, copy, parts });
             keep.push(upload);
         }
@@ -213,7 +213,7 @@ impl PassTimer {
             };
             let Some(image) = self.slots.image(slot, copy) else { continue };
             let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-            let upload = Upload::new(&self.context, "contents", image, place.parts.clone(), &bytes)?;
+            let upload = Upload::new(&self.context, "contents", image.layout(), place.parts.clone(), &bytes)?;
             self.recorder.upload(&mut self.barriers, &upload, image, place);
             keep.push(upload);
         }

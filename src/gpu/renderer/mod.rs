@@ -277,7 +277,7 @@ impl Renderer {
     fn upload(&mut self, slot: Slot, copy: u32, bytes: &[u8]) -> Result<(), GpuError> {
         let Some(image) = self.slots.image(slot, copy) else { return Ok(()) };
         let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-        let upload = Upload::new(&self.context, "upload", image, place.parts.clone(), bytes)?;
+        let upload = Upload::new(&self.context, "upload", image.layout(), place.parts.clone(), bytes)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
         self.picture.upload(&mut self.barriers, &upload, image, place);
         self.uploads.push(upload);

@@ -5,7 +5,8 @@ use super::screen::failed;
 use crate::gpu::buffers::{Buffer, Purpose};
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::resources::{self, Reserve, WHOLE};
+use crate::gpu::memory::{self, Reserve};
+use crate::gpu::resources::WHOLE;
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
@@ -159,7 +160,7 @@ impl PanelTextures {
         let needs = unsafe { device.get_image_memory_requirements(image) };
         let (name, location) = ("panel texture", MemoryLocation::GpuOnly);
         let wanted = Reserve { name, requirements: needs, location, linear: false };
-        let allocation = resources::reserve(&self.context, wanted, &operation)?;
+        let allocation = memory::reserve(&self.context, wanted, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the image.
         let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
         texture.allocation = Some(allocation);
@@ -270,6 +271,6 @@ impl Drop for Texture {
             self.context.device.destroy_image_view(self.view, None);
             self.context.device.destroy_image(self.image, None);
         }
-        resources::free(&self.context, self.allocation.take());
+        memory::free(&self.context, self.allocation.take());
     }
 }
