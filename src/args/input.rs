@@ -1,8 +1,9 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
+use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
-use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, TexelAccess, device_selection};
+use crate::gpu::{Context, ContextOptions, Deadline, DeviceChoice, GpuError, TexelAccess, device_selection};
 use crate::scene::load::Layers;
 use crate::scene::{Input, Scene};
 use crate::source::phantom::{self, Phantom, PhantomSource};
@@ -148,6 +149,10 @@ pub struct SceneArgs {
     /// Vulkan device, by number or part of its name (see `echolume devices`)
     #[arg(long, value_name = "N|NAME")]
     pub device: Option<DeviceChoice>,
+    /// Give a device up that does not finish within this time, such as 5s or 500ms; none: wait for ever [default: 5s on a GPU, none on
+    /// a software device]
+    #[arg(long, value_name = "TIME")]
+    device_timeout: Option<String>,
 }
 
 impl SceneArgs {
@@ -219,16 +224,32 @@ impl SceneArgs {
         Ok(set)
     }
 
-    /// Opens the chosen device and prints its name.
+    /// When a device that does not finish is given up.
+    pub fn deadline(&self) -> Result<Deadline, Failure> {
+        match self.device_timeout.as_deref() {
+            None => Ok(Deadline::ByDevice),
+            Some("none") => Ok(Deadline::Never),
+            Some(text) => match humantime::parse_duration(text) {
+                Ok(time) if !time.is_zero() => Ok(Deadline::After(time)),
+                _ => Err(input(format!("--device-timeout {text}: must be a time such as 5s or 500ms, or none"))),
+            },
+        }
+    }
+
+    /// Opens the chosen device and prints its name. A signal that is held ends its waits.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
-        open_device(self.device.clone(), validation)
+        let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
+        open(&ContextOptions { device, validation, deadline, stop: Some(|| signals::received().is_some()) })
     }
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
 pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
-    let device = choice.unwrap_or(DeviceChoice::Best);
-    let context = Context::new(&ContextOptions { device, validation }).map_err(|e| match e {
+    open(&ContextOptions { device: choice.unwrap_or_default(), validation, ..ContextOptions::default() })
+}
+
+fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
+    let context = Context::new(options).map_err(|e| match e {
         GpuError::NoSuchDevice { .. } => input(e),
         e => failed(e),
     })?;

@@ -54,7 +54,11 @@ impl Devices {
                 for queue in &device.queues {
                     say!("    {queue:?}");
                 }
-                say!("    largest allocation and buffer: {} MiB", device.max_bytes >> 20);
+                say!(
+                    "    largest allocation: {} MiB, buffer: {} MiB",
+                    device.max_allocation >> 20,
+                    device.max_buffer >> 20
+                );
                 format!("{:#?}", device.limits).lines().for_each(|line| say!("    {line}"));
             }
         }

@@ -98,7 +98,8 @@ impl Render {
         let Drawn { mut renderer, picture, kept } = loop {
             match self.draw(&context, &mut *source, scene.clone(), &options) {
                 Ok(drawn) => break drawn,
-                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
+                // What hung once would hang again: a device that was given up is not tried a second time.
+                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && !lost.is_given_up() && losses < MAX_LOSSES => {
                     tracing::warn!("{lost}; the device is reopened, and its work is divided into smaller parts");
                     losses += 1;
                     options.bands = Bands::Measured { losses };

@@ -3,7 +3,7 @@
 use super::one_colour;
 use crate::args::{SceneArgs, SourceArgs, StreamArgs};
 use crate::files::signals::Held;
-use crate::gpu::Context;
+use crate::gpu::{Context, GpuError};
 use crate::live::{Feed, FinishedPicture, Statistics, Step, Stream as Live, StreamError, StreamOptions, Update};
 use crate::passes::Slot;
 use crate::picture;
@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// A status line says that the device is stalled if it has finished nothing for so long.
+const STALL: Duration = Duration::from_secs(2);
 /// A device that is lost so often in a row is given up.
 const MAX_LOSSES: u32 = 6;
 /// Interval of the statistics lines.
@@ -94,10 +96,17 @@ impl Stream {
         let mut explained = false;
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
+                // The device is busy, and a signal is not to wait for it.
+                Err(StreamError::Gpu(GpuError::Stopped { .. })) => break None,
                 // Each time the work is divided into smaller parts. A device that is lost all the same, without a picture in between, is
                 // given up.
                 Err(StreamError::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
-                    tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume");
+                    match lost.is_given_up() {
+                        true => say!("{:>6.1} s  stalled: {lost}; opening it again", began.elapsed().as_secs_f64()),
+                        false => {
+                            tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume")
+                        }
+                    }
                     losses += 1;
                     *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
@@ -123,6 +132,10 @@ impl Stream {
                 last_status = Instant::now();
                 let since = stream.take_statistics().map_err(fault)?;
                 say!("{:>6.1} s  {}", began.elapsed().as_secs_f64(), since.line(stream.acquisition_time()));
+                if let Some(busy) = stream.device_busy_for().filter(|busy| *busy >= STALL) {
+                    let (at, busy) = (began.elapsed().as_secs_f64(), busy.as_secs_f64());
+                    say!("{at:>6.1} s  stalled: the device has finished nothing for {busy:.1} s");
+                }
                 all.add(&since);
                 // After a few seconds all buffers are allocated.
                 if memory.is_none() && began.elapsed() > 5 * INTERVAL {
@@ -144,7 +157,11 @@ impl Stream {
                 break None;
             }
         };
-        all.add(&stream.take_final_statistics().map_err(fault)?);
+        all.add(&match stream.take_final_statistics() {
+            // Without the times of the work that is not done.
+            Err(StreamError::Gpu(GpuError::Stopped { .. })) => stream.take_statistics().map_err(fault)?,
+            taken => taken.map_err(fault)?,
+        });
         say!("in all    {}", all.line(stream.acquisition_time()));
         let counts = all.volumes;
         say!(

@@ -107,6 +107,7 @@ impl View {
             }));
         }
         let (kiosk, device) = (self.kiosk, self.scene.device.clone());
+        let deadline = self.scene.deadline()?;
         let mut place = match self.config() {
             None => self.place()?,
             Some(Ok(config)) => WindowConfig::configured(&config)?,
@@ -120,7 +121,7 @@ impl View {
         place.shape.full_screen |= self.full_screen;
         place.shape.stays_open = kiosk;
         place.shape.time = self.time.map(Into::into);
-        place.device.validation = self.validate;
+        (place.device.validation, place.device.deadline) = (self.validate, deadline);
         if let Some(device) = device {
             place.device.device = device;
         }

@@ -7,6 +7,7 @@ use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
 use super::lost_device::LossReporting;
 use super::validation::{self, Layer, Messenger};
+use super::watchdog::{Deadline, Watchdog};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
 use ash::vk;
@@ -24,6 +25,11 @@ pub struct ContextOptions {
     pub device: DeviceChoice,
     /// Enables core and synchronization validation; every message is kept in [`Context::messages`].
     pub validation: bool,
+    /// When a device that does not finish is given up.
+    pub deadline: Deadline,
+    /// Asked during every wait for the device. Once it returns true, the wait ends after less than a second, and the device is given up
+    /// if it is still busy.
+    pub stop: Option<fn() -> bool>,
 }
 
 /// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
@@ -55,6 +61,7 @@ pub struct Context {
     /// Taken in `drop`, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
+    pub(super) watchdog: Watchdog,
     /// The window shows more than 8 bits a channel.
     pub is_deep: AtomicBool,
     pub faults: Faults,
@@ -185,6 +192,7 @@ impl Context {
                 return Err(error);
             }
         };
+        let watchdog = Watchdog::new(options.deadline.on_device(candidate.is_software()), options.stop);
         let context = Arc::new(Context {
             push_descriptor: (candidate.push_descriptors)
                 .then(|| ash::khr::push_descriptor::Device::new(instance, &device)),
@@ -217,6 +225,7 @@ impl Context {
             device,
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
+            watchdog,
             is_deep: AtomicBool::new(false),
             faults: Faults::default(),
             counts: Counts::default(),
@@ -344,19 +353,38 @@ impl Context {
         queue: usize,
         submit: &vk::SubmitInfo2,
         done: vk::Fence,
-        operation: impl FnOnce() -> String,
+        operation: impl Fn() -> String,
     ) -> Result<(), GpuError> {
-        self.faults
-            .check(InjectionPoint::Submit)
-            .and_then(|()| {
-                let queue = &self.queues[queue.min(self.queues.len() - 1)];
-                let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
-                // SAFETY: the lock keeps the queue to one thread; the command buffer in `submit` is recorded and what it names is
-                // alive until the timeline says it is done.
-                unsafe { self.device.queue_submit2(*queue, &[*submit], done) }
-            })
-            .context(operation)
-            .map_err(|error| self.explain(error))
+        self.watchdog.check(&operation)?;
+        let sent = self.faults.check(InjectionPoint::Submit).and_then(|()| self.send(queue, &[*submit], done));
+        sent.context(operation).map_err(|error| self.explain(error))
+    }
+
+    fn send(&self, queue: usize, submits: &[vk::SubmitInfo2], done: vk::Fence) -> Result<(), vk::Result> {
+        if self.faults.keeps_submission() {
+            return Ok(());
+        }
+        let queue = &self.queues[queue.min(self.queues.len() - 1)];
+        let queue = queue.lock().unwrap_or_else(|e| e.into_inner());
+        // SAFETY: the lock keeps the queue to one thread; the command buffers submitted are recorded and what they name is alive until
+        // the timeline says it is done.
+        unsafe { self.device.queue_submit2(*queue, submits, done) }
+    }
+
+    /// Waits for a fence of a submission that was made at `since`.
+    ///
+    /// # Errors
+    /// A device that fails or is given up.
+    pub(super) fn wait_fence(&self, fence: vk::Fence, since: Instant, operation: &str) -> Result<(), GpuError> {
+        // SAFETY: the fence is alive; it is signalled, or a submission in flight will signal it.
+        let attempt = |ns| unsafe { self.device.wait_for_fences(&[fence], true, ns) };
+        self.watchdog.wait(&|| operation.into(), || since, attempt)
+    }
+
+    /// True once the device did not finish in time, or was busy when the program had to end. What was made from the context is then
+    /// leaked, not destroyed, and so is the context: the device may still use all of it.
+    pub fn is_given_up(&self) -> bool {
+        self.watchdog.has_given_up()
     }
 
     /// An error with the report of the driver, if the device is lost and its driver reports anything.
@@ -384,11 +412,39 @@ impl Context {
         work(*self.queues[0].lock().unwrap_or_else(|e| e.into_inner()))
     }
 
-    pub(super) fn wait_idle(&self) {
+    /// Waits until a queue has done what was submitted to it so far.
+    ///
+    /// # Errors
+    /// A device that fails or is given up.
+    fn wait_queue(&self, queue: usize) -> Result<(), GpuError> {
+        let (begun, operation) = (Instant::now(), || "wait for an idle queue".to_string());
+        // vkQueueWaitIdle has no time-out; a fence behind everything that was submitted has one.
+        // SAFETY: the create structure is complete.
+        let fence = unsafe { self.device.create_fence(&vk::FenceCreateInfo::default(), None) }.context(operation)?;
+        let done = match self.send(queue, &[], fence) {
+            Ok(()) => self.wait_fence(fence, begun, "wait for an idle queue"),
+            failed => failed.context(operation),
+        };
+        if !self.is_given_up() {
+            // SAFETY: it was not submitted, or the device is done with it or lost.
+            unsafe { self.device.destroy_fence(fence, None) };
+        }
+        done
+    }
+
+    /// Waits until the device is idle.
+    ///
+    /// # Errors
+    /// A device that fails, and is then idle, or one that is given up.
+    pub(super) fn wait_idle(&self) -> Result<(), GpuError> {
         self.counts.waits_idle.fetch_add(1, Ordering::Relaxed);
+        let operation = || "wait for an idle device".to_string();
+        self.watchdog.check(operation)?;
+        (0..self.queues.len()).try_for_each(|queue| self.wait_queue(queue))?;
         let _queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+        // What presents pictures signals no fence. The queues are empty, so that this does not block.
         // SAFETY: the locks keep every queue of the device to this thread.
-        let _ = unsafe { self.device.device_wait_idle() };
+        unsafe { self.device.device_wait_idle() }.context(operation)
     }
 
     /// The limits of an image of this format, type and usage.
@@ -411,9 +467,16 @@ impl Context {
 
 impl Drop for Context {
     fn drop(&mut self) {
+        // A device that fails is idle.
+        let _ = self.wait_idle();
+        if self.is_given_up() {
+            // The device may still be at work: its memory is not freed, and the driver stays loaded.
+            std::mem::forget((self.entry.clone(), self.messenger.take()));
+            std::mem::forget(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
+            return;
+        }
         // SAFETY: everything made from this context held an `Arc` of it and is gone. The order is the one of creation reversed.
         unsafe {
-            let _ = self.device.device_wait_idle();
             drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
             self.device.destroy_device(None);
             drop(self.messenger.take());

@@ -59,8 +59,10 @@ pub struct Candidate {
     /// The budget of its memory when it was listed, if it reports one.
     pub budget: Option<MemoryBudget>,
     pub limits: vk::PhysicalDeviceLimits,
-    /// The smaller of the largest allocation and the largest buffer, bytes.
-    pub max_bytes: u64,
+    /// The largest allocation, bytes: the limit of an image.
+    pub max_allocation: u64,
+    /// The largest buffer, bytes. Several drivers allow 2 GiB only, and far larger images.
+    pub max_buffer: u64,
 }
 
 /// A queue of a device.
@@ -249,7 +251,8 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
         budget,
         limits: properties.limits,
         // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
-        max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
+        max_allocation: v11.max_memory_allocation_size,
+        max_buffer: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
 }
 
@@ -351,7 +354,8 @@ mod tests {
             checkpoints: true,
             budget: None,
             limits: vk::PhysicalDeviceLimits::default(),
-            max_bytes: u64::MAX,
+            max_allocation: u64::MAX,
+            max_buffer: u64::MAX,
         }
     }
 

@@ -52,13 +52,21 @@ pub enum GpuError {
     #[error("no window: {0}")]
     Window(String),
     #[error("the device did not finish within {seconds} s; last submitted: {operation}")]
-    TimedOut { seconds: u64, operation: String },
+    TimedOut { seconds: f64, operation: String },
+    #[error("a signal ended the wait for the device; last submitted: {operation}")]
+    Stopped { operation: String },
 }
 
 impl GpuError {
-    /// True if the device was lost: everything has to be recreated from a new context.
+    /// True if the device was lost, or was given up because it did not finish: everything has to be recreated from a new context.
     pub fn is_device_lost(&self) -> bool {
         matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. } | GpuError::Lost { .. })
+            || self.is_given_up()
+    }
+
+    /// True if the device did not finish and was given up.
+    pub fn is_given_up(&self) -> bool {
+        matches!(self, GpuError::TimedOut { .. } | GpuError::Stopped { .. })
     }
 }
 

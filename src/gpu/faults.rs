@@ -8,6 +8,7 @@ use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Params, Pass, Slot};
 use crate::scene::Scene;
 use ash::vk;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock};
 
@@ -76,6 +77,8 @@ impl Poison {
 #[derive(Default)]
 pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
+    /// Submissions left until the device hangs.
+    hang: Mutex<Option<u32>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
     loss: Mutex<Option<LossReport>>,
@@ -103,6 +106,24 @@ impl Faults {
                 Ok(())
             }
             _ => Ok(()),
+        }
+    }
+
+    /// The `after`-th submission from now (0: the next) and all later ones never reach the device, as if it hung.
+    pub fn hang(&self, after: u32) {
+        *self.hang.lock().unwrap_or_else(|e| e.into_inner()) = Some(after);
+    }
+
+    /// True if the device hangs at this submission.
+    pub(super) fn keeps_submission(&self) -> bool {
+        let mut hang = self.hang.lock().unwrap_or_else(|e| e.into_inner());
+        match hang.as_mut() {
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+            None => false,
         }
     }
 
@@ -208,8 +229,18 @@ impl Faults {
         values
     }
 
-    pub(super) fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
+    fn frame(&self, scene: &Scene, bytes: &mut [u8]) {
         self.apply(|change| change.frame(scene, bytes));
+    }
+
+    /// The bytes of a frame that is uploaded.
+    pub(super) fn changed_frame<'a>(&self, scene: &Scene, bytes: &'a [u8]) -> Cow<'a, [u8]> {
+        if !matches!(self.change.get(), Some(Change::Frame(_))) {
+            return Cow::Borrowed(bytes);
+        }
+        let mut changed = bytes.to_vec();
+        self.frame(scene, &mut changed);
+        Cow::Owned(changed)
     }
 
     /// The input bytes of a slot for a single pass.

@@ -103,8 +103,9 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -
         && wide.contains(vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::BLIT_SRC);
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
-    let fits = fits
-        .is_ok_and(|l| Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
+    let fits = fits.is_ok_and(|l| {
+        Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_allocation)
+    });
     if fits { scene } else { scene.without_quads() }
 }
 
@@ -121,8 +122,13 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
             false => Err(GpuError::Limit { what: what(), needed: needed.into(), allowed: allowed.into() }),
         };
         let bytes = slot.bytes(scene);
-        if bytes > context.candidate.max_bytes {
-            return Err(GpuError::Limit { what: what(), needed: bytes, allowed: context.candidate.max_bytes });
+        // An image is never a buffer: what is uploaded and read back is cut into pieces.
+        let allowed = match slot.shape(scene) {
+            Shape::Buffer(_) => context.candidate.max_buffer,
+            _ => context.candidate.max_allocation,
+        };
+        if bytes > allowed {
+            return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
         }
         match slot.shape(scene) {
             Shape::Buffer(bytes) => {
@@ -149,7 +155,12 @@ pub fn check(context: &Context, plan: &Plan, scene: &Scene) -> Result<(), GpuErr
             Shape::Three(_) => vk::ImageType::TYPE_3D,
             _ => vk::ImageType::TYPE_2D,
         };
-        let allowed = context.image_limits(format, kind, usage(context, slot))?.max_resource_size;
+        let limits = context.image_limits(format, kind, usage(context, slot))?;
+        let ([w, h, parts], most) = (slot.shape(scene).size().map(|n| n as u32), limits.max_extent);
+        within(w, most.width)?;
+        within(h, most.height)?;
+        within(parts, if kind == vk::ImageType::TYPE_3D { most.depth } else { limits.max_array_layers })?;
+        let allowed = limits.max_resource_size;
         if bytes > allowed {
             return Err(GpuError::Limit { what: what(), needed: bytes, allowed });
         }

@@ -1,22 +1,25 @@
 //! The Vulkan renderer: the only module that calls Vulkan, and the only one with unsafe code.
 //!
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
-//! - `resources` are images and buffers, also those of a scene's slots, `formats` what the device can do with them.
+//! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
+//!   the device can do with them.
 //! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
-//! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done.
-//!   `bands` divides dispatches that a watchdog might end.
+//! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
+//!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
 //! - `lost_device` reports why a device was lost, `budget` how much memory it has left.
 //! - `renderer` runs the four stages, `pass_runner` a single pass for tests and benchmarks.
 //! - `window` presents pictures.
 
 mod bands;
 pub mod budget;
+mod buffers;
 pub mod context;
 pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
 pub(crate) mod formats;
 pub mod lost_device;
+mod memory;
 pub mod pass_runner;
 mod pipelines;
 mod recorder;
@@ -26,6 +29,7 @@ pub mod shader_reload;
 mod timeline;
 mod timing;
 mod validation;
+mod watchdog;
 pub mod window;
 
 pub use bands::Bands;
@@ -36,3 +40,4 @@ pub use formats::TexelAccess;
 pub use pipelines::{Shaders, Wake};
 pub use renderer::{Renderer, RendererOptions};
 pub use timing::TimeStamps;
+pub use watchdog::Deadline;

@@ -1,11 +1,12 @@
 //! Runs a single pass on given inputs: tests compare it with its CPU reference, benchmarks time it.
 
+use super::buffers::{Readback, Upload};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{Pipeline, Pipelines, embedded};
-use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, SlotResources};
+use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
+use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
 use crate::passes::slots::{Initializer, Shape};
@@ -73,10 +74,7 @@ impl PassRunner {
             let Some(bytes) = input(scene, bind, inputs) else { continue };
             let bytes = self.context.faults.given(bind.slot, scene, bytes);
             match slots.buffer_mut(bind.slot) {
-                Some(buffer) => {
-                    let length = buffer.bytes().len().min(bytes.len());
-                    buffer.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
-                }
+                Some(buffer) => buffer.write(0, &bytes),
                 None => staged.push((*bind, bytes)),
             }
         }
@@ -91,22 +89,20 @@ impl PassRunner {
         let mut keep = Vec::new();
         for (bind, bytes) in staged {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
-            let mut staging = Buffer::new(&self.context, "input", bytes.len() as u64, Purpose::Staging)?;
-            staging.bytes_mut().copy_from_slice(&bytes);
             let parts = match bind.part {
                 Part::Layer => args.layer..args.layer + 1,
                 _ => 0..image.shape.parts(),
             };
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
-            let from = (&staging, BufferLayout::default());
-            recorder.copy_in(&mut barriers, from, image, SlotParts { slot: bind.slot, copy, parts });
-            keep.push(staging);
+            let upload = Upload::new(&self.context, "input", image.layout(), parts.clone(), &bytes)?;
+            recorder.upload(&mut barriers, &upload, image, SlotParts { slot: bind.slot, copy, parts });
+            keep.push(upload);
         }
         recorder.dispatch(&mut barriers, &Dispatch { slots: &slots, pipeline: &pipeline, scene, pass, args })?;
         let mut results = Vec::new();
         for bind in &writes {
             let Some(image) = slots.image(bind.slot, args.image) else { continue };
-            let buffer = Buffer::new(&self.context, "output", bind.slot.bytes(scene), Purpose::Readback)?;
+            let buffer = Readback::new(&self.context, "output", image.shape, image.format.texel_bytes())?;
             let copy = if bind.slot.is_multibuffered() { args.image } else { 0 };
             recorder.copy_out(&mut barriers, image, bind.slot, copy, &buffer);
             results.push((bind, image.shape.size(), image.format, buffer));
@@ -119,7 +115,7 @@ impl PassRunner {
         let mut outputs = Arrays::default();
         for (bind, size, format, buffer) in results {
             let outside = Texels::stored(format, poison);
-            let part = Texels::decode(size, format, buffer.bytes());
+            let part = Texels::decode(size, format, &buffer.bytes()?);
             outputs.insert(bind.name, part.with_outside(bind.slot, scene, outside));
         }
         Ok(outputs)
@@ -216,13 +212,10 @@ impl PassTimer {
                 _ => continue,
             };
             let Some(image) = self.slots.image(slot, copy) else { continue };
-            // The staging buffer has the size of the image, whatever was given.
-            let mut staging = Buffer::new(&self.context, "contents", slot.bytes(&self.scene), Purpose::Staging)?;
-            let length = bytes.len().min(staging.bytes().len());
-            staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
             let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
-            self.recorder.copy_in(&mut self.barriers, (&staging, BufferLayout::default()), image, place);
-            keep.push(staging);
+            let upload = Upload::new(&self.context, "contents", image.layout(), place.parts.clone(), &bytes)?;
+            self.recorder.upload(&mut self.barriers, &upload, image, place);
+            keep.push(upload);
         }
         self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
@@ -254,14 +247,15 @@ impl PassTimer {
     /// A device that fails.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
         let Some(image) = self.slots.image(slot, 0) else { return Ok(None) };
-        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
+        let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
         self.recorder.begin(&mut self.barriers, &self.timelines)?;
         self.recorder.copy_out(&mut self.barriers, image, slot, 0, &buffer);
         self.recorder.submit(&mut self.barriers, &mut self.timelines)?;
         let done = self.timelines.wait_all();
         // The buffer is freed at the end, also when waiting failed.
         self.timelines.drain();
-        let part = done.map(|()| Texels::decode(image.shape.size(), image.format, buffer.bytes()))?;
+        done?;
+        let part = Texels::decode(image.shape.size(), image.format, &buffer.bytes()?);
         Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
     }
 }

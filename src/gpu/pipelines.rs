@@ -2,10 +2,10 @@
 //! compiles them in the background, so that drawing goes on meanwhile; and their descriptor sets.
 
 use super::bands::InvocationTime;
+use super::buffers::has_texels;
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
-use super::resources::has_texels;
 use crate::passes::slots::{Format, Shape};
 use crate::passes::{DispatchArgs, Pass, Slot, interface_check};
 use crate::plan::Plan;
@@ -156,6 +156,9 @@ impl Pipelines {
 impl Drop for Pipelines {
     fn drop(&mut self) {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).clear();
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: pipelines that use the sampler are dropped by whoever holds them only after the device is done.
         unsafe { self.context.device.destroy_sampler(self.sampler, None) };
     }
@@ -244,6 +247,9 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: whoever drops the last reference has waited for the device; null handles are allowed.
         unsafe {
             self.context.device.destroy_pipeline(self.handle, None);
@@ -437,6 +443,9 @@ impl DescriptorSets {
 
 impl Drop for DescriptorSets {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         for pool in &self.pools {
             // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
             unsafe { self.context.device.destroy_descriptor_pool(*pool, None) };

@@ -1,11 +1,12 @@
 //! Records one command buffer: dispatches and copies with the barriers that they need, labels, time stamps, and parameters.
 
 use super::bands::{Band, BandLimit, Work};
+use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{DescriptorSets, Pipeline, descriptor_type};
-use super::resources::{Buffer, Image, Purpose, Resource, SlotResources, WHOLE};
+use super::resources::{Image, Resource, SlotResources, WHOLE};
 use super::timeline::Timelines;
 use super::timing::{Stamps, TimeStamps, Timings};
 use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
@@ -282,8 +283,7 @@ impl Recorder {
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(&signal);
         self.context.submit(self.queue, &submit, vk::Fence::null(), || format!("submit '{}'", self.label))?;
-        timeline.submitted += 1;
-        timeline.label = self.label.to_string();
+        timeline.advance(self.label);
         self.done_at = timeline.submitted;
         barriers.submitted(self.queue, &waits, self.done_at);
         Ok(())
@@ -414,7 +414,7 @@ impl Recorder {
                 allowed: PARAMS_BYTES,
             });
         }
-        self.params.bytes_mut()[offset as usize..end as usize].copy_from_slice(block);
+        self.params.write(offset as usize, block);
         self.params_used = end;
         Ok(offset)
     }
@@ -606,34 +606,56 @@ impl Recorder {
                 from.handle,
                 image.handle,
                 vk::ImageLayout::GENERAL,
-                &[region(image, parts.start, parts.end - parts.start, layout)],
+                &[region(image, parts, 0..image.extent.height, layout)],
             );
         }
     }
 
-    /// Copies a complete image into the readback buffer and makes it visible to the host.
-    pub fn copy_out(&mut self, barriers: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Buffer) {
+    /// Copies everything that an upload holds into its parts of an image.
+    pub fn upload(&mut self, barriers: &mut BarrierRecorder, from: &Upload, image: &Image, to: SlotParts) {
+        self.barrier(barriers, &[Access::of_slot(to.slot, to.copy, to.parts, true, PipelineStage::Copy)]);
+        for (piece, buffer) in from.pieces() {
+            let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
+            // SAFETY: the buffer holds the bytes of this piece and both live until the device is done.
+            unsafe {
+                self.context.device.cmd_copy_buffer_to_image(
+                    self.commands,
+                    buffer.handle,
+                    image.handle,
+                    vk::ImageLayout::GENERAL,
+                    &[region],
+                );
+            }
+        }
+    }
+
+    /// Copies a complete image into the buffers of a readback and makes them visible to the host.
+    pub fn copy_out(&mut self, barriers: &mut BarrierRecorder, image: &Image, slot: Slot, copy: u32, to: &Readback) {
         let parts = image.shape.parts();
         let read = Access::of_slot(slot, copy, 0..parts, false, PipelineStage::Copy);
         let resource = barriers::Resource::Readback;
         let write = Access { resource, parts: 0..1, write: true, stage: PipelineStage::Copy };
         self.barrier(barriers, &[read, write]);
-        // SAFETY: the buffer is as large as the image (its maker sized it so) and both live until the device is done.
-        unsafe {
-            self.context.device.cmd_copy_image_to_buffer(
-                self.commands,
-                image.handle,
-                vk::ImageLayout::GENERAL,
-                to.handle,
-                &[region(image, 0, parts, BufferLayout::default())],
-            );
+        for (piece, buffer) in to.pieces() {
+            let region = region(image, piece.parts.clone(), piece.rows.clone(), BufferLayout::default());
+            // SAFETY: the buffer is as large as its piece of the image and both live until the device is done.
+            unsafe {
+                self.context.device.cmd_copy_image_to_buffer(
+                    self.commands,
+                    image.handle,
+                    vk::ImageLayout::GENERAL,
+                    buffer.handle,
+                    &[region],
+                );
+            }
         }
         self.barrier(barriers, &[Access { resource, parts: 0..1, write: false, stage: PipelineStage::Host }]);
     }
 }
 
-/// The copy region of `parts` layers or slices, from `part` on.
-fn region(image: &Image, part: u32, parts: u32, layout: BufferLayout) -> vk::BufferImageCopy {
+/// The copy region of layers or slices, and of rows in each of them.
+fn region(image: &Image, parts: Range<u32>, rows: Range<u32>, layout: BufferLayout) -> vk::BufferImageCopy {
+    let (part, parts) = (parts.start, parts.end - parts.start);
     let is_volume = image.extent.depth > 1 || matches!(image.shape, Shape::Three(_));
     let (layer, layers, z, depth) = if is_volume { (0, 1, part, parts) } else { (part, parts, 0, 1) };
     vk::BufferImageCopy {
@@ -646,13 +668,16 @@ fn region(image: &Image, part: u32, parts: u32, layout: BufferLayout) -> vk::Buf
             base_array_layer: layer,
             layer_count: layers,
         },
-        image_offset: vk::Offset3D { x: 0, y: 0, z: z as i32 },
-        image_extent: vk::Extent3D { depth, ..image.extent },
+        image_offset: vk::Offset3D { x: 0, y: rows.start as i32, z: z as i32 },
+        image_extent: vk::Extent3D { width: image.extent.width, height: rows.end - rows.start, depth },
     }
 }
 
 impl Drop for Recorder {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: the owner waited for the device before it drops its recorders. The pool frees its command buffer.
         unsafe { self.context.device.destroy_command_pool(self.pool, None) };
     }

@@ -1,19 +1,19 @@
-//! Images and buffers that own their memory, and those of the slots in a scene's plan.
+//! Images that own their memory, and the images and buffers of the slots in a scene's plan.
 
+use super::buffers::{Buffer, Purpose};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
-use super::faults::InjectionPoint;
 use super::formats;
+use super::memory::{Reserve, free, reserve};
 use crate::passes::Slot;
 use crate::passes::slots::{Format, Initializer, Shape};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::Allocation;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// An image, its memory and its views.
 pub struct Image {
@@ -27,75 +27,6 @@ pub struct Image {
     pub shape: Shape,
     pub format: Format,
     allocation: Option<Allocation>,
-}
-
-/// A buffer and its memory, mapped as long as it lives.
-pub struct Buffer {
-    context: Arc<Context>,
-    pub handle: vk::Buffer,
-    pub size: u64,
-    /// For a lookup table: views with texels of one, two and four floats.
-    texels: [vk::BufferView; 3],
-    allocation: Option<Allocation>,
-}
-
-/// The purpose of a buffer. It decides the kind of memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    /// A lookup table that shaders read.
-    Table,
-    /// Uniform numbers of passes, written by the CPU.
-    Params,
-    /// Data to upload, written by the CPU.
-    Staging,
-    /// Results to download, read by the CPU.
-    Readback,
-}
-
-pub(super) fn allocate(
-    context: &Context,
-    name: &str,
-    requirements: vk::MemoryRequirements,
-    location: MemoryLocation,
-    linear: bool,
-    operation: &dyn Fn() -> String,
-) -> Result<Allocation, GpuError> {
-    context.faults.check(InjectionPoint::Allocate).context(operation)?;
-    context.counts.allocations.fetch_add(1, Ordering::Relaxed);
-    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
-    let Some(allocator) = allocator.as_mut() else {
-        return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
-    };
-    if let Some(budget) = context.memory_budget() {
-        let required = match location {
-            MemoryLocation::GpuOnly => vk::MemoryPropertyFlags::DEVICE_LOCAL,
-            _ => vk::MemoryPropertyFlags::HOST_VISIBLE,
-        };
-        let check =
-            |reserve| budget.check(operation, requirements.size, requirements.memory_type_bits, required, reserve);
-        // What is allocated and free is only added up where it decides.
-        if check(0).is_err() {
-            let report = allocator.generate_report();
-            check(report.total_capacity_bytes.saturating_sub(report.total_allocated_bytes))?;
-        }
-    }
-    allocator
-        .allocate(&AllocationCreateDesc {
-            name,
-            requirements,
-            location,
-            linear,
-            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-        })
-        .map_err(|e| GpuError::Memory { operation: operation(), fault: e.to_string() })
-}
-
-pub(super) fn free(context: &Context, allocation: Option<Allocation>) {
-    let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
-    if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
-        // Freeing an allocation of this allocator cannot fail, and a Drop could not report it.
-        let _ = allocator.free(allocation);
-    }
 }
 
 impl Image {
@@ -152,7 +83,8 @@ impl Image {
         };
         // SAFETY: the image was just made by this device.
         let requirements = unsafe { device.get_image_memory_requirements(handle) };
-        let allocation = allocate(context, slot.name(), requirements, MemoryLocation::GpuOnly, false, &operation)?;
+        let wanted = Reserve { name: slot.name(), requirements, location: MemoryLocation::GpuOnly, linear: false };
+        let allocation = reserve(context, wanted, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the image.
         let bound = unsafe { device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
@@ -167,6 +99,11 @@ impl Image {
         context.name(handle, slot.name());
         tracing::debug!("image '{}': {width}x{height}x{} {format:?}, {mebibytes} MiB", slot.name(), depth.max(layers));
         Ok(image)
+    }
+
+    /// Its shape and the bytes of a texel.
+    pub fn layout(&self) -> (Shape, usize) {
+        (self.shape, self.format.texel_bytes())
     }
 
     fn create_view(
@@ -201,94 +138,15 @@ pub const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
 
 impl Drop for Image {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: whoever drops an image has waited for the device to be done with it; null handles are allowed.
         unsafe {
             for view in self.layers.drain(..).chain([self.view]) {
                 self.context.device.destroy_image_view(view, None);
             }
             self.context.device.destroy_image(self.handle, None);
-        }
-        free(&self.context, self.allocation.take());
-    }
-}
-
-const TEXELS: [vk::Format; 3] = [vk::Format::R32_SFLOAT, vk::Format::R32G32_SFLOAT, vk::Format::R32G32B32A32_SFLOAT];
-
-/// True if a lookup table of this size can be a texel buffer, for any size of its entries.
-pub fn has_texels(context: &Context, bytes: u64) -> bool {
-    bytes >= 16 && bytes / 4 <= u64::from(context.limits.max_texel_buffer_elements)
-}
-
-impl Buffer {
-    pub fn new(context: &Arc<Context>, name: &str, size: u64, purpose: Purpose) -> Result<Buffer, GpuError> {
-        let operation = || format!("create buffer '{name}' ({} KiB)", size.div_ceil(1024));
-        let (usage, location) = match purpose {
-            Purpose::Table => (
-                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER,
-                MemoryLocation::CpuToGpu,
-            ),
-            Purpose::Params => (vk::BufferUsageFlags::UNIFORM_BUFFER, MemoryLocation::CpuToGpu),
-            Purpose::Staging => (vk::BufferUsageFlags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
-            Purpose::Readback => (vk::BufferUsageFlags::TRANSFER_DST, MemoryLocation::GpuToCpu),
-        };
-        if size > context.candidate.max_bytes {
-            return Err(GpuError::Limit { what: operation(), needed: size, allowed: context.candidate.max_bytes });
-        }
-        let create = vk::BufferCreateInfo::default().size(size.max(4)).usage(usage);
-        let device = &context.device;
-        // SAFETY: the create structure is complete.
-        let handle = unsafe { device.create_buffer(&create, None) }.context(operation)?;
-        let mut buffer =
-            Buffer { context: context.clone(), handle, size, texels: Default::default(), allocation: None };
-        // SAFETY: the buffer was just made by this device.
-        let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-        let allocation = allocate(context, name, requirements, location, true, &operation)?;
-        // SAFETY: the allocation fits the requirements and lives as long as the buffer.
-        let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
-        buffer.allocation = Some(allocation);
-        bound.context(operation)?;
-        context.name(handle, name);
-        if let Some(poison) = context.faults.poisoned() {
-            buffer.bytes_mut().fill(poison.byte);
-        }
-        if purpose == Purpose::Table && has_texels(context, size) {
-            for (n, format) in TEXELS.into_iter().enumerate() {
-                let create = vk::BufferViewCreateInfo::default().buffer(handle).format(format).range(vk::WHOLE_SIZE);
-                // SAFETY: the buffer is bound to memory and alive; every device has these formats as texel buffers.
-                buffer.texels[n] = unsafe { device.create_buffer_view(&create, None) }.context(operation)?;
-                context.name(buffer.texels[n], name);
-            }
-        }
-        Ok(buffer)
-    }
-
-    /// The view of a lookup table with texels of 1, 2 or 4 floats.
-    pub fn texels(&self, components: u32) -> vk::BufferView {
-        self.texels[components.ilog2().min(2) as usize]
-    }
-
-    /// The mapped bytes. Buffers of every purpose are visible to the host.
-    pub fn bytes(&self) -> &[u8] {
-        let bytes = self.allocation.as_ref().and_then(|a| a.mapped_slice()).unwrap_or(&[]);
-        &bytes[..bytes.len().min(self.size as usize)]
-    }
-
-    pub fn bytes_mut(&mut self) -> &mut [u8] {
-        let size = self.size as usize;
-        let bytes = self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).unwrap_or(&mut []);
-        let end = bytes.len().min(size);
-        &mut bytes[..end]
-    }
-}
-
-impl Drop for Buffer {
-    fn drop(&mut self) {
-        // SAFETY: whoever drops a buffer has waited for the device to be done with it; null handles are allowed.
-        unsafe {
-            for view in self.texels {
-                self.context.device.destroy_buffer_view(view, None);
-            }
-            self.context.device.destroy_buffer(self.handle, None);
         }
         free(&self.context, self.allocation.take());
     }
@@ -342,10 +200,7 @@ impl SlotResources {
             (slot.initializer(), self.resources.get_mut(&(slot, 0)))
         {
             let values = self.context.faults.table(slot, scene, make(scene));
-            let bytes: &[u8] = bytemuck::cast_slice(&values);
-            let target = buffer.bytes_mut();
-            let length = bytes.len().min(target.len());
-            target[..length].copy_from_slice(&bytes[..length]);
+            buffer.write(0, bytemuck::cast_slice(&values));
         }
     }
 

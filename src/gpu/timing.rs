@@ -230,6 +230,9 @@ impl Stamps {
 
 impl Drop for Stamps {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         for pool in [Some(self.pool), self.statistics].into_iter().flatten() {
             // SAFETY: whoever drops the stamps has waited for the device.
             unsafe { self.context.device.destroy_query_pool(pool, None) };

@@ -462,6 +462,11 @@ impl Stream {
         self.context.counts.dispatches.load(Ordering::Relaxed)
     }
 
+    /// How long the device has been at work without finishing anything; none before the first frame.
+    pub fn device_busy_for(&self) -> Option<Duration> {
+        self.session.as_ref().map(|session| session.renderer.busy_for())
+    }
+
     /// When the last picture was begun.
     pub fn last_begun(&self) -> Option<Instant> {
         self.session.as_ref().map(|session| session.begun)

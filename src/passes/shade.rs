@@ -357,7 +357,7 @@ pub const OCCLUSION: Pass = Pass {
         let occlusion = s.settings.light.occlusion.unwrap_or_default();
         camera_params(s).f32("radius", occlusion.radius).f32("strength", occlusion.strength)
     },
-    constants: |_, _| vec![("SAMPLES", OCCLUSION_SAMPLES as i32)],
+    constants: |_, _| vec![],
     tolerance: Tolerance {
         absolute: 4e-3,
         relative: 0.0,
@@ -376,6 +376,13 @@ pub const OCCLUSION: Pass = Pass {
     },
 };
 
+/// The direction of a sample, x and y: the constants of the shader, which takes no sine itself. The precision of a device's sine is
+/// bounded only from -pi to pi, and the last sample's angle is 74 rad.
+fn occlusion_direction(sample: u32) -> [f32; 2] {
+    let (sin, cos) = (GOLDEN_ANGLE * f64::from(sample)).sin_cos();
+    [cos as f32, sin as f32]
+}
+
 /// True if ambient occlusion darkens this scene.
 fn is_occluded(scene: &Scene) -> bool {
     (OCCLUSION.needed)(scene).is_ok()
@@ -390,7 +397,7 @@ fn open(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<f64> {
     let mut taken = 0.0;
     for i in 0..OCCLUSION_SAMPLES {
         let share = ((f64::from(i) + 0.5) / f64::from(OCCLUSION_SAMPLES)).sqrt();
-        let (sin, cos) = (GOLDEN_ANGLE * f64::from(i)).sin_cos();
+        let [cos, sin] = occlusion_direction(i).map(f64::from);
         let tap = |at: i64, along: f64| (at as f64 + 0.5 + pixels * share * along).floor() as i64;
         let Some((there, _)) = place(scene, distances, tap(x, cos), tap(y, sin)) else { continue };
         let far = there.distance(here);
@@ -461,4 +468,28 @@ pub fn normal(scene: &Scene, distances: &Texels, x: i64, y: i64) -> Option<DVec3
     let (_, along) = rays.at(x as f64 + 0.5, y as f64 + 0.5);
     let normal = sy.cross(sx).try_normalize().unwrap_or(-along);
     Some(if normal.dot(along) > 0.0 { -normal } else { normal })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prevents a shader whose directions differ from the reference's.
+    #[test]
+    fn the_shaders_directions_of_occlusion_are_those_of_the_reference() {
+        let source = include_str!("../../glsl/shade/occlusion.comp");
+        let (_, table) = source.split_once("= vec2[](").expect("the table");
+        let (table, rest) = table.split_once(");").expect("its end");
+        assert!(!rest.contains("sin(") && !rest.contains("cos("), "the shader takes a sine itself");
+        let pairs: Vec<[f32; 2]> = table
+            .split("vec2(")
+            .skip(1)
+            .map(|pair| {
+                let (pair, _) = pair.split_once(')').expect("a pair");
+                let (x, y) = pair.split_once(", ").expect("two numbers");
+                [x.parse().expect("a number"), y.parse().expect("a number")]
+            })
+            .collect();
+        assert_eq!(pairs, (0..OCCLUSION_SAMPLES).map(occlusion_direction).collect::<Vec<_>>());
+    }
 }

@@ -99,6 +99,7 @@ impl Output<'_> {
         let still = |fault: GpuError| (if fault.is_device_lost() { Lost::Device } else { lost }, fault);
         // Drop the old one first: a window has one surface at a time.
         console.set_screen(None);
+        let has_stalled = lost == Lost::Device && context.is_given_up();
         if lost == Lost::Device {
             *context = Context::for_presentation(self.device, &self.target).map_err(still)?;
         }
@@ -107,6 +108,9 @@ impl Output<'_> {
         match lost {
             Lost::Device => {
                 console.revive(context, Some(screen)).unwrap_or_else(|e| console.notify(&e.to_string(), true));
+                if has_stalled {
+                    console.show_stall(Instant::now());
+                }
             }
             Lost::Screen => console.set_screen(Some(screen)),
         }

@@ -135,6 +135,12 @@ impl WindowLoop<'_> {
 
     /// Restores what is lost, including the window.
     fn restore(&mut self, events: &ActiveEventLoop, lost: Lost) -> Result<(), (Lost, GpuError)> {
+        // A device that was given up keeps its surface, and a window has one surface at a time.
+        if self.context.as_ref().is_some_and(|context| context.is_given_up())
+            && let Some(window) = self.window.take()
+        {
+            window.set_visible(false);
+        }
         if self.window.is_none() {
             self.window = Some(self.new_window(events).map_err(|fault| (lost, fault))?);
         }
@@ -211,7 +217,11 @@ impl ApplicationHandler<()> for WindowLoop<'_> {
         }
     }
 
-    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+    fn window_event(&mut self, events: &ActiveEventLoop, window: WindowId, event: WindowEvent) {
+        // Another one was hidden when its device was given up.
+        if self.window.as_ref().is_some_and(|current| current.id() != window) {
+            return;
+        }
         let Some(console) = &mut self.console else { return };
         match &event {
             WindowEvent::Destroyed if self.options.stays_open => {

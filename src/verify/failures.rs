@@ -175,7 +175,7 @@ fn failed_once(
     Ok(failed > 0)
 }
 
-/// Device lost and time-out: the error names the operation, and another context renders as before.
+/// A device that is lost or does not finish: the error names the operation, and another context renders as before.
 fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let isolated = IsolatedContext::new(dut)?;
@@ -185,7 +185,6 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     for (what, seam, after, failure) in [
         ("a device lost at a submission", InjectionPoint::Submit, 0, InjectedFailure::DeviceLost),
         ("a device lost at a wait", InjectionPoint::Wait, 1, InjectedFailure::DeviceLost),
-        ("a device that does not come back", InjectionPoint::Wait, 1, InjectedFailure::TimeOut),
     ] {
         let mut renderer = render::sent(context, &case.scene, &case.frames, &RendererOptions::default())?;
         renderer.picture()?;
@@ -197,10 +196,7 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
             Ok(_) => findings.expect(false, || format!("{what}: a picture was drawn")),
             Err(error) => {
                 let text = error.to_string();
-                let is_right_kind = match failure {
-                    InjectedFailure::TimeOut => matches!(error, GpuError::TimedOut { .. }),
-                    _ => error.is_device_lost(),
-                };
+                let is_right_kind = error.is_device_lost() && !error.is_given_up();
                 findings
                     .expect(is_right_kind && text.contains("picture"), || format!("{what}: the error says: {text}"));
             }
@@ -209,6 +205,21 @@ fn lost(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
         expect_memory_returned(&mut findings, context, before, what);
     }
     isolated.report_validation(&mut findings);
+    // What is submitted from here on never reaches the device. Whatever waited for it without end would wait here for ever.
+    let (hung, what) = (IsolatedContext::new(dut)?, "a device that does not finish");
+    let mut renderer = render::sent(&hung.context, &case.scene, &case.frames, &RendererOptions::default())?;
+    renderer.picture()?;
+    renderer.show(0)?;
+    hung.context.faults.hang(0);
+    hung.context.faults.inject(InjectionPoint::Wait, 1, InjectedFailure::TimeOut.result());
+    for turn in ["", ", again"] {
+        let said = renderer.picture().map_or_else(|error| error.to_string(), |_| "nothing".into());
+        let is_named = said.contains("did not finish within") && said.contains("picture");
+        findings.expect(is_named, || format!("{what}{turn}: the error says: {said}"));
+    }
+    drop(renderer);
+    findings.expect(hung.context.is_given_up(), || format!("{what}: its context was not given up"));
+    hung.report_validation(&mut findings);
     let other = IsolatedContext::new(dut)?;
     let picture = render::picture(&other.context, &case.scene, &case.frames)?;
     expect_same_picture(&mut findings, "another context after that", &case.picture, &picture);
@@ -295,7 +306,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     }
     // Every edge is within the limits, but the volume exceeds the maximum allocation.
     let floats = format!("{small}\nslices = {{ format = 'r32f' }}");
-    let bytes = context.candidate.max_bytes;
+    let bytes = context.candidate.max_allocation;
     if 4 * (three as u64).pow(3) > bytes {
         let scene = cartesian_scene([three; 3], &floats)?;
         refused(&mut findings, context, "a volume larger than an allocation", scene, ["image", &bytes.to_string()]);
@@ -308,7 +319,7 @@ fn beyond(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     // A context with lower limits.
     let lesser = IsolatedContext::lacking(dut, |context| {
         context.limits.max_image_dimension2_d = 64;
-        context.candidate.max_bytes = 1 << 20;
+        context.candidate.max_allocation = 1 << 20;
     })?;
     let wide = cartesian_scene([4; 3], "mode = 'vr'\npicture = { size = [65, 8] }")?;
     refused(&mut findings, &lesser.context, "a picture wider than a device's images", wide, ["image", "64"]);

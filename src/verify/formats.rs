@@ -150,7 +150,7 @@ fn missing_features() -> Vec<MissingFeature> {
         // The maximum allocation holds the volume, but not four times as much.
         of(
             "no room for quads",
-            |c| c.candidate.max_bytes = 80 << 10,
+            |c| c.candidate.max_allocation = 80 << 10,
             reading(TexelAccess::Storage),
             Some(Sampling::Exact),
         ),

@@ -4,6 +4,7 @@ mod bounds;
 mod budget;
 #[path = "../common/mod.rs"]
 mod common;
+mod devices;
 #[cfg(feature = "view")]
 mod direct;
 mod docs;

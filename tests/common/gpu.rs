@@ -1,6 +1,6 @@
 //! A device with validation on, scenes, and noise that is the same everywhere.
 
-use echolume::gpu::{Context, ContextOptions, DeviceChoice, Renderer, RendererOptions};
+use echolume::gpu::{Context, ContextOptions, Deadline, DeviceChoice, Renderer, RendererOptions};
 use echolume::passes::slots::Format;
 use echolume::passes::{Slot, Texels, is_hit};
 use echolume::picture::Picture;
@@ -8,6 +8,7 @@ use echolume::scene::Scene;
 use echolume::verify::built_in;
 use std::ops::Deref;
 use std::sync::Arc;
+use std::time::Duration;
 
 pub use super::files::*;
 pub use super::probes::wobbler;
@@ -35,8 +36,16 @@ impl Device {
 
     /// `validation` false switches the layers off: they keep some memory for every object ever created.
     pub fn watched(validation: bool) -> Device {
-        let context = Context::new(&ContextOptions { device: chosen(), validation }).expect("a Vulkan device");
+        let context = Context::new(&ContextOptions { device: chosen(), validation, ..ContextOptions::default() })
+            .expect("a Vulkan device");
         Device { context, provoked: false }
+    }
+
+    /// One that is given up if it does not finish within two seconds, also in software. That is far more than a small picture takes.
+    pub fn impatient() -> Device {
+        let deadline = Deadline::After(Duration::from_secs(2));
+        let options = ContextOptions { device: chosen(), validation: true, deadline, ..ContextOptions::default() };
+        Device { context: Context::new(&options).expect("a Vulkan device"), provoked: false }
     }
 
     /// The device and driver, for output with `--nocapture`.

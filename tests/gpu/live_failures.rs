@@ -119,6 +119,42 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
     assert!(rays > 1, "{dispatched:?}");
 }
 
+/// Prevents a stream that goes silent with a device that does not finish: whatever hangs, a picture, an upload or a pass over a frame, the
+/// device is given up, and the next volumes are shown on another. What the hung device was to do is never waited for, also at the end.
+#[test]
+fn a_device_that_hangs_costs_a_volume_and_not_the_stream() {
+    let other = Device::new();
+    for hangs_after in [0, 3] {
+        let device = Device::impatient();
+        let options = live::StreamOptions::default();
+        let mut stream =
+            stream(&device, events(header(0.3), (0..6).flat_map(stamped)), settings("mode = 'mip'"), options);
+        let (mut shown, mut stalled) = (Vec::new(), 0);
+        loop {
+            match stream.step(Duration::from_millis(20)) {
+                Ok(Step::Picture(picture)) => {
+                    shown.push(picture.volume);
+                    if shown.len() == 2 {
+                        device.faults.hang(hangs_after);
+                    }
+                }
+                Ok(Step::End(why)) => break assert_eq!(why, None),
+                Ok(_) => {}
+                Err(live::StreamError::Gpu(error)) if error.is_given_up() => {
+                    stalled += 1;
+                    assert!(error.to_string().contains("did not finish within 2 s"), "{error}");
+                    stream.revive(&other).expect("made anew");
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+        assert!(stalled == 1 && shown.first() == Some(&0) && shown.last() == Some(&5), "{stalled} stalls, {shown:?}");
+        assert!(device.is_given_up() && !other.is_given_up());
+        let counts = stream.statistics().expect("statistics").volumes;
+        assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
+    }
+}
+
 /// Prevents volumes that are never complete if some slices are outside the visible bounds and frames arrive line by line.
 #[test]
 fn missing_slices_outside_the_visible_bounds_do_not_make_a_volume_incomplete() {

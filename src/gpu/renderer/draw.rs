@@ -51,6 +51,11 @@ impl Renderer {
         Ok(self.drawing && !self.picture.is_done(&self.timelines)?)
     }
 
+    /// How long the device has been at work without finishing anything; zero if it is idle.
+    pub fn busy_for(&self) -> Duration {
+        self.timelines.busy_for()
+    }
+
     /// True if there is a picture of the current size, done or in flight.
     pub fn has_drawn(&self) -> bool {
         self.drawn
@@ -70,11 +75,11 @@ impl Renderer {
             _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
         };
         let rgba = match &self.readback {
-            Some(buffer) => in_8_bits(buffer.bytes(), Slot::Screen.format(&self.scene)),
-            None => {
-                let there = self.bring_back(Slot::Screen)?;
-                there.map_or(Vec::new(), |(buffer, _, format)| in_8_bits(buffer.bytes(), format))
-            }
+            Some(readback) => in_8_bits(&readback.bytes()?, Slot::Screen.format(&self.scene)),
+            None => match self.bring_back(Slot::Screen)? {
+                Some((readback, _, format)) => in_8_bits(&readback.bytes()?, format),
+                None => Vec::new(),
+            },
         };
         Ok(Picture { width, height, rgba })
     }

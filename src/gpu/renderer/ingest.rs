@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::source::StoredType;
+use std::mem::MaybeUninit;
 
 impl InFlight {
     /// The recorder that reads the staging buffer.
@@ -75,15 +76,15 @@ impl Renderer {
             return Err(GpuError::FrameSlice { slice, slices: self.scene.slices() });
         }
         let (frame_bytes, line) = (self.frame_bytes(), self.frame_bytes() / self.scene.frame_size()[1] as usize);
-        let at = first as usize * line;
-        let follows = self.partial.as_ref().is_some_and(|a| (a.slice, a.image, a.received) == (slice, image, at));
+        let (at, received) = (first as usize * line, self.received.len());
+        let follows = self.partial.as_ref().is_some_and(|a| (a.slice, a.image) == (slice, image)) && received == at;
         // No lines are kept of a frame that is not visible, so the order of its lines is not checked.
         let is_visible = self.scene.visible_frames().contains(&slice);
         if !bytes.len().is_multiple_of(line)
             || at + bytes.len() > frame_bytes
             || !(first == 0 || follows || !is_visible)
         {
-            let received = self.partial.as_ref().map_or(0, |a| a.received / line) as u32;
+            let received = self.partial.as_ref().map_or(0, |_| received / line) as u32;
             return Err(GpuError::FrameLines { slice, first, bytes: bytes.len(), received });
         }
         self.filtered_bounds = self.scene.visible_bounds;
@@ -91,37 +92,45 @@ impl Renderer {
             self.skipped += u64::from(first == 0);
             return Ok(at + bytes.len() == frame_bytes);
         }
-        if first == 0 && self.partial.take().is_some() {
-            self.incomplete += 1;
-        }
-        let offset = match chain::copied(&self.scene) {
-            Some(_) => self.batch_offset(slice, image)?,
-            None if first == 0 => {
-                self.wait_for_ring()?;
-                0
-            }
-            None => 0,
-        };
-        let staging = self.ring[self.ring_index].staging.bytes_mut();
-        let staged = staged_bytes(&self.scene) as usize;
-        let widening = staged / frame_bytes;
-        let (from, to) = (offset + widening * at, offset + widening * (at + bytes.len()));
-        let stage = stage_of(&self.scene);
-        self.timings.host("stage", || stage(bytes, &mut staging[from..to]));
-        if at + bytes.len() == frame_bytes {
-            self.context.faults.frame(&self.scene, &mut staging[offset..offset + staged]);
+        if first == 0 {
+            self.received.clear();
+            self.incomplete += u64::from(self.partial.take().is_some());
         }
         if at + bytes.len() < frame_bytes {
-            self.partial = Some(PartialFrame { slice, image, received: at + bytes.len() });
+            self.received.extend_from_slice(bytes);
+            self.partial = Some(PartialFrame { slice, image });
             return Ok(false);
         }
         self.partial = None;
-        match chain::copied(&self.scene) {
-            Some(_) => self.extend_batch()?,
-            None => self.ingest(slice, image)?,
+        if first == 0 {
+            self.send(slice, image, bytes)?;
+        } else {
+            let mut whole = std::mem::take(&mut self.received);
+            whole.extend_from_slice(bytes);
+            let sent = self.send(slice, image, &whole);
+            // Its memory is for the next frame.
+            self.received = whole;
+            sent?;
         }
         self.unprocessed[image as usize][slice as usize] = true;
         Ok(true)
+    }
+
+    /// Writes a complete frame into the staging buffer of the next entry, and submits it or adds it to the batch.
+    fn send(&mut self, slice: u32, image: u32, bytes: &[u8]) -> Result<(), GpuError> {
+        let is_copied = chain::copied(&self.scene).is_some();
+        let offset = match is_copied {
+            true => self.batch_offset(slice, image)?,
+            false => {
+                self.wait_for_ring()?;
+                0
+            }
+        };
+        let bytes = self.context.faults.changed_frame(&self.scene, bytes);
+        let (stage, staged) = (stage_of(&self.scene), staged_bytes(&self.scene) as usize);
+        let space = self.ring[self.ring_index].staging.space();
+        self.timings.host("stage", || stage(&bytes, &mut space[offset..offset + staged]));
+        if is_copied { self.extend_batch() } else { self.ingest(slice, image) }
     }
 
     /// Waits until the next entry is free, and adds up its times.
@@ -166,8 +175,11 @@ fn staged_bytes(scene: &Scene) -> u64 {
     chain::copied(scene).map_or(frame_bytes(scene), |slot| width * height * slot.format(scene).texel_bytes() as u64)
 }
 
+/// Staging memory, which cannot be read.
+type Space = [MaybeUninit<u8>];
+
 /// How samples are written into the staging buffer. A format that holds v/255 or v/65535 only rounded gets the nearest value to it.
-fn stage_of(scene: &Scene) -> fn(&[u8], &mut [u8]) {
+fn stage_of(scene: &Scene) -> fn(&[u8], &mut Space) {
     match (scene.input.stored, chain::copied(scene).map(|slot| slot.format(scene))) {
         // 65535 is 255 times 257.
         (StoredType::U8, Some(Format::R16)) => |from, to| widen(from, to, |[v]| (257 * u16::from(v)).to_ne_bytes()),
@@ -176,24 +188,24 @@ fn stage_of(scene: &Scene) -> fn(&[u8], &mut [u8]) {
             |from, to| widen(from, to, |v| (f32::from(u16::from_ne_bytes(v)) / 65535.0).to_ne_bytes())
         }
         (StoredType::F32, Some(_)) => copy_clamped,
-        _ => |from, to| to.copy_from_slice(from),
+        _ => |from, to| _ = to.write_copy_of_slice(from),
     }
 }
 
 /// Writes each sample of N bytes as one of M bytes.
-fn widen<const N: usize, const M: usize>(from: &[u8], to: &mut [u8], wide: impl Fn([u8; N]) -> [u8; M]) {
+fn widen<const N: usize, const M: usize>(from: &[u8], to: &mut Space, wide: impl Fn([u8; N]) -> [u8; M]) {
     let (from, _) = from.as_chunks::<N>();
     let (to, _) = to.as_chunks_mut::<M>();
-    from.iter().zip(to).for_each(|(from, to)| *to = wide(*from));
+    from.iter().zip(to).for_each(|(from, to)| *to = wide(*from).map(MaybeUninit::new));
 }
 
 /// Copies 32-bit floats, as 0..1: no pass clamps them where they are stored unchanged.
-fn copy_clamped(from: &[u8], to: &mut [u8]) {
-    for (from, to) in from.chunks_exact(4).zip(to.chunks_exact_mut(4)) {
-        let value = f32::from_ne_bytes([from[0], from[1], from[2], from[3]]);
+fn copy_clamped(from: &[u8], to: &mut Space) {
+    widen(from, to, |sample| {
+        let value = f32::from_ne_bytes(sample);
         let value = if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) };
-        to.copy_from_slice(&value.to_ne_bytes());
-    }
+        value.to_ne_bytes()
+    });
 }
 
 /// Maximum bytes of a batch, unless a single slice is larger. Copying so much takes far longer than submitting it.
@@ -232,7 +244,6 @@ impl Renderer {
         let follows = |s: &SliceBatch| s.image == image && s.first + s.count == slice;
         if self.batch.as_ref().is_some_and(|batch| !follows(batch)) {
             self.flush()?;
-            // A batch that is left holds only lines of a dropped frame.
             self.batch = None;
         }
         if self.batch.is_none() {
@@ -253,7 +264,7 @@ impl Renderer {
         }
     }
 
-    /// Submits the batch. The lines of an incomplete frame move to the next entry.
+    /// Submits the batch.
     pub(super) fn flush(&mut self) -> Result<(), GpuError> {
         let Some(slot) = chain::copied(&self.scene) else { return Ok(()) };
         let Some(SliceBatch { image, first, count }) = self.batch.take_if(|batch| batch.count > 0) else {
@@ -269,15 +280,7 @@ impl Renderer {
         let offset = texel * slot.format(&self.scene).texel_bytes() as u64;
         let layout = BufferLayout { offset, row_length, image_height };
         let entry = &mut self.ring[from];
-        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)?;
-        let Some((slice, image, received)) = self.partial.as_ref().map(PartialFrame::place) else { return Ok(()) };
-        self.wait_for_ring()?;
-        let staged = staged_bytes(&self.scene) as usize;
-        let (at, received) = (count as usize * staged, received * (staged / self.frame_bytes()));
-        let lines = self.ring[from].staging.bytes()[at..at + received].to_vec();
-        self.ring[self.ring_index].staging.bytes_mut()[..received].copy_from_slice(&lines);
-        self.batch = Some(SliceBatch { image, first: slice, count: 0 });
-        Ok(())
+        entry.submit_copy(&mut self.barriers, &mut self.timelines, &self.slots, (place, layout), &mut self.timings)
     }
 }
 

@@ -5,12 +5,13 @@ mod draw;
 mod ingest;
 
 use super::bands::{BandLimit, Bands};
+use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
 use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake, embedded};
 use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
-use super::resources::{Buffer, Purpose, SlotResources};
+use super::resources::SlotResources;
 use super::timeline::Timelines;
 use super::timing::{TimeStamps, Timings};
 use crate::passes::chain;
@@ -23,6 +24,7 @@ use crate::queues::{MAX_QUEUES, QueueRole, QueueTracker};
 use crate::scene::{Scene, VisibleBounds};
 use std::collections::HashSet;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// How a [`Renderer`] runs.
 #[derive(Clone)]
@@ -75,19 +77,10 @@ struct InFlight {
     staging: Buffer,
 }
 
-/// A frame of which some lines have arrived in the staging buffer of a ring entry.
+/// A frame of which some lines have arrived.
 struct PartialFrame {
     slice: u32,
     image: u32,
-    /// Bytes that have arrived.
-    received: usize,
-}
-
-impl PartialFrame {
-    /// Its slice, its volume image, and its bytes that have arrived.
-    fn place(&self) -> (u32, u32, usize) {
-        (self.slice, self.image, self.received)
-    }
 }
 
 /// Consecutive slices in the staging buffer of a ring entry that are not submitted yet.
@@ -103,7 +96,7 @@ pub struct Renderer {
     ring: Vec<InFlight>,
     picture: Recorder,
     /// `None` if pictures stay on the device.
-    readback: Option<Buffer>,
+    readback: Option<Readback>,
     slots: SlotResources,
     steps: Vec<Arc<Pipeline>>,
     /// Started at its first use.
@@ -123,11 +116,14 @@ pub struct Renderer {
     /// The error that left the last change of scene incomplete.
     broken: Option<String>,
     /// Buffers of a single copy, kept until the device is done with them.
-    uploads: Vec<Buffer>,
+    uploads: Vec<Upload>,
+    unread: Vec<Readback>,
     volume_images: u32,
     ring_index: usize,
     /// The frame whose lines are arriving.
     partial: Option<PartialFrame>,
+    /// Its bytes that have arrived, in host memory: staging memory is slow to read, and a batch may be submitted before they are complete.
+    received: Vec<u8>,
     /// Frames that were dropped because another began before all of their lines had arrived.
     incomplete: u64,
     /// Slices that will be copied together.
@@ -186,6 +182,7 @@ impl Renderer {
             unprocessed: Vec::new(),
             broken: None,
             uploads: Vec::new(),
+            unread: Vec::new(),
             volume_images: options.volume_images.max(1),
             plan,
             filtered_bounds: scene.visible_bounds,
@@ -193,6 +190,7 @@ impl Renderer {
             scene,
             ring_index: 0,
             partial: None,
+            received: Vec::new(),
             incomplete: 0,
             batch: None,
             drawing: false,
@@ -278,17 +276,11 @@ impl Renderer {
 
     fn upload(&mut self, slot: Slot, copy: u32, bytes: &[u8]) -> Result<(), GpuError> {
         let Some(image) = self.slots.image(slot, copy) else { return Ok(()) };
-        let mut staging = Buffer::new(&self.context, "upload", slot.bytes(&self.scene), Purpose::Staging)?;
-        let length = bytes.len().min(staging.bytes().len());
-        staging.bytes_mut()[..length].copy_from_slice(&bytes[..length]);
+        let place = SlotParts { slot, copy, parts: 0..image.shape.parts() };
+        let upload = Upload::new(&self.context, "upload", image.layout(), place.parts.clone(), bytes)?;
         self.picture.begin(&mut self.barriers, &self.timelines)?;
-        self.picture.copy_in(
-            &mut self.barriers,
-            (&staging, BufferLayout::default()),
-            image,
-            SlotParts { slot, copy, parts: 0..image.shape.parts() },
-        );
-        self.uploads.push(staging);
+        self.picture.upload(&mut self.barriers, &upload, image, place);
+        self.uploads.push(upload);
         self.picture.submit(&mut self.barriers, &mut self.timelines)?;
         self.timelines.wait_all()?;
         self.uploads.clear();
@@ -425,7 +417,7 @@ impl Renderer {
                 self.stale.iter_mut().for_each(|stale| *stale = true);
                 self.invalidate_volumes();
                 if *rerun == Rerun::Everything {
-                    // Their bytes are in the ring that is replaced.
+                    // The next frames may have another size.
                     self.incomplete += u64::from(self.partial.take().is_some());
                     self.batch = None;
                     self.slots.clear();
@@ -452,17 +444,18 @@ impl Renderer {
     /// # Errors
     /// A device that fails; a failed change of scene.
     pub fn read(&mut self, slot: Slot) -> Result<Option<Texels>, GpuError> {
-        let there = self.bring_back(slot)?.map(|(buffer, size, format)| Texels::decode(size, format, buffer.bytes()));
+        let Some((readback, size, format)) = self.bring_back(slot)? else { return Ok(None) };
+        let part = Texels::decode(size, format, &readback.bytes()?);
         // What is not stored of a volume is what no pass would have written.
-        Ok(there.map(|part| part.with_outside(slot, &self.scene, 0.0)))
+        Ok(Some(part.with_outside(slot, &self.scene, 0.0)))
     }
 
     /// The current bytes of an image slot, its texels along x, y, z, and their format.
-    pub(super) fn bring_back(&mut self, slot: Slot) -> Result<Option<(Buffer, [usize; 3], Format)>, GpuError> {
+    pub(super) fn bring_back(&mut self, slot: Slot) -> Result<Option<(Readback, [usize; 3], Format)>, GpuError> {
         self.check(self.shown)?;
         self.flush()?;
         let Some(image) = self.slots.image(slot, self.shown) else { return Ok(None) };
-        let buffer = Buffer::new(&self.context, "read", slot.bytes(&self.scene), Purpose::Readback)?;
+        let buffer = Readback::new(&self.context, "read", image.shape, image.format.texel_bytes())?;
         let (format, size) = (image.format, image.shape.size());
         let copy = if slot.is_multibuffered() { self.shown } else { 0 };
         self.picture.collect(&self.timelines, &mut self.timings)?;
@@ -472,7 +465,7 @@ impl Renderer {
         let done = self.timelines.wait_all();
         if done.is_err() {
             // The copy may still be running: the buffer must outlive it.
-            self.uploads.push(buffer);
+            self.unread.push(buffer);
             return done.map(|()| None);
         }
         Ok(Some((buffer, size, format)))
@@ -556,8 +549,8 @@ fn frame_bytes(scene: &Scene) -> u64 {
     Slot::Frames.bytes(scene) / u64::from(FRAMES_IN_FLIGHT)
 }
 
-fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Buffer, GpuError> {
-    Buffer::new(context, "readback", Slot::Screen.bytes(scene), Purpose::Readback)
+fn readback(context: &Arc<Context>, scene: &Scene) -> Result<Readback, GpuError> {
+    Readback::new(context, "readback", Slot::Screen.shape(scene), Slot::Screen.format(scene).texel_bytes())
 }
 
 impl Drop for Renderer {

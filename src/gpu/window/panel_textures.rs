@@ -1,9 +1,11 @@
 //! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
+use crate::gpu::buffers::{Buffer, Purpose};
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
-use crate::gpu::resources::{self, Buffer, Purpose, WHOLE};
+use crate::gpu::memory::{self, Reserve};
+use crate::gpu::resources::WHOLE;
 use ash::vk;
 use egui::epaint::{ImageData, ImageDelta, Primitive};
 use egui_ash_renderer::Renderer;
@@ -134,7 +136,7 @@ impl PanelTextures {
             }
         };
         let mut staging = Buffer::new(&self.context, "panel texture", bytes.len() as u64, Purpose::Staging)?;
-        staging.bytes_mut().copy_from_slice(&bytes);
+        staging.write(0, &bytes);
         self.pending.push(Upload { texture: id, staging, at, size });
         Ok(())
     }
@@ -165,8 +167,9 @@ impl PanelTextures {
         };
         // SAFETY: the image was just made by this device.
         let needs = unsafe { device.get_image_memory_requirements(image) };
-        let allocation =
-            resources::allocate(&self.context, "panel texture", needs, MemoryLocation::GpuOnly, false, &operation)?;
+        let (name, location) = ("panel texture", MemoryLocation::GpuOnly);
+        let wanted = Reserve { name, requirements: needs, location, linear: false };
+        let allocation = memory::reserve(&self.context, wanted, &operation)?;
         // SAFETY: the allocation fits the requirements and lives as long as the image.
         let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
         texture.allocation = Some(allocation);
@@ -255,6 +258,9 @@ impl PanelTextures {
 impl Drop for PanelTextures {
     fn drop(&mut self) {
         self.textures.clear();
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: the owner waited for the device; null handles are allowed. The pool frees its sets.
         unsafe {
             self.context.device.destroy_descriptor_pool(self.sets, None);
@@ -266,11 +272,14 @@ impl Drop for PanelTextures {
 
 impl Drop for Texture {
     fn drop(&mut self) {
+        if self.context.is_given_up() {
+            return;
+        }
         // SAFETY: nothing drawn with the texture is in flight; null handles are allowed.
         unsafe {
             self.context.device.destroy_image_view(self.view, None);
             self.context.device.destroy_image(self.image, None);
         }
-        resources::free(&self.context, self.allocation.take());
+        memory::free(&self.context, self.allocation.take());
     }
 }

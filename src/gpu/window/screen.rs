@@ -15,7 +15,7 @@ use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time-out for acquiring an image of the window, ns. A window that is covered or unplugged may never provide one.
 const ACQUIRE_TIMEOUT_NS: u64 = 100_000_000;
@@ -50,6 +50,8 @@ pub struct Screen {
     free: vk::Semaphore,
     /// Signalled when the last drawing is done.
     done: vk::Fence,
+    /// When the last drawing was submitted.
+    submitted: Instant,
     context: Arc<Context>,
     /// The swapchain no longer matches the surface.
     stale: bool,
@@ -81,6 +83,7 @@ impl Screen {
             commands: vk::CommandBuffer::null(),
             free: vk::Semaphore::null(),
             done: vk::Fence::null(),
+            submitted: Instant::now(),
             context: context.clone(),
             stale: true,
             lost: false,
@@ -192,9 +195,7 @@ impl Screen {
 
     /// Waits for the last drawing.
     fn wait(&self) -> Result<(), GpuError> {
-        // SAFETY: the fence is alive; it is signalled, or a submission in flight will signal it.
-        unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
-            .context(|| "draw on the window".into())
+        self.context.wait_fence(self.done, self.submitted, "draw on the window")
     }
 
     /// Recreates what no longer matches the surface; false if nothing can be presented.
@@ -209,7 +210,7 @@ impl Screen {
         if !(self.stale || self.unused_acquire) {
             return Ok(true);
         }
-        self.context.wait_idle();
+        self.context.wait_idle()?;
         if self.unused_acquire {
             // SAFETY: the device is idle.
             unsafe {
@@ -307,7 +308,7 @@ impl Screen {
     }
 
     fn submit(
-        &self,
+        &mut self,
         drawn: vk::Semaphore,
         queued: Option<(&mut BarrierRecorder, &mut Timelines)>,
     ) -> Result<(), GpuError> {
@@ -333,6 +334,7 @@ impl Screen {
             .signal_semaphore_infos(&signals);
         // SAFETY: its last submission is done.
         unsafe { self.context.device.reset_fences(&[self.done]) }.context(|| "reset a fence".into())?;
+        self.submitted = Instant::now();
         let sent = self.context.submit(0, &submit, self.done, || "submit 'window'".into());
         if let Err(error) = sent {
             // No submission in flight would signal the fence.
@@ -341,8 +343,7 @@ impl Screen {
         }
         if let Some((barriers, timelines)) = queued {
             let timeline = timelines.of_mut(0);
-            timeline.submitted += 1;
-            timeline.label = "window".into();
+            timeline.advance("window");
             barriers.submitted(0, &after, timeline.submitted);
         }
         Ok(())
@@ -357,7 +358,13 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        self.context.wait_idle();
+        // A device that was lost is idle.
+        let _ = self.context.wait_idle();
+        if self.context.is_given_up() {
+            // egui's renderer would destroy what the device still uses.
+            std::mem::forget(self.overlay.take());
+            return;
+        }
         self.overlay = None;
         // SAFETY: the device is idle; null handles are allowed.
         unsafe {

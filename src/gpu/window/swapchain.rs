@@ -129,7 +129,7 @@ impl Swapchain {
 
     /// Replaces a lost surface by a new one on the same target.
     pub fn renew_surface(&mut self) -> Result<(), GpuError> {
-        self.context.wait_idle();
+        self.context.wait_idle()?;
         self.destroy();
         self.surface =
             self.target.surface(&self.context.entry, &self.context.instance, self.context.candidate.handle)?;
@@ -293,7 +293,13 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        self.context.wait_idle();
+        // A device that was lost is idle.
+        let _ = self.context.wait_idle();
+        if self.context.is_given_up() {
+            // The surface stays, and its window must outlive it.
+            std::mem::forget(self.target.clone());
+            return;
+        }
         self.destroy();
     }
 }

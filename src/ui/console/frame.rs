@@ -59,7 +59,8 @@ impl Console {
         self.take_statistics(now);
         let before = self.notes.len();
         self.notes.retain(|(until, _)| *until > now);
-        self.needs_redraw |= self.notes.len() != before || self.repaint_at.is_some_and(|at| at <= now);
+        let stall_ends = self.stall_shown_until.take_if(|until| *until <= now).is_some();
+        self.needs_redraw |= self.notes.len() != before || stall_ends || self.repaint_at.is_some_and(|at| at <= now);
         self.present(now)?;
         Ok(LoopRequest { wake_at: self.next_wake(now), ..std::mem::take(&mut self.request) })
     }
@@ -181,6 +182,7 @@ impl Console {
             self.frame_budget.rests_at(now),
             self.repaint_at,
             self.next_cine_step,
+            self.stall_shown_until,
             silence,
             statistics,
         ]
@@ -314,6 +316,11 @@ impl Console {
         if let Some(fault) = &self.shader_fault {
             let lines: Vec<&str> = fault.lines().take(MAX_SHADER_LINES).collect();
             return Some(banner("Shader error: the last good shader is shown", &lines.join("\n"), true));
+        }
+        if self.stall_shown_until.is_some() {
+            let text =
+                "It did not finish in time and was opened again. The volumes that arrived in between are not shown.";
+            return Some(banner("The graphics device stalled", text, true));
         }
         let is_silent = now.saturating_duration_since(self.last_arrival) >= SILENCE && !self.stream.is_frozen();
         match self.source.state() {

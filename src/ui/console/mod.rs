@@ -26,6 +26,8 @@ use std::time::{Duration, Instant};
 
 /// How long a note is shown.
 const NOTE_TIME: Duration = Duration::from_secs(5);
+/// How long the banner of a device that did not finish is shown.
+const STALL_TIME: Duration = Duration::from_secs(10);
 /// Interval of the checks whether a startup fault is resolved.
 const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
 /// Largest number of notes that are shown at once; the newest ones win.
@@ -174,6 +176,8 @@ pub struct Console {
     frames: u64,
     /// Faults of the device since the last picture.
     device_faults: u32,
+    /// The device did not finish and was opened again; a banner says so until then.
+    stall_shown_until: Option<Instant>,
     /// Since when there is no picture to show.
     blank_since: Option<Instant>,
     /// When the panels want to be drawn again.
@@ -253,6 +257,7 @@ impl Console {
             last_arrival: now,
             frames: 0,
             device_faults: 0,
+            stall_shown_until: None,
             blank_since: None,
             repaint_at: None,
             present_retry_at: None,
@@ -303,6 +308,11 @@ impl Console {
             Err(fault) => self.source_ended(Some(fault.to_string()), Instant::now()),
         }
         revived
+    }
+
+    /// Shows for a while that the device did not finish and was opened again.
+    pub fn show_stall(&mut self, now: Instant) {
+        (self.stall_shown_until, self.needs_redraw) = (Some(now + STALL_TIME), true);
     }
 
     /// Sets the size of the window, pixels; 0 while it is minimised.

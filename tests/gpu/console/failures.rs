@@ -95,6 +95,24 @@ fn a_lost_device_is_reported_and_the_next_one_shows_the_same() {
     }
 }
 
+/// Prevents a console that stands still with a device that does not finish.
+#[test]
+fn a_hung_device_is_given_up_and_the_next_one_shows_the_same() {
+    let (device, other) = (Device::impatient(), Device::new());
+    let mut desk = Desk::new(&device, options());
+    desk.begin();
+    let seen: Vec<_> = (0..2).map(|number| desk.live(number)).collect();
+    desk.press(Key::Space);
+    device.faults.hang(0);
+    desk.console.execute(&Command::Rotate([1.0, 0.0]), Instant::now());
+    let lost = desk.rest_or_lost().expect_err("given up");
+    assert!(matches!(&lost, ConsoleError::DeviceLost(error) if error.is_given_up()), "{lost}");
+    desk.console.execute(&Command::Reset, Instant::now());
+    desk.console.revive(&other, None).expect("made anew");
+    desk.rest();
+    assert!(desk.picture() == seen[1] && device.is_given_up());
+}
+
 /// Prevents a console that stays black because memory ran out at the wrong moment.
 #[test]
 fn running_out_of_memory_anywhere_is_recovered() {

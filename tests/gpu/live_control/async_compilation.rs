@@ -84,7 +84,7 @@ fn settings_too_large_for_the_device_are_reported_and_the_picture_stays() {
     // None of it may be allocated, or the machine would have to hold it.
     let scene = Scene::new(geometry, BYTES, large.clone()).expect("another device might hold it");
     let most = Plan::new(&scene).slots.iter().map(|slot| slot.bytes(&scene)).max().expect("slots");
-    assert!(most > device.candidate.max_bytes, "{most} of {}", device.candidate.max_bytes);
+    assert!(most > device.candidate.max_allocation, "{most} of {}", device.candidate.max_allocation);
     bench.stream.change(large).expect("told by the device alone");
     assert!(bench.settle().is_empty());
     assert!(bench.faults.len() == 1 && bench.faults[0].contains("4096"), "{:?}", bench.faults);

@@ -1,0 +1,237 @@
+//! Waits for the device that end. A driver can leave a submission unfinished for ever: a hung GPU, a lost interrupt, a virtual machine
+//! that was suspended. Waits are therefore short slices. Between two of them a deadline and a request to stop are looked at. A device that
+//! does not finish in time is *given up*: nothing waits for it again, and what was made from its context is leaked instead of destroyed,
+//! because Vulkan forbids to destroy what a submission still uses, and some drivers block in such a call or free memory that the device
+//! still writes.
+
+use super::error::{ErrorContext, GpuError};
+use ash::vk;
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Longest time without a look at the deadline and the request to stop. A signal is answered within two of them and [`STOP_GRACE`].
+const SLICE: Duration = Duration::from_millis(50);
+/// Time that a wait goes on after a request to stop: most work is done by then, and a command ends as usual.
+const STOP_GRACE: Duration = Duration::from_millis(400);
+/// The deadline of a GPU. A picture takes milliseconds there, a very large one less than a second.
+const GPU_DEADLINE: Duration = Duration::from_secs(5);
+
+/// Longest time that a device may take for a submission before it is given up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Deadline {
+    /// 5 s on a GPU; none on a software device, which may need minutes for a picture.
+    #[default]
+    ByDevice,
+    Never,
+    After(Duration),
+}
+
+impl Deadline {
+    /// The deadline on a device.
+    pub(super) fn on_device(self, is_software: bool) -> Option<Duration> {
+        match self {
+            Deadline::ByDevice => (!is_software).then_some(GPU_DEADLINE),
+            Deadline::Never => None,
+            Deadline::After(time) => Some(time),
+        }
+    }
+}
+
+/// Why a device was given up.
+#[derive(Clone, Copy, Debug)]
+enum GivenUp {
+    /// It did not finish in this time.
+    Late(Duration),
+    /// A stop was requested while it was busy.
+    Stopped,
+}
+
+impl GivenUp {
+    fn error(self, operation: String) -> GpuError {
+        match self {
+            GivenUp::Late(time) => GpuError::TimedOut { seconds: time.as_secs_f64(), operation },
+            GivenUp::Stopped => GpuError::Stopped { operation },
+        }
+    }
+}
+
+/// Watches the waits of a context.
+pub struct Watchdog {
+    deadline: Option<Duration>,
+    /// True once the program is to end.
+    stop: Option<fn() -> bool>,
+    given_up: Mutex<Option<GivenUp>>,
+}
+
+impl Watchdog {
+    pub fn new(deadline: Option<Duration>, stop: Option<fn() -> bool>) -> Watchdog {
+        Watchdog { deadline, stop, given_up: Mutex::default() }
+    }
+
+    /// True once the device was given up.
+    pub fn has_given_up(&self) -> bool {
+        self.given_up().is_some()
+    }
+
+    fn given_up(&self) -> Option<GivenUp> {
+        *self.given_up.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn give_up(&self, why: GivenUp, operation: impl FnOnce() -> String) -> GpuError {
+        let why = *self.given_up.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(why);
+        why.error(operation())
+    }
+
+    /// # Errors
+    /// The device was given up before.
+    pub fn check(&self, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
+        self.given_up().map_or(Ok(()), |why| Err(why.error(operation())))
+    }
+
+    /// Gives the device up if it has been busy since `since` for longer than the deadline.
+    ///
+    /// # Errors
+    /// The device is given up.
+    pub fn check_deadline(&self, since: Instant, operation: impl FnOnce() -> String) -> Result<(), GpuError> {
+        match self.deadline.filter(|deadline| since.elapsed() > *deadline) {
+            Some(deadline) => Err(self.give_up(GivenUp::Late(deadline), operation)),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits by `attempt`, which gets a time-out in ns and returns [`vk::Result::TIMEOUT`] after it. `since` says since when the device
+    /// has been busy without any progress.
+    ///
+    /// # Errors
+    /// The device is given up, because it is late or a stop was requested, or `attempt` fails.
+    pub fn wait(
+        &self,
+        operation: &dyn Fn() -> String,
+        since: impl Fn() -> Instant,
+        mut attempt: impl FnMut(u64) -> Result<(), vk::Result>,
+    ) -> Result<(), GpuError> {
+        let mut stop_seen: Option<Instant> = None;
+        loop {
+            self.check(operation)?;
+            match attempt(SLICE.as_nanos() as u64) {
+                Err(vk::Result::TIMEOUT) => self.check_deadline(since(), operation)?,
+                other => return other.context(operation),
+            }
+            if self.stop.is_some_and(|is_requested| is_requested())
+                && stop_seen.get_or_insert_with(Instant::now).elapsed() >= STOP_GRACE
+            {
+                return Err(self.give_up(GivenUp::Stopped, operation));
+            }
+        }
+    }
+
+    /// Fault injection: the device appears not to finish.
+    pub fn inject_lateness(&self, operation: impl FnOnce() -> String) -> GpuError {
+        self.give_up(GivenUp::Late(self.deadline.unwrap_or_default()), operation)
+    }
+}
+
+/// Since when a queue has been busy without progress. Submissions are done in their order.
+#[derive(Debug, Default)]
+pub struct Progress {
+    /// The number of each submission that was not seen done, and when it was made.
+    pending: VecDeque<(u64, Instant)>,
+    /// When a submission was last seen done.
+    advanced: Option<Instant>,
+}
+
+impl Progress {
+    /// Submission `number` was made.
+    pub fn submitted(&mut self, number: u64, now: Instant) {
+        self.pending.push_back((number, now));
+    }
+
+    /// All submissions up to `number` were seen done.
+    pub fn reached(&mut self, number: u64, now: Instant) {
+        let before = self.pending.len();
+        self.pending.retain(|(pending, _)| *pending > number);
+        if self.pending.len() < before {
+            self.advanced = Some(now);
+        }
+    }
+
+    /// The submission of the oldest work that is not done, or the last progress if that came later: what was submitted behind other work
+    /// has its full time from when that work is done. None without work.
+    pub fn busy_since(&self) -> Option<Instant> {
+        self.pending.front().map(|(_, made)| self.advanced.map_or(*made, |advanced| advanced.max(*made)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deadline_counts_from_a_submission_or_from_the_end_of_the_one_before() {
+        let (start, second) = (Instant::now(), Duration::from_secs(1));
+        let mut queue = Progress::default();
+        assert_eq!(queue.busy_since(), None);
+        queue.submitted(1, start);
+        queue.submitted(2, start + second);
+        assert_eq!(queue.busy_since(), Some(start));
+        queue.reached(0, start + 2 * second);
+        assert_eq!(queue.busy_since(), Some(start), "nothing was done");
+        queue.reached(1, start + 3 * second);
+        assert_eq!(queue.busy_since(), Some(start + 3 * second), "the second had to wait for the first");
+        queue.submitted(3, start + 4 * second);
+        queue.reached(2, start + 5 * second);
+        queue.reached(3, start + 6 * second);
+        assert_eq!(queue.busy_since(), None);
+        queue.submitted(4, start + 9 * second);
+        assert_eq!(queue.busy_since(), Some(start + 9 * second), "an idle queue is not late");
+    }
+
+    #[test]
+    fn a_late_device_is_given_up_for_good_and_a_punctual_one_is_not() {
+        let operation = || "draw".to_string();
+        let watchdog = Watchdog::new(Some(Duration::from_millis(120)), None);
+        let (begun, mut attempts) = (Instant::now(), 0);
+        let punctual = watchdog.wait(
+            &operation,
+            || begun,
+            |_| {
+                attempts += 1;
+                if attempts < 2 { Err(vk::Result::TIMEOUT) } else { Ok(()) }
+            },
+        );
+        assert!(punctual.is_ok() && attempts == 2 && !watchdog.has_given_up());
+        let never = |ns| {
+            std::thread::sleep(Duration::from_nanos(ns));
+            Err(vk::Result::TIMEOUT)
+        };
+        let late = watchdog.wait(&operation, || begun, never).expect_err("late");
+        assert!(matches!(&late, GpuError::TimedOut { seconds, operation } if *seconds == 0.12 && operation == "draw"));
+        assert!(late.is_device_lost() && watchdog.has_given_up());
+        let again = watchdog.wait(&operation, Instant::now, |_| panic!("nothing waits for it again"));
+        assert!(matches!(again, Err(GpuError::TimedOut { .. })));
+    }
+
+    #[test]
+    fn a_request_to_stop_ends_a_wait_that_has_no_deadline() {
+        let watchdog = Watchdog::new(None, Some(|| true));
+        let (begun, mut attempts) = (Instant::now(), 0);
+        let never = |ns| {
+            attempts += 1;
+            std::thread::sleep(Duration::from_nanos(ns));
+            Err(vk::Result::TIMEOUT)
+        };
+        let stopped = watchdog.wait(&|| "draw".into(), || begun, never).expect_err("stopped");
+        assert!(matches!(stopped, GpuError::Stopped { .. }), "{stopped}");
+        assert!(attempts > 1, "work that is nearly done is waited for");
+    }
+
+    #[test]
+    fn a_gpu_has_a_deadline_and_a_software_device_has_none() {
+        assert_eq!(Deadline::default().on_device(false), Some(Duration::from_secs(5)));
+        assert_eq!(Deadline::default().on_device(true), None);
+        assert_eq!(Deadline::Never.on_device(false), None);
+        let given = Duration::from_millis(300);
+        assert_eq!(Deadline::After(given).on_device(true), Some(given));
+    }
+}
