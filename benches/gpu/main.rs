@@ -53,7 +53,7 @@ fn all(run: Run) -> Result<(), String> {
     check_that_none_is_forgotten()?;
     let sizes = if run == Run::Bench { &FULL } else { &SMALL };
     let Ok(device) = std::env::var("ECHOLUME_DEVICE").map_or(Ok(DeviceChoice::Best), |name| name.parse());
-    let options = ContextOptions { device, validation: run == Run::Test };
+    let options = ContextOptions { device, validation: run == Run::Test, ..ContextOptions::default() };
     let context = Context::new(&options).map_err(|e| e.to_string())?;
     // Inputs are made on a context of their own: synchronization validation does not see that the host waits for a timeline,
     // so memory that one has read back from and the other then takes anew would look like a hazard.

@@ -1,5 +1,6 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
+use super::pipeline_folder::pipeline_folder;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError, TexelAccess, device_selection};
@@ -103,6 +104,11 @@ impl InputArgs {
             Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
             None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
+    }
+
+    /// The device that was asked for.
+    pub fn device(&self) -> Option<DeviceChoice> {
+        self.scene.device.clone()
     }
 
     /// The layers of settings before they are resolved.
@@ -227,8 +233,18 @@ impl SceneArgs {
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
 pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
-    let device = choice.unwrap_or(DeviceChoice::Best);
-    let context = Context::new(&ContextOptions { device, validation }).map_err(|e| match e {
+    let device = choice.unwrap_or_default();
+    open(&ContextOptions { device, validation, pipeline_cache: pipeline_folder(), ..ContextOptions::default() })
+}
+
+/// Like [`open_device`], for statistics of the compilation of pipelines: none of them comes from an earlier run.
+pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
+    let device = choice.unwrap_or_default();
+    open(&ContextOptions { device, compile_statistics: true, ..ContextOptions::default() })
+}
+
+fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {
+    let context = Context::new(options).map_err(|e| match e {
         GpuError::NoSuchDevice { .. } => input(e),
         e => failed(e),
     })?;

@@ -212,7 +212,10 @@ mod tests {
     fn a_software_device_gets_bands_after_it_was_lost() {
         assert_eq!(BandLimit::new(Bands::default(), true), None);
         assert!(BandLimit::new(Bands::Measured { losses: 1 }, true).is_some());
-        assert_eq!(BandLimit::new(Bands::Measured { losses: 99 }, true), Some(BandLimit::Time { target: LEAST_NS, losses: 99 }));
+        assert_eq!(
+            BandLimit::new(Bands::Measured { losses: 99 }, true),
+            Some(BandLimit::Time { target: LEAST_NS, losses: 99 })
+        );
     }
 
     #[test]

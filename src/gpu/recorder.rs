@@ -2,9 +2,10 @@
 
 use super::bands::{Band, BandLimit, Work};
 use super::context::Context;
+use super::descriptor_sets::DescriptorSets;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
-use super::pipelines::{DescriptorSets, Pipeline, descriptor_type};
+use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Buffer, Image, Purpose, Resource, SlotResources, WHOLE};
 use super::timeline::Timelines;
 use super::timing::{Stamps, TimeStamps, Timings};
@@ -347,11 +348,7 @@ impl Recorder {
                 (band.groups[i] * local[i]).min(extent[i].saturating_sub(from))
             });
             let share = invocations(size) as f64 / invocations(extent).max(1) as f64;
-            let work = Work {
-                time: pipeline.time.clone(),
-                expected: share * expected,
-                invocations: invocations(size),
-            };
+            let work = Work { time: pipeline.time.clone(), expected: share * expected, invocations: invocations(size) };
             self.barrier(barriers, &accesses);
             self.context.begin_label(self.commands, pass.name);
             self.context.loss.mark(self.commands, pass.name);

@@ -77,7 +77,7 @@ impl Verify {
     pub fn run(&self) -> Result<(), Failure> {
         if self.digest {
             let device = self.device.clone().unwrap_or(DeviceChoice::Best);
-            let context = context(&ContextOptions { device, validation: false })?;
+            let context = context(&ContextOptions { device, validation: false, ..ContextOptions::default() })?;
             say!("{}", verify::determinism::digest(&context).map_err(failed)?.trim_end());
             return Ok(());
         }
@@ -153,7 +153,12 @@ impl Verify {
     /// Opens the device, with validation if its layer is installed.
     fn open(&self, level: Level) -> Result<DeviceUnderTest, Failure> {
         let device = self.device.clone().unwrap_or(DeviceChoice::Best);
-        let with = |validation| DeviceUnderTest::new(&ContextOptions { device: device.clone(), validation }, level);
+        let with = |validation| {
+            DeviceUnderTest::new(
+                &ContextOptions { device: device.clone(), validation, ..ContextOptions::default() },
+                level,
+            )
+        };
         match with(!self.no_validation) {
             Err(GpuError::NoValidation) => with(false),
             made => made,

@@ -35,7 +35,8 @@ impl Device {
 
     /// `validation` false switches the layers off: they keep some memory for every object ever created.
     pub fn watched(validation: bool) -> Device {
-        let context = Context::new(&ContextOptions { device: chosen(), validation }).expect("a Vulkan device");
+        let context = Context::new(&ContextOptions { device: chosen(), validation, ..ContextOptions::default() })
+            .expect("a Vulkan device");
         Device { context, provoked: false }
     }
 

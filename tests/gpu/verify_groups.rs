@@ -18,7 +18,7 @@ fn bench() -> DeviceUnderTest {
 
 /// A bench with a fault in every context.
 fn prepared(wrong: Option<fn(&Context)>) -> DeviceUnderTest {
-    let options = ContextOptions { device: chosen(), validation: true };
+    let options = ContextOptions { device: chosen(), validation: true, ..ContextOptions::default() };
     DeviceUnderTest::prepared(&options, Level::Quick, wrong).expect("bench")
 }
 
@@ -227,7 +227,7 @@ fn a_renderer_unlike_a_fresh_one_is_detected_by_the_stress_check() {
 #[test]
 fn validation_counts_only_if_it_notices_a_dropped_barrier() {
     for validation in [true, false] {
-        let options = ContextOptions { device: chosen(), validation };
+        let options = ContextOptions { device: chosen(), validation, ..ContextOptions::default() };
         let mut bench = DeviceUnderTest::new(&options, Level::Quick).expect("bench");
         assert_eq!(bench.prove_validation().expect("a device"), validation);
         assert_eq!(bench.watched(), validation);
