@@ -53,6 +53,7 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         self.needs_redraw |= shader_fault != self.shader_fault;
         self.shader_fault = shader_fault;
@@ -181,6 +182,7 @@ impl Console {
             self.frame_budget.rests_at(now),
             self.repaint_at,
             self.next_cine_step,
+            self.warms_at(now),
             silence,
             statistics,
         ]
