@@ -100,10 +100,15 @@ mod tests {
 
     #[test]
     fn an_allocation_over_the_budget_of_each_of_its_heaps_is_refused_with_the_numbers() {
-        let check = |needed: u64, types, required, reserve| budget().check(|| "volume".into(), needed, types, required, reserve);
+        let check = |needed: u64, types, required, reserve| {
+            budget().check(|| "volume".into(), needed, types, required, reserve)
+        };
         assert!(check(1 << 30, 0b001, OWN, 0).is_ok());
         let line = check((1 << 30) + 1, 0b001, OWN, 0).unwrap_err().to_string();
-        assert_eq!(line, "volume: needs 1025 MiB, the budget of this device's memory is 4096 MiB, of which 3072 MiB are used");
+        assert_eq!(
+            line,
+            "volume: needs 1025 MiB, the budget of this device's memory is 4096 MiB, of which 3072 MiB are used"
+        );
         assert!(check((1 << 30) + 1, 0b001, OWN, 1).is_ok(), "it fits into what is allocated already");
         assert!(check(5 << 30, 0b011, vk::MemoryPropertyFlags::empty(), 0).is_ok(), "the other heap has room");
         assert!(check(5 << 30, 0b101, HOST, 0).is_err());

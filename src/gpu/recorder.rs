@@ -380,7 +380,13 @@ impl Recorder {
                 }
                 // SAFETY: everything the pipeline's layout names was bound, and it allows a base; extents are within limits checked with
                 // the formats.
-                unsafe { device.cmd_dispatch_base(commands, x, y, z, wide, high, deep) };
+                unsafe {
+                    match band.base {
+                        // Synchronization validation of older layers (1.3.239) ignores dispatches with a base.
+                        [0, 0, 0] => device.cmd_dispatch(commands, wide, high, deep),
+                        _ => device.cmd_dispatch_base(commands, x, y, z, wide, high, deep),
+                    }
+                }
             }
         };
         match (&mut self.stamps, self.time_stamps) {

@@ -71,7 +71,8 @@ pub(super) fn allocate(
             MemoryLocation::GpuOnly => vk::MemoryPropertyFlags::DEVICE_LOCAL,
             _ => vk::MemoryPropertyFlags::HOST_VISIBLE,
         };
-        let check = |reserve| budget.check(operation, requirements.size, requirements.memory_type_bits, required, reserve);
+        let check =
+            |reserve| budget.check(operation, requirements.size, requirements.memory_type_bits, required, reserve);
         // What is allocated and free is only added up where it decides.
         if check(0).is_err() {
             let report = allocator.generate_report();

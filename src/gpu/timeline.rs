@@ -47,9 +47,7 @@ impl Timeline {
             Err(vk::Result::TIMEOUT) => {
                 Err(GpuError::TimedOut { seconds: TIMEOUT_SECONDS, operation: self.label.clone() })
             }
-            other => {
-                other.context(|| format!("run {}", self.label)).map_err(|error| self.context.explain(error))
-            }
+            other => other.context(|| format!("run {}", self.label)).map_err(|error| self.context.explain(error)),
         }
     }
 

@@ -261,14 +261,7 @@ impl Timings {
     pub fn new(context: &Arc<Context>, spans: bool) -> Timings {
         let spans = spans.then(|| {
             let (began, monotonic) = context.clocks_now();
-            SpanLog {
-                context: context.clone(),
-                list: Vec::new(),
-                began,
-                monotonic,
-                anchor: (0, 0.0),
-                deviation: None,
-            }
+            SpanLog { context: context.clone(), list: Vec::new(), began, monotonic, anchor: (0, 0.0), deviation: None }
         });
         Timings { times: Vec::new(), untimed: 0, spans }
     }

@@ -64,8 +64,13 @@ fn renderer(device: &Device, scene: &Scene, options: &RendererOptions) -> Render
     renderer
 }
 
+/// The bits of the values in each slot.
+type Contents = Vec<(Slot, Vec<u64>)>;
+/// Passes with their invocations.
+type Dispatched = Vec<(&'static str, [u32; 3])>;
+
 /// All that the passes over volume and picture left, by slot, and the dispatches that made it.
-fn made(renderer: &mut Renderer) -> (Vec<(Slot, Vec<u64>)>, Vec<(&'static str, [u32; 3])>) {
+fn made(renderer: &mut Renderer) -> (Contents, Dispatched) {
     let dispatched = renderer.dispatch_extents(|r| r.picture()).expect("picture");
     let slots = renderer.plan().slots.clone();
     let read = slots.into_iter().filter_map(|slot| {
@@ -153,8 +158,13 @@ fn each_band_is_a_submission_and_all_are_ordered() {
         let options = RendererOptions { bands, queues: Some(queues), log: true, ..Default::default() };
         let mut renderer = renderer(&device, &scene, &options);
         let submitted = renderer.log().expect("log").submissions.len();
-        let steps: Vec<_> =
-            renderer.plan().steps.iter().filter(|s| s.pass.frequency != Frequency::Frame).map(|s| s.pass.name).collect();
+        let steps: Vec<_> = renderer
+            .plan()
+            .steps
+            .iter()
+            .filter(|s| s.pass.frequency != Frequency::Frame)
+            .map(|s| s.pass.name)
+            .collect();
         renderer.take_times().expect("idle");
         let dispatched = renderer.dispatch_extents(|r| r.picture()).expect("picture");
         let times = renderer.take_times().expect("times");

@@ -55,7 +55,11 @@ fn an_allocation_over_the_memory_budget_is_refused_before_it_is_made() {
     let error = Renderer::new(&device, small(), &RendererOptions { volume_images: 3, ..Default::default() });
     assert!(error.is_ok(), "each of its allocations is below the budget");
     drop(error);
-    let large = scene(Geometry::Sweep(wobbler()), BYTES, "mode = 'mip'\npicture = { size = [2048, 2048] }");
+    let large = scene(
+        Geometry::Sweep(wobbler()),
+        BYTES,
+        "mode = 'mip'\npicture = { size = [2048, 2048] }\nslices = { pixels = 40 }",
+    );
     let before = device.allocated();
     let options = RendererOptions { readback: false, ..RendererOptions::default() };
     let error = Renderer::new(&device, large, &options).err().expect("over the budget");

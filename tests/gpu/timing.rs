@@ -117,7 +117,10 @@ fn a_live_picture_has_two_stamps_a_command_buffer() {
     }
     let times = renderer.take_times().expect("times");
     let names: Vec<_> = times.iter().map(|t| t.name).collect();
-    assert!(names.iter().all(|name| ["picture", "frame", "copy"].contains(name)) && names.contains(&"frame"), "{names:?}");
+    assert!(
+        names.iter().all(|name| ["picture", "frame", "copy"].contains(name)) && names.contains(&"frame"),
+        "{names:?}"
+    );
     // The last submission of each recorder is always timed.
     assert!(times.iter().any(|t| t.name == "picture" && t.total > 0.0), "{times:?}");
     let mut untimed = timed(&device, TimeStamps::None);

@@ -1,7 +1,6 @@
 //! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
 //! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
 
-use super::screen::failed;
 use crate::gpu::context::Context;
 use crate::gpu::error::{ErrorContext, GpuError};
 use crate::gpu::resources::{self, Buffer, Purpose, WHOLE};
@@ -54,6 +53,16 @@ struct Upload {
     size: [u32; 2],
 }
 
+/// An error of the library that draws the panels.
+pub(super) fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
+    match error {
+        egui_ash_renderer::RendererError::Vulkan(result) => {
+            GpuError::Vulkan { operation: "draw the panels".into(), result }
+        }
+        other => GpuError::Window(format!("the panels cannot be drawn: {other}")),
+    }
+}
+
 impl PanelTextures {
     pub(super) fn new(context: &Arc<Context>) -> Result<PanelTextures, GpuError> {
         let device = &context.device;
@@ -67,10 +76,8 @@ impl PanelTextures {
             in_flight: Vec::new(),
             freed: Vec::new(),
         };
-        let sizes = [vk::DescriptorPoolSize {
-            ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-            descriptor_count: MAX_TEXTURES,
-        }];
+        let sizes =
+            [vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: MAX_TEXTURES }];
         let pool = vk::DescriptorPoolCreateInfo::default()
             .pool_sizes(&sizes)
             .max_sets(MAX_TEXTURES)
@@ -171,8 +178,8 @@ impl PanelTextures {
             .subresource_range(WHOLE);
         // SAFETY: the image is bound to memory and alive.
         texture.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
-        texture.set = create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler)
-            .map_err(failed)?;
+        texture.set =
+            create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler).map_err(failed)?;
         texture.drawn_as = renderer.add_user_texture(texture.set);
         self.context.name(image, "panel texture");
         Ok(texture)

@@ -1,7 +1,7 @@
 //! Presents a picture and panels: copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
 //! and a few triangles take little time compared with a picture.
 
-use super::panel_textures::PanelTextures;
+use super::panel_textures::{PanelTextures, failed};
 use super::swapchain::{PresentMode, Swapchain};
 use super::target::{MonitorChoice, Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
@@ -473,15 +473,6 @@ impl Drop for Panels {
 struct Overlay {
     renderer: Renderer<DefaultAllocator>,
     textures: PanelTextures,
-}
-
-pub(super) fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
-    match error {
-        egui_ash_renderer::RendererError::Vulkan(result) => {
-            GpuError::Vulkan { operation: "draw the panels".into(), result }
-        }
-        other => GpuError::Window(format!("the panels cannot be drawn: {other}")),
-    }
 }
 
 impl Overlay {

@@ -117,7 +117,11 @@ impl Swapchain {
         .context(|| "list the formats of the surface".into())?;
         let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         let found = choose(&there, |format| self.context.format_features(format).contains(needed));
-        let found = found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))?;
+        let found = found.ok_or_else(|| {
+            GpuError::Window(
+                "the surface supports no UNORM format of 8 or 10 bits that pictures can be copied to".into(),
+            )
+        })?;
         // Pictures are made with as many bits from the next change of the scene on.
         self.context.is_deep.store(DEEP.contains(&found), Ordering::Relaxed);
         Ok(found)
