@@ -1,5 +1,6 @@
 //! Arguments of commands that render a recording: the recording, the settings of the scene in layers, the device, and checks of outputs.
 
+use super::pipeline_folder::pipeline_folder;
 use crate::files::signals;
 use crate::files::{check_target, replace};
 use crate::gpu::context::list;
@@ -104,6 +105,11 @@ impl InputArgs {
             Some(file) => source::open(file, self.probe.as_deref()).map_err(input),
             None => Ok(Box::new(PhantomSource::new(Phantom::new(phantom::PhantomOptions::default()).map_err(input)?))),
         }
+    }
+
+    /// The device that was asked for.
+    pub fn device(&self) -> Option<DeviceChoice> {
+        self.scene.device.clone()
     }
 
     /// The layers of settings before they are resolved.
@@ -239,13 +245,31 @@ impl SceneArgs {
     /// Opens the chosen device and prints its name. A signal that is held ends its waits.
     pub fn open_device(&self, validation: bool) -> Result<Arc<Context>, Failure> {
         let (device, deadline) = (self.device.clone().unwrap_or_default(), self.deadline()?);
-        open(&ContextOptions { device, validation, deadline, stop: Some(|| signals::received().is_some()) })
+        open(&ContextOptions {
+            device,
+            validation,
+            deadline,
+            stop: Some(|| signals::received().is_some()),
+            pipeline_cache: pipeline_folder(),
+            ..ContextOptions::default()
+        })
     }
 }
 
 /// Opens the chosen device, or the best one, and prints its name on one line.
 pub fn open_device(choice: Option<DeviceChoice>, validation: bool) -> Result<Arc<Context>, Failure> {
-    open(&ContextOptions { device: choice.unwrap_or_default(), validation, ..ContextOptions::default() })
+    open(&ContextOptions {
+        device: choice.unwrap_or_default(),
+        validation,
+        pipeline_cache: pipeline_folder(),
+        ..ContextOptions::default()
+    })
+}
+
+/// Like [`open_device`], for statistics of the compilation of pipelines: none of them comes from an earlier run.
+pub fn open_device_for_statistics(choice: Option<DeviceChoice>) -> Result<Arc<Context>, Failure> {
+    let device = choice.unwrap_or_default();
+    open(&ContextOptions { device, compile_statistics: true, ..ContextOptions::default() })
 }
 
 fn open(options: &ContextOptions) -> Result<Arc<Context>, Failure> {

@@ -1,6 +1,6 @@
 //! The configuration of a view: device, window and console, from flags or from a configuration file.
 
-use crate::args::{SceneArgs, SourceArgs};
+use crate::args::{SceneArgs, SourceArgs, pipeline_folder};
 use crate::error_report::command::read_report;
 use crate::gpu::window::{MonitorChoice, PresentMode};
 use crate::gpu::{Context, ContextOptions, GpuError, Wake};
@@ -30,7 +30,7 @@ pub struct WindowConfig {
 impl WindowConfig {
     /// The default: the best device, a window of [`DEFAULT_SIZE`].
     pub fn usual() -> WindowConfig {
-        let device = ContextOptions::default();
+        let device = ContextOptions { pipeline_cache: pipeline_folder(), ..ContextOptions::default() };
         let (monitor, present_mode, time) = (None, PresentMode::Fifo, None);
         let direct = None;
         WindowConfig {

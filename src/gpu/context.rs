@@ -6,6 +6,7 @@ use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
 use super::lost_device::LossReporting;
+use super::pipeline_cache::PipelineCache;
 use super::validation::{self, Layer, Messenger};
 use super::watchdog::{Deadline, Watchdog};
 use super::window::target::Target;
@@ -14,6 +15,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::CString;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -30,6 +32,11 @@ pub struct ContextOptions {
     /// Asked during every wait for the device. Once it returns true, the wait ends after less than a second, and the device is given up
     /// if it is still busy.
     pub stop: Option<fn() -> bool>,
+    /// The folder in which compiled pipelines are kept for the next run; `None` keeps none.
+    pub pipeline_cache: Option<PathBuf>,
+    /// Pipelines can be asked for the driver's statistics of their compilation, if the device has
+    /// VK_KHR_pipeline_executable_properties.
+    pub compile_statistics: bool,
 }
 
 /// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
@@ -52,6 +59,9 @@ pub struct Context {
     /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
+    /// With [`ContextOptions::compile_statistics`], if the device has them.
+    pub(super) executables: Option<ash::khr::pipeline_executable_properties::Device>,
+    pub(super) pipeline_cache: PipelineCache,
     /// Reports why the device was lost.
     pub(super) loss: LossReporting,
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
@@ -166,7 +176,8 @@ impl Context {
             candidates.iter_mut().for_each(|candidate| target.check_support(&entry, instance, candidate));
         }
         let candidate = candidates[device_selection::choose(&candidates, &options.device)?].clone();
-        let device = create_device(instance, &candidate, target.is_some())?;
+        let has_statistics = options.compile_statistics && candidate.compile_statistics;
+        let device = create_device(instance, &candidate, target.is_some(), has_statistics)?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -199,6 +210,9 @@ impl Context {
             clock: (candidate.calibrated_timestamps)
                 .then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
+            executables: has_statistics
+                .then(|| ash::khr::pipeline_executable_properties::Device::new(instance, &device)),
+            pipeline_cache: PipelineCache::open(&device, &candidate.driver_identity, options.pipeline_cache.as_deref()),
             loss: LossReporting {
                 faults: candidate.device_fault.then(|| ash::ext::device_fault::Device::new(instance, &device)),
                 checkpoints: (candidate.checkpoints)
@@ -475,6 +489,8 @@ impl Drop for Context {
             std::mem::forget(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
             return;
         }
+        self.pipeline_cache.store(&self.device);
+        self.pipeline_cache.destroy(&self.device);
         // SAFETY: everything made from this context held an `Arc` of it and is gone. The order is the one of creation reversed.
         unsafe {
             drop(self.allocator.lock().unwrap_or_else(|e| e.into_inner()).take());
@@ -528,8 +544,14 @@ fn create_instance(
     }
 }
 
-/// `presents`: the device will present pictures with panels drawn over them.
-fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool) -> Result<ash::Device, GpuError> {
+/// `presents`: the device will present pictures with panels drawn over them. `has_statistics`: pipelines will be asked for statistics of
+/// their compilation.
+fn create_device(
+    instance: &ash::Instance,
+    candidate: &Candidate,
+    presents: bool,
+    has_statistics: bool,
+) -> Result<ash::Device, GpuError> {
     let priorities = [1.0; MAX_QUEUES];
     let families: BTreeSet<u32> = candidate.queues.iter().map(|q| q.family).collect();
     let queues: Vec<_> = families
@@ -543,6 +565,7 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
     extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     extensions.extend(presents.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    extensions.extend(has_statistics.then_some(ash::khr::pipeline_executable_properties::NAME.as_ptr()));
     extensions.extend(candidate.budget.is_some().then_some(ash::ext::memory_budget::NAME.as_ptr()));
     extensions.extend(candidate.device_fault.then_some(ash::ext::device_fault::NAME.as_ptr()));
     extensions.extend(candidate.checkpoints.then_some(ash::nv::device_diagnostic_checkpoints::NAME.as_ptr()));
@@ -562,6 +585,8 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
         .synchronization2(true)
         .maintenance4(true)
         .dynamic_rendering(presents);
+    let mut executables =
+        vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
     let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
     let mut present_id = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
     let mut present_wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
@@ -571,6 +596,9 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
         .enabled_features(&core)
         .push_next(&mut v12)
         .push_next(&mut v13);
+    if has_statistics {
+        create = create.push_next(&mut executables);
+    }
     if candidate.device_fault {
         create = create.push_next(&mut fault);
     }

@@ -2,6 +2,7 @@
 
 use super::budget::MemoryBudget;
 use super::error::GpuError;
+use super::pipeline_cache::DriverIdentity;
 use ash::vk;
 use std::borrow::Cow;
 use std::ffi::CStr;
@@ -48,8 +49,12 @@ pub struct Candidate {
     pub push_descriptors: bool,
     /// Can count shader invocations.
     pub pipeline_statistics: bool,
+    /// Can tell statistics of the compilation of pipelines.
+    pub compile_statistics: bool,
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
+    /// What its pipelines may be loaded by.
+    pub driver_identity: DriverIdentity,
     /// Reports when a picture is on the monitor.
     pub present_wait: bool,
     /// Reports why it was lost.
@@ -192,6 +197,12 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
     if !push_descriptors {
         missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
     }
+    let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    if has(ash::khr::pipeline_executable_properties::NAME) {
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut executables);
+        // SAFETY: as above.
+        unsafe { instance.get_physical_device_features2(handle, &mut features) };
+    }
     // SAFETY: as above.
     let pipeline_statistics =
         unsafe { instance.get_physical_device_features(handle) }.pipeline_statistics_query == vk::TRUE;
@@ -244,7 +255,14 @@ fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalD
         reads_monotonic,
         push_descriptors,
         pipeline_statistics,
+        compile_statistics: executables.pipeline_executable_info == vk::TRUE,
         can_present,
+        driver_identity: DriverIdentity {
+            vendor: properties.vendor_id,
+            device: properties.device_id,
+            driver_version: properties.driver_version,
+            uuid: properties.pipeline_cache_uuid,
+        },
         present_wait,
         device_fault,
         checkpoints,
@@ -348,7 +366,9 @@ mod tests {
             reads_monotonic: true,
             push_descriptors: true,
             pipeline_statistics: true,
+            compile_statistics: true,
             can_present: true,
+            driver_identity: DriverIdentity::default(),
             present_wait: true,
             device_fault: true,
             checkpoints: true,

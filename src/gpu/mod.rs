@@ -3,7 +3,9 @@
 //! - `context` owns instance, device, queues and allocator; `device_selection` picks the device; `faults` injects faults.
 //! - `resources` are images and the slots of a scene, `buffers` what is uploaded and read back, `memory` where both lie, `formats` what
 //!   the device can do with them.
-//! - `pipelines` compiles shaders, also on its own thread, `shader_reload` takes them from a folder that is watched.
+//! - `pipelines` compiles shaders, `pipeline_compiler` on a thread of its own, `pipeline_measure` to measure that; `pipeline_cache` keeps
+//!   what was compiled on disk; `shader_reload` takes shaders from a folder that is watched. `descriptor_sets` are for devices without push
+//!   descriptors.
 //! - `recorder` records command buffers with their barriers and the time stamps of `timing`; `timeline` says when a submission is done,
 //!   and `watchdog` gives up a device that does not finish. `bands` divides dispatches that a driver's watchdog might end.
 //! - `lost_device` reports why a device was lost, `budget` how much memory it has left.
@@ -14,6 +16,7 @@ mod bands;
 pub mod budget;
 mod buffers;
 pub mod context;
+mod descriptor_sets;
 pub(crate) mod device_selection;
 pub(crate) mod error;
 pub mod faults;
@@ -21,6 +24,9 @@ pub(crate) mod formats;
 pub mod lost_device;
 mod memory;
 pub mod pass_runner;
+mod pipeline_cache;
+mod pipeline_compiler;
+pub mod pipeline_measure;
 mod pipelines;
 mod recorder;
 mod renderer;
@@ -37,7 +43,8 @@ pub use context::{Context, ContextOptions};
 pub use device_selection::{Candidate, DeviceChoice};
 pub use error::GpuError;
 pub use formats::TexelAccess;
-pub use pipelines::{Shaders, Wake};
+pub use pipeline_compiler::{SceneMaker, Wake};
+pub use pipelines::Shaders;
 pub use renderer::{Renderer, RendererOptions};
 pub use timing::TimeStamps;
 pub use watchdog::Deadline;

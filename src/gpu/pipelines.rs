@@ -1,5 +1,5 @@
-//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants; a thread that
-//! compiles them in the background, so that drawing goes on meanwhile; and their descriptor sets.
+//! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants. All that a plan
+//! lacks are compiled at the same time, one a core.
 
 use super::bands::InvocationTime;
 use super::buffers::has_texels;
@@ -12,11 +12,11 @@ use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::spirv::{self, Kind, Module};
 use ash::vk;
+use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 /// A compute pipeline and its layout.
 pub struct Pipeline {
@@ -27,12 +27,28 @@ pub struct Pipeline {
     pub set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
+    /// What its compilation took, and whether it came from a pipeline cache; `None` if the driver does not say.
+    pub compilation: (Duration, Option<bool>),
     /// The time of an invocation, as its last dispatches took.
     pub time: Arc<InvocationTime>,
 }
 
 /// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
-type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+pub type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
+
+/// What a pipeline is compiled from: SPIR-V as the device gets it, what it declares, and constants by name.
+pub struct Prepared {
+    pub words: Vec<u32>,
+    pub module: Module,
+    pub constants: Vec<(&'static str, i32)>,
+}
+
+/// How a pipeline is compiled.
+#[derive(Clone, Copy)]
+pub struct Compile {
+    pub cache: vk::PipelineCache,
+    pub flags: vk::PipelineCreateFlags,
+}
 
 /// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
@@ -82,13 +98,19 @@ impl Pipelines {
         Ok(Pipelines { context: context.clone(), made: Mutex::default(), shaders, texel_access, sampler })
     }
 
-    fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
+    /// What tells the pipeline of a pass in a scene from others.
+    pub fn key(pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Key {
         let formats = pass.reads(scene, args).iter().map(|b| b.slot.format(scene)).collect();
         (pass.shader(scene, args), (pass.constants)(scene, args), formats)
     }
 
-    fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
+    /// The pipeline of a key, if it is compiled.
+    pub fn cached(&self, key: &Key) -> Option<Arc<Pipeline>> {
         self.made.lock().unwrap_or_else(|e| e.into_inner()).get(key).cloned()
+    }
+
+    pub fn context(&self) -> &Arc<Context> {
+        &self.context
     }
 
     /// The pipeline of a pass in a scene, compiled at its first use.
@@ -106,11 +128,23 @@ impl Pipelines {
         Ok(pipeline)
     }
 
+    /// The pipelines of a plan, by step. Those that are missing are compiled at the same time.
+    ///
+    /// # Errors
+    /// As of [`Pipelines::get`]: the first of the plan that fails. Those that were compiled are kept.
+    pub fn of_plan(&self, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let steps = self.complete(&mut made, plan, scene);
+        // The background compiler may have added others meanwhile.
+        self.made.lock().unwrap_or_else(|e| e.into_inner()).extend(made);
+        steps
+    }
+
     /// Compiles the pipelines of a plan again that use `shaders`, and forgets all others that do. Returns the pipelines of the plan, by
     /// step. The device must have finished with the previous pipelines, and no other thread may compile any.
     ///
     /// # Errors
-    /// As of [`Pipelines::get`]; the previous pipelines stay.
+    /// As of [`Pipelines::of_plan`]; the previous pipelines stay.
     pub(super) fn recompile(
         &self,
         shaders: &HashSet<String>,
@@ -119,22 +153,51 @@ impl Pipelines {
     ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
         let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner()).clone();
         made.retain(|key, _| !shaders.contains(key.0));
-        let mut steps = Vec::with_capacity(plan.steps.len());
-        for step in &plan.steps {
-            let args = step.args();
-            let key = Pipelines::key(step.pass, scene, &args);
-            let pipeline = match made.get(&key) {
-                Some(pipeline) => pipeline.clone(),
-                None => self.make(&key, step.pass, scene, &args)?,
-            };
-            made.insert(key, pipeline.clone());
-            steps.push(pipeline);
-        }
+        let steps = self.complete(&mut made, plan, scene)?;
         *self.made.lock().unwrap_or_else(|e| e.into_inner()) = made;
         Ok(steps)
     }
 
+    /// Adds the pipelines of a plan to `made`, and returns them by step.
+    fn complete(
+        &self,
+        made: &mut HashMap<Key, Arc<Pipeline>>,
+        plan: &Plan,
+        scene: &Scene,
+    ) -> Result<Vec<Arc<Pipeline>>, GpuError> {
+        let keys: Vec<Key> = plan.steps.iter().map(|step| Pipelines::key(step.pass, scene, &step.args())).collect();
+        let mut asked = HashSet::new();
+        let missing: Vec<usize> =
+            (0..keys.len()).filter(|i| !made.contains_key(&keys[*i]) && asked.insert(&keys[*i])).collect();
+        let compile = |&i: &usize| self.make(&keys[i], plan.steps[i].pass, scene, &plan.steps[i].args());
+        let compiled: Vec<Result<_, GpuError>> = missing.par_iter().map(compile).collect();
+        let mut fault = None;
+        for (i, pipeline) in missing.into_iter().zip(compiled) {
+            match pipeline {
+                Ok(pipeline) => drop(made.insert(keys[i].clone(), pipeline)),
+                Err(error) => drop(fault.get_or_insert(error)),
+            }
+        }
+        match fault {
+            Some(error) => Err(error),
+            None => Ok(keys.iter().filter_map(|key| made.get(key).cloned()).collect()),
+        }
+    }
+
     fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
+        let prepared = self.prepare(key, pass, scene, args)?;
+        let cache = &self.context.pipeline_cache;
+        let how = Compile { cache: cache.handle(), flags: vk::PipelineCreateFlags::empty() };
+        let pipeline = self.compile(key.0, prepared, how)?;
+        cache.used(pipeline.compilation.1);
+        Ok(Arc::new(pipeline))
+    }
+
+    /// What the pipeline of a pass in a scene is compiled from.
+    ///
+    /// # Errors
+    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    pub fn prepare(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Prepared, GpuError> {
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
@@ -148,8 +211,15 @@ impl Pipelines {
         self.context.faults.words(pass.name, &mut words).map_err(at_fault)?;
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
-        let constants = self.context.faults.constants(pass.name, &key.1);
-        Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module).map(Arc::new)
+        Ok(Prepared { words, module, constants: self.context.faults.constants(pass.name, &key.1) })
+    }
+
+    /// Compiles a pipeline without keeping it.
+    ///
+    /// # Errors
+    /// The driver refuses the shader, or memory runs out.
+    pub fn compile(&self, name: &'static str, prepared: Prepared, how: Compile) -> Result<Pipeline, GpuError> {
+        Pipeline::new(&self.context, self.sampler, name, prepared, how)
     }
 }
 
@@ -169,10 +239,10 @@ impl Pipeline {
         context: &Arc<Context>,
         sampler: vk::Sampler,
         name: &'static str,
-        constants: &[(&'static str, i32)],
-        words: &[u32],
-        module: Module,
+        prepared: Prepared,
+        how: Compile,
     ) -> Result<Pipeline, GpuError> {
+        let Prepared { words, module, constants } = prepared;
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
         let bindings: Vec<_> = module
@@ -201,6 +271,7 @@ impl Pipeline {
             set_layout,
             layout: vk::PipelineLayout::null(),
             handle: vk::Pipeline::null(),
+            compilation: (Duration::ZERO, None),
             time: Arc::default(),
         };
         let layouts = [set_layout];
@@ -210,7 +281,7 @@ impl Pipeline {
         context.name(set_layout, name);
         context.name(pipeline.layout, name);
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
-        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
+        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(operation)?;
         context.name(shader, name);
         let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())
@@ -228,19 +299,28 @@ impl Pipeline {
             .module(shader)
             .name(c"main")
             .specialization_info(&specialization);
+        let mut feedback = vk::PipelineCreationFeedback::default();
+        let mut feedbacks = vk::PipelineCreationFeedbackCreateInfo::default().pipeline_creation_feedback(&mut feedback);
         let create = vk::ComputePipelineCreateInfo::default()
             // Dispatches in bands begin at another workgroup than the first.
-            .flags(vk::PipelineCreateFlags::DISPATCH_BASE)
+            .flags(how.flags | vk::PipelineCreateFlags::DISPATCH_BASE)
             .stage(stage)
-            .layout(pipeline.layout);
-        // SAFETY: as above; the shader module is alive until after the call.
-        let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
+            .layout(pipeline.layout)
+            .push_next(&mut feedbacks);
+        let begun = Instant::now();
+        // SAFETY: as above; the shader module is alive until after the call, and the cache is of this device.
+        let made = unsafe { device.create_compute_pipelines(how.cache, &[create], None) };
+        let took = begun.elapsed();
         context.counts.pipelines.fetch_add(1, Ordering::Relaxed);
         // SAFETY: a shader module may be destroyed once its pipelines are made.
         unsafe { device.destroy_shader_module(shader, None) };
         pipeline.handle = made.map_err(|(_, result)| result).context(operation)?[0];
         context.name(pipeline.handle, name);
-        tracing::debug!("pipeline '{name}' {constants:?}");
+        let has = |flag| feedback.flags.contains(flag);
+        let hit = has(vk::PipelineCreationFeedbackFlags::VALID)
+            .then(|| has(vk::PipelineCreationFeedbackFlags::APPLICATION_PIPELINE_CACHE_HIT));
+        pipeline.compilation = (took, hit);
+        tracing::debug!("pipeline '{name}' {constants:?}: {:.1} ms", took.as_secs_f64() * 1e3);
         Ok(pipeline)
     }
 }
@@ -256,218 +336,5 @@ impl Drop for Pipeline {
             self.context.device.destroy_pipeline_layout(self.layout, None);
             self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
         }
-    }
-}
-
-/// Wakes the event loop of a view.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
-
-struct Job {
-    key: Key,
-    pass: &'static Pass,
-    scene: Arc<Scene>,
-    args: DispatchArgs,
-}
-
-/// A thread that compiles pipelines, and its requests.
-pub struct AsyncPipelineCompiler {
-    jobs: Option<Sender<Job>>,
-    thread: Option<JoinHandle<()>>,
-    asked: HashSet<Key>,
-    stop: Arc<AtomicBool>,
-    faults: Arc<Mutex<HashMap<Key, String>>>,
-}
-
-impl AsyncPipelineCompiler {
-    /// `wake` is called after each pipeline.
-    ///
-    /// # Errors
-    /// The thread cannot be started.
-    pub fn new(pipelines: &Arc<Pipelines>, wake: Option<Wake>) -> Result<AsyncPipelineCompiler, GpuError> {
-        let (jobs, asked_for) = channel::<Job>();
-        let faults = Arc::new(Mutex::new(HashMap::new()));
-        let stop = Arc::new(AtomicBool::new(false));
-        let (theirs, pipelines, over) = (faults.clone(), pipelines.clone(), stop.clone());
-        let work = move || {
-            for Job { key, pass, scene, args } in asked_for {
-                if over.load(Ordering::Relaxed) {
-                    break;
-                }
-                let is_new = pipelines.cached(&key).is_none();
-                match pipelines.get(pass, &scene, &args) {
-                    Ok(_) => drop(pipelines.context.counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed)),
-                    Err(fault) => drop(theirs.lock().unwrap_or_else(|e| e.into_inner()).insert(key, fault.to_string())),
-                }
-                if let Some(wake) = &wake {
-                    wake();
-                }
-            }
-        };
-        let thread = std::thread::Builder::new().name("pipelines".into()).spawn(work);
-        let thread =
-            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
-        Ok(AsyncPipelineCompiler { jobs: Some(jobs), thread: Some(thread), asked: HashSet::new(), stop, faults })
-    }
-
-    /// True if every pipeline of a plan is compiled; requests those that are not.
-    ///
-    /// # Errors
-    /// A pipeline that could not be compiled.
-    pub fn prepare(&mut self, pipelines: &Pipelines, plan: &Plan, scene: &Scene) -> Result<bool, GpuError> {
-        let mut shared = None;
-        let mut is_ready = true;
-        for step in &plan.steps {
-            let args = step.args();
-            let key = Pipelines::key(step.pass, scene, &args);
-            if pipelines.cached(&key).is_some() {
-                continue;
-            }
-            if let Some(fault) = self.faults.lock().unwrap_or_else(|e| e.into_inner()).get(&key) {
-                return Err(GpuError::Shader { shader: key.0.into(), fault: fault.clone() });
-            }
-            is_ready = false;
-            if self.asked.insert(key.clone()) {
-                let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
-                // If the thread has died, pipelines are compiled at their first use.
-                let sent =
-                    self.jobs.as_ref().is_some_and(|j| j.send(Job { key, pass: step.pass, scene, args }).is_ok());
-                is_ready |= !sent;
-            }
-        }
-        Ok(is_ready)
-    }
-}
-
-impl Drop for AsyncPipelineCompiler {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.jobs = None;
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-/// Number of sets in a pool; few pictures need more dispatches.
-const SETS: u32 = 64;
-/// Number of descriptors of each type in a pool.
-const DESCRIPTORS: u32 = 4 * SETS;
-const KINDS: [Kind; 6] = [Kind::Params, Kind::Sampled, Kind::Filtered, Kind::Storage, Kind::Buffer, Kind::Texels(1)];
-
-/// What is left in a pool. It is counted here, because drivers differ in whether they allocate beyond the size of a pool.
-#[derive(Clone, Copy)]
-struct PoolSpace {
-    sets: u32,
-    /// Descriptors, in the order of [`KINDS`].
-    descriptors: [u32; KINDS.len()],
-}
-
-const FULL: PoolSpace = PoolSpace { sets: SETS, descriptors: [DESCRIPTORS; KINDS.len()] };
-
-impl PoolSpace {
-    /// What is left after a set with these descriptors is allocated; `None` if there is not enough.
-    fn after(mut self, kinds: impl Iterator<Item = Kind>) -> Option<PoolSpace> {
-        self.sets = self.sets.checked_sub(1)?;
-        for kind in kinds {
-            let of = KINDS.iter().position(|k| descriptor_type(*k) == descriptor_type(kind))?;
-            self.descriptors[of] = self.descriptors[of].checked_sub(1)?;
-        }
-        Some(self)
-    }
-}
-
-/// Descriptor sets of one command buffer, for a device without push descriptors. They are allocated from pools and freed all at once.
-pub struct DescriptorSets {
-    context: Arc<Context>,
-    pools: Vec<vk::DescriptorPool>,
-    /// What is left in the current pool.
-    left: PoolSpace,
-    current: usize,
-}
-
-impl DescriptorSets {
-    /// Allocates no pool yet: push descriptors need none.
-    pub fn new(context: &Arc<Context>) -> DescriptorSets {
-        DescriptorSets { context: context.clone(), pools: Vec::new(), left: FULL, current: 0 }
-    }
-
-    /// Frees all sets. The device must be done with the command buffer.
-    pub fn begin(&mut self) -> Result<(), GpuError> {
-        for pool in &self.pools {
-            // SAFETY: the pool is alive, and the device is done with what was taken from it.
-            unsafe { self.context.device.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()) }
-                .context(|| "reset a descriptor pool".into())?;
-        }
-        (self.left, self.current) = (FULL, 0);
-        Ok(())
-    }
-
-    /// Allocates a set for a pipeline; it is valid until [`DescriptorSets::begin`].
-    pub fn take(&mut self, pipeline: &Pipeline) -> Result<vk::DescriptorSet, GpuError> {
-        let kinds = || pipeline.module.bindings.iter().map(|binding| binding.kind);
-        let (current, left) = match self.left.after(kinds()) {
-            Some(left) => (self.current, left),
-            None => {
-                let left = FULL.after(kinds()).ok_or_else(|| GpuError::Limit {
-                    what: "descriptors of one type in one dispatch".into(),
-                    needed: kinds().count() as u64,
-                    allowed: u64::from(DESCRIPTORS),
-                })?;
-                (self.current + 1, left)
-            }
-        };
-        if current == self.pools.len() {
-            self.pools.push(self.pool()?);
-        }
-        let layouts = [pipeline.set_layout];
-        let allocate =
-            vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.pools[current]).set_layouts(&layouts);
-        // SAFETY: pool and layout are alive, and there is room for one set more.
-        let sets = unsafe { self.context.device.allocate_descriptor_sets(&allocate) };
-        let set = sets.context(|| "allocate a descriptor set".into())?[0];
-        (self.current, self.left) = (current, left);
-        Ok(set)
-    }
-
-    fn pool(&self) -> Result<vk::DescriptorPool, GpuError> {
-        let sizes =
-            KINDS.map(|kind| vk::DescriptorPoolSize { ty: descriptor_type(kind), descriptor_count: DESCRIPTORS });
-        let create = vk::DescriptorPoolCreateInfo::default().max_sets(SETS).pool_sizes(&sizes);
-        // SAFETY: the structure is complete and outlives the call.
-        let pool = unsafe { self.context.device.create_descriptor_pool(&create, None) };
-        let pool = pool.context(|| "create a descriptor pool".into())?;
-        self.context.name(pool, "descriptor sets");
-        Ok(pool)
-    }
-}
-
-impl Drop for DescriptorSets {
-    fn drop(&mut self) {
-        if self.context.is_given_up() {
-            return;
-        }
-        for pool in &self.pools {
-            // SAFETY: whoever drops this has waited for the device; a pool frees its sets.
-            unsafe { self.context.device.destroy_descriptor_pool(*pool, None) };
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_pool_is_full_when_its_sets_or_the_descriptors_of_one_type_run_out() {
-        let images = |count| std::iter::repeat_n(Kind::Storage, count);
-        let mut left = FULL;
-        for _ in 0..SETS {
-            left = left.after(images(1).chain([Kind::Texels(2), Kind::Texels(4)])).expect("room");
-        }
-        assert!(left.after(images(0)).is_none(), "{} sets are left", left.sets);
-        assert!(FULL.after(images(DESCRIPTORS as usize)).is_some());
-        assert!(FULL.after(images(DESCRIPTORS as usize + 1)).is_none());
-        let rest = FULL.after(images(200)).expect("room");
-        assert!(rest.after(images(57)).is_none() && rest.after(images(56)).is_some());
     }
 }

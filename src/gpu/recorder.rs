@@ -3,9 +3,10 @@
 use super::bands::{Band, BandLimit, Work};
 use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
+use super::descriptor_sets::DescriptorSets;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
-use super::pipelines::{DescriptorSets, Pipeline, descriptor_type};
+use super::pipelines::{Pipeline, descriptor_type};
 use super::resources::{Image, Resource, SlotResources, WHOLE};
 use super::timeline::Timelines;
 use super::timing::{Stamps, TimeStamps, Timings};

@@ -1,7 +1,8 @@
 //! Shaders from a folder of GLSL instead of the embedded ones, for whoever writes them: compiled when a pipeline asks for them, and
 //! again when a file changes ([`Watch`]), so that a running view shows what was edited.
 
-use super::pipelines::{Shaders, Wake, embedded};
+use super::pipeline_compiler::Wake;
+use super::pipelines::{Shaders, embedded};
 use crate::shader_source::{self, Source};
 use crate::shader_tools::Compiler;
 use rayon::prelude::*;

@@ -4,7 +4,7 @@ use super::cine::{Cine, CineVolume};
 use super::phase::{Display, InFlight, Pending, Phase, Replay};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumePool};
-use crate::gpu::{GpuError, Renderer};
+use crate::gpu::{GpuError, Renderer, SceneMaker};
 use crate::picture::Picture;
 use crate::plan::Rerun;
 use crate::probe::Geometry;
@@ -105,6 +105,8 @@ pub(super) struct Session {
     refused: Option<String>,
     /// A volume that was on display and has to be sent again before it can be drawn.
     to_restore: Option<u32>,
+    /// Pipelines were asked for in advance.
+    pub has_warmed: bool,
 }
 
 impl Session {
@@ -129,6 +131,7 @@ impl Session {
             compiles_async,
             refused: None,
             to_restore,
+            has_warmed: false,
         }
     }
 
@@ -194,6 +197,21 @@ impl Session {
         let rerun = self.renderer.reload_shaders(shaders)?;
         self.run_again(&rerun);
         Ok(())
+    }
+
+    /// By slice of the volume on display: swept backwards.
+    pub fn swept_backward(&self) -> &[bool] {
+        &self.backward
+    }
+
+    /// Compiles the pipelines of scenes that may come next, where pipelines are compiled in the background.
+    pub fn warm(&mut self, scenes: Vec<SceneMaker>) {
+        self.has_warmed = true;
+        if self.compiles_async
+            && let Err(fault) = self.renderer.warm(scenes)
+        {
+            tracing::debug!("compiled in advance: {fault}");
+        }
     }
 
     fn run_again(&mut self, rerun: &Rerun) {

@@ -7,7 +7,7 @@ use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{self, Bands, Context, GpuError, Renderer, TimeStamps, Wake};
+use crate::gpu::{self, Bands, Context, GpuError, Renderer, SceneMaker, TimeStamps, Wake};
 use crate::probe::Probe;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
@@ -434,6 +434,36 @@ impl Stream {
         if let Some(session) = &mut self.session {
             session.pool.restart_numbering();
         }
+    }
+
+    /// Compiles in the background, while nothing else is to be compiled, what these settings would need, in this order, instead of those
+    /// given before. Settings that cannot be drawn are left out. Nothing happens before the first header, and without
+    /// [`StreamOptions::wake`].
+    pub fn warm(&mut self, next: Vec<Settings>) {
+        let (Some(session), Some(header)) = (&mut self.session, &self.header) else { return };
+        let (header, update) = (Arc::new(header.clone()), self.options.update);
+        let scenes = next.into_iter().map(|settings| {
+            let (header, backward) = (header.clone(), session.swept_backward().to_vec());
+            let make = move || Some(Views::new(&header, &settings, update).ok()?.of(&backward).into_owned());
+            Box::new(make) as SceneMaker
+        });
+        let scenes = scenes.collect();
+        session.warm(scenes);
+    }
+
+    /// Forgets the settings of [`Stream::warm`] that are left.
+    pub fn stop_warming(&self) {
+        self.session.iter().for_each(|session| session.renderer.stop_warming());
+    }
+
+    /// True after [`Stream::warm`], until the geometry or the device is another.
+    pub fn has_warmed(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.has_warmed)
+    }
+
+    /// True while pipelines of [`Stream::warm`] are left to compile.
+    pub fn is_warming(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.renderer.is_warming())
     }
 
     /// True while a volume of the cine loop is being sent to the device.

@@ -5,6 +5,7 @@ use crate::files::{read_text, replace};
 use crate::gpu::DeviceChoice;
 use crate::profile as model;
 use crate::profile::measure;
+use crate::profile::pipelines::command::Request;
 use crate::profile::{compare, export};
 use crate::terminal::{Failure, failed, input, say};
 use std::path::{Path, PathBuf};
@@ -17,7 +18,9 @@ const MAX_BYTES: u64 = 256 << 20;
                         echolume profile sweep.mha --preset fetal --json before.json\n  \
                         echolume profile --mode vr --trace trace.json    (open it in Perfetto or chrome://tracing)\n  \
                         echolume profile volume.mha --mode mip --still --turn 2    (the picture alone, each from another angle)\n  \
-                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)")]
+                        echolume profile --compare before.json after.json    (exit code 1 if a pass became slower)\n  \
+                        echolume profile --pipelines --all --json gpu.json    (what the driver makes of every shader)\n  \
+                        echolume profile --pipelines --all --compare gpu.json    (exit code 1 on a spill or a loss of occupancy)")]
 pub struct Profile {
     #[command(flatten)]
     input: InputArgs,
@@ -48,12 +51,20 @@ pub struct Profile {
     /// Write a trace for Perfetto or Chrome
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression
-    #[arg(long, num_args = 2, value_names = ["OLD", "NEW"])]
-    compare: Option<Vec<PathBuf>>,
+    /// Compare two profiles pass by pass, without measuring; exit code 1 on a regression. With --pipelines, OLD alone is compared with
+    /// what is measured
+    #[arg(long, num_args = 1..=2, value_names = ["OLD", "NEW"])]
+    compare: Vec<PathBuf>,
     /// Measure on this device too, alternating with the other, and compare them
     #[arg(long, value_name = "N|NAME", conflicts_with = "compare")]
     against: Option<DeviceChoice>,
+    /// Compile the pipelines of the scene, and print what the driver makes of them: registers, occupancy, spills, instructions, time to
+    /// compile without a cache and with one. Runs nothing on the device
+    #[arg(long, conflicts_with_all = ["repeat", "warm_up", "still", "turn", "no_ceilings", "csv", "csv_samples", "trace", "against"])]
+    pipelines: bool,
+    /// With --pipelines: of every mode, preset and filter instead of the scene alone
+    #[arg(long, requires = "pipelines")]
+    all: bool,
     /// Ratio that a pass must exceed to be a regression
     #[arg(long, value_name = "RATIO", default_value_t = 1.05)]
     threshold: f64,
@@ -64,8 +75,13 @@ pub struct Profile {
 
 impl Profile {
     pub fn run(&self) -> Result<(), Failure> {
-        match self.compare.as_deref() {
-            Some([old, new]) => self.compare(old, new),
+        if self.pipelines {
+            let (json, compare) = (self.json.as_deref(), self.compare.as_slice());
+            return Request { input: &self.input, all: self.all, json, compare, force: self.force }.run();
+        }
+        match self.compare.as_slice() {
+            [old, new] => self.compare(old, new),
+            [_] => Err(input("--compare: needs two profiles, OLD and NEW; with --pipelines one")),
             _ => self.measure(),
         }
     }
@@ -140,7 +156,7 @@ impl Profile {
         };
         let compared = compare::compare(old, new, &options).map_err(input)?;
         say!("{}", export::comparison_table(&compared).trim_end());
-        if let (Some(file), true) = (&self.json, self.compare.is_some()) {
+        if let (Some(file), true) = (&self.json, !self.compare.is_empty()) {
             let text = serde_json::to_string_pretty(&compared).map_err(failed)?;
             replace(file, text.as_bytes()).map_err(failed)?;
         }

@@ -97,7 +97,7 @@ fn quoted(field: &str) -> String {
 const MAX_DRIFT: f64 = 1.05;
 
 /// Rows as text, columns as wide as their widest cell: the first `left` columns left-aligned, the others right-aligned.
-fn aligned(rows: &[Vec<String>], left: usize) -> String {
+pub(super) fn aligned(rows: &[Vec<String>], left: usize) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();

@@ -1,10 +1,11 @@
 //! Profiles: run times of every pass, what they were measured on, and their JSON file. [`measure`] makes a profile, [`compare`]
-//! compares two, [`export`] writes them as text and as Chrome traces.
+//! compares two, [`export`] writes them as text and as Chrome traces. [`pipelines`] is about their compilation.
 
 pub(crate) mod command;
 pub mod compare;
 pub mod export;
 pub mod measure;
+pub mod pipelines;
 pub mod statistics;
 
 use crate::machine::Device;

@@ -11,6 +11,7 @@ mod region;
 pub mod self_attenuation;
 pub mod settings;
 pub mod transfer;
+pub mod variants;
 pub mod visible_bounds;
 
 pub use bricks::{Bricks, Reach, Side, TILE};

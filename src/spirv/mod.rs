@@ -10,5 +10,5 @@ pub(crate) mod storage_to_texel_buffer;
 pub(crate) mod strip_bindings;
 pub(crate) mod texture_to_storage;
 
-pub use module::{EMBEDDED, SpirvError, embedded, words};
+pub use module::{EMBEDDED, SOURCES, SpirvError, embedded, set_tool_version, words};
 pub use reflect::{Access, Binding, Constant, Dimension, Kind, Member, Module, PARAMS, reflect};

@@ -95,6 +95,21 @@ pub(super) const MAX_BOUND: u32 = 0x3f_ffff;
 pub(super) const HEADER_WORDS: usize = 5;
 pub(super) const BOUND: usize = 3;
 
+/// The hash of each shader's expanded source, a line each.
+pub const SOURCES: &str = include_str!("../../spirv/SOURCES");
+
+/// Word of a module's header that names the tool that made it; the lower half is the tool's version.
+const GENERATOR: usize = 2;
+
+/// Changes the version of the tool that a module names, and nothing that it means: a driver does not find it in its own cache of
+/// compiled shaders. `number` tells the modules of one run of the program from those of another.
+pub fn set_tool_version(words: &mut [u32], number: u16) {
+    if let Some(word) = words.get_mut(GENERATOR) {
+        // Versions from 0x8000 on are later than any that a driver works around.
+        *word = (*word & 0xffff_0000) | 0x8000 | u32::from(number);
+    }
+}
+
 /// A module that breaks the format, or that a rewrite cannot handle.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("SPIR-V: {0}")]
@@ -174,4 +189,29 @@ pub(super) fn encode(opcode: u32, operands: &[u32]) -> Vec<u32> {
     let mut words = vec![(operands.len() as u32 + 1) << 16 | opcode];
     words.extend_from_slice(operands);
     words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A driver looks compiled shaders up by their words: another number is another shader to it, and means the same.
+    #[test]
+    fn another_tool_version_changes_one_word_and_no_meaning() {
+        for (name, bytes) in EMBEDDED {
+            let before = words(bytes);
+            let [one, two] = [1, 2].map(|number| {
+                let mut words = before.clone();
+                set_tool_version(&mut words, number);
+                words
+            });
+            assert_ne!(one, two, "{name}");
+            for marked in [one, two] {
+                assert_eq!((&marked[..2], &marked[3..]), (&before[..2], &before[3..]), "{name}");
+                // The tool itself stays: drivers know faults of some.
+                assert_eq!(marked[2] >> 16, before[2] >> 16, "{name}");
+                assert!(super::super::reflect(&marked).is_ok(), "{name}");
+            }
+        }
+    }
 }

@@ -114,7 +114,7 @@ impl Controls {
         let finite = |numbers: &[f64]| numbers.iter().all(|n| n.is_finite());
         let mut new = self.settings.clone();
         match *command {
-            Command::Mode(mode) => self.set_mode(&mut new, mode),
+            Command::Mode(mode) => new.set_mode(mode),
             Command::Layout(layout) => {
                 new.layout = layout;
                 if layout == Layout::Four && new.mode.is_flat() {
@@ -152,7 +152,7 @@ impl Controls {
             Command::Plane(name) => {
                 new.planes.plane = name;
                 if !now.cuts_planes() {
-                    self.set_mode(&mut new, Mode::Plane);
+                    new.set_mode(Mode::Plane);
                 }
             }
             // Without a visible plane the change would surprise the user later.
@@ -181,13 +181,6 @@ impl Controls {
             _ => return None,
         }
         Some(new)
-    }
-
-    fn set_mode(&self, settings: &mut Settings, mode: Mode) {
-        settings.mode = mode;
-        if mode.is_flat() || (settings.layout == Layout::Pair && mode != Mode::Surface) {
-            settings.layout = Layout::Single;
-        }
     }
 
     /// Switches the shadow. Off sets its strength to 0 and keeps its other values; on restores the strength of the start.

@@ -1,9 +1,9 @@
-//! Group "speed": the time of each pass alone, by the clock of the device. These checks never fail by themselves; a baseline has the
+//! Group "speed": the time of each pass alone, by the clock of the device, and the time to compile its pipelines. These checks never fail by themselves; a baseline has the
 //! earlier times.
 
 use super::built_in::{ALL_FILTERS, BYTES, cartesian, scene, wobbler};
 use super::{Check, DeviceUnderTest, Findings};
-use crate::gpu::{Context, ContextOptions, GpuError, pass_runner};
+use crate::gpu::{Context, ContextOptions, GpuError, pass_runner, pipeline_measure};
 use crate::passes::{PASSES, Pass};
 use crate::probe::{Axis, Geometry, Probe};
 use crate::scene::{Sampling, Scene};
@@ -72,13 +72,17 @@ fn time(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<Findings, GpuE
     let own =
         dut.options().validation.then(|| Context::new(&ContextOptions { validation: false, ..dut.options().clone() }));
     let context = own.transpose()?.unwrap_or_else(|| dut.context.clone());
+    // First: later the driver may have parts of it ready.
+    let compiled = pipeline_measure::compile_time(&context, scene, pass)?;
     let samples = pass_runner::time_pass(&context, scene, pass, repeats)?;
     let mut findings = Findings::default();
     if samples.is_empty() {
-        return Ok(Findings::left_out("the device has no time stamps"));
+        findings.left_out = Some("the device has no time stamps".into());
+    } else {
+        let figure = Figure::times("time on the device", samples);
+        findings.figures.push(figure.map_err(|e| GpuError::Broken(format!("times of '{}': {e}", pass.name)))?);
     }
-    let figure = Figure::times("time on the device", samples);
-    findings.figures.push(figure.map_err(|e| GpuError::Broken(format!("times of '{}': {e}", pass.name)))?);
+    findings.figures.push(Figure::single_time("time to compile without a cache", compiled));
     Ok(findings)
 }
 

@@ -15,6 +15,7 @@ mod inputs;
 mod one_colour;
 mod oracle;
 mod outputs;
+mod pipelines;
 mod service;
 mod shaders;
 mod signals;

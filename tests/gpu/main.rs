@@ -32,6 +32,7 @@ mod motion;
 mod pair;
 mod passes;
 mod pictures;
+mod pipelines;
 mod planes;
 mod rays;
 mod recordings;

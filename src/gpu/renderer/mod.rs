@@ -9,7 +9,8 @@ use super::buffers::{Buffer, Purpose, Readback, Upload};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
-use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake, embedded};
+use super::pipeline_compiler::{AsyncPipelineCompiler, SceneMaker, Wake};
+use super::pipelines::{Pipeline, Pipelines, Shaders, embedded};
 use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
 use super::resources::SlotResources;
 use super::timeline::Timelines;
@@ -160,7 +161,7 @@ impl Renderer {
         let plan = Plan::new(&scene);
         formats::check(context, &plan, &scene)?;
         let pipelines = Arc::new(Pipelines::new(context, options.shaders.clone(), texel_access)?);
-        let steps = pipelines_of(&pipelines, &plan, &scene)?;
+        let steps = pipelines.of_plan(&plan, &scene)?;
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut renderer = Renderer {
             ring: Vec::new(),
@@ -330,11 +331,35 @@ impl Renderer {
         let scene = formats::adapt_scene(&self.context, self.texel_access, scene.clone());
         let plan = Plan::new(&scene);
         formats::check(&self.context, &plan, &scene)?;
-        let compiler = match &mut self.compiler {
+        self.compiler()?.prepare(&plan, &scene)
+    }
+
+    fn compiler(&mut self) -> Result<&mut AsyncPipelineCompiler, GpuError> {
+        let compiler = match self.compiler.take() {
             Some(compiler) => compiler,
-            None => self.compiler.insert(AsyncPipelineCompiler::new(&self.pipelines, self.wake.clone())?),
+            None => AsyncPipelineCompiler::new(&self.pipelines, self.texel_access, self.wake.clone())?,
         };
-        compiler.prepare(&self.pipelines, &plan, &scene)
+        Ok(self.compiler.insert(compiler))
+    }
+
+    /// Compiles the pipelines of further scenes in the background while nothing else is to be compiled, in this order, instead of those
+    /// asked for before. Scenes that this device cannot draw are left out.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn warm(&mut self, scenes: Vec<SceneMaker>) -> Result<(), GpuError> {
+        self.compiler()?.warm(scenes);
+        Ok(())
+    }
+
+    /// Forgets the scenes of [`Renderer::warm`] that are left. A pipeline in the making is finished.
+    pub fn stop_warming(&self) {
+        self.compiler.iter().for_each(AsyncPipelineCompiler::stop_warming);
+    }
+
+    /// True while pipelines of [`Renderer::warm`] are left to compile.
+    pub fn is_warming(&self) -> bool {
+        self.compiler.as_ref().is_some_and(AsyncPipelineCompiler::is_warming)
     }
 
     /// Changes the scene. The next picture runs the passes that this affects. If it returns [`Rerun::Everything`] or
@@ -354,7 +379,7 @@ impl Renderer {
             scene.kept_bounds = VisibleBounds::default();
         }
         formats::check(&self.context, &plan, &scene)?;
-        let steps = pipelines_of(&self.pipelines, &plan, &scene)?;
+        let steps = self.pipelines.of_plan(&plan, &scene)?;
         // Frames in flight use nothing that such a change touches, so only the picture is waited for.
         let touched = |slots: &[Slot]| {
             plan.steps_of(Frequency::Frame).any(|(_, s)| s.reads(&scene).iter().any(|r| slots.contains(r)))
@@ -539,10 +564,6 @@ impl Renderer {
     pub fn drop_barrier(&mut self, n: u32) {
         self.barriers.drop_barrier = Some(n);
     }
-}
-
-fn pipelines_of(pipelines: &Pipelines, plan: &Plan, scene: &Scene) -> Result<Vec<Arc<Pipeline>>, GpuError> {
-    plan.steps.iter().map(|step| pipelines.get(step.pass, scene, &step.args())).collect()
 }
 
 fn frame_bytes(scene: &Scene) -> u64 {

@@ -60,6 +60,14 @@ impl Settings {
     pub fn moving(&self) -> Settings {
         Settings { ray: Ray { half: true, rays: 1, ..self.ray.clone() }, ..self.clone() }
     }
+
+    /// Changes the mode, and the layout where it does not fit the mode: planes have no layout, and a pair is of mode surface.
+    pub fn set_mode(&mut self, mode: Mode) {
+        self.mode = mode;
+        if mode.is_flat() || (self.layout == Layout::Pair && mode != Mode::Surface) {
+            self.layout = Layout::Single;
+        }
+    }
 }
 
 /// What a pixel shows.

@@ -53,6 +53,7 @@ impl Console {
         self.advance_cine(now);
         self.send_settings(now);
         self.run_stream(now)?;
+        self.warm(now);
         let shader_fault = self.shaders.as_ref().and_then(|folder| folder.fault());
         self.needs_redraw |= shader_fault != self.shader_fault;
         self.shader_fault = shader_fault;
@@ -183,6 +184,7 @@ impl Console {
             self.repaint_at,
             self.next_cine_step,
             self.stall_shown_until,
+            self.warms_at(now),
             silence,
             statistics,
         ]

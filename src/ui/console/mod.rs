@@ -19,7 +19,7 @@ use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
-use crate::scene::{Layout, Settings};
+use crate::scene::{Layout, Settings, variants};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -32,6 +32,8 @@ const STALL_TIME: Duration = Duration::from_secs(10);
 const FAULT_CHECK_INTERVAL: Duration = Duration::from_secs(2);
 /// Largest number of notes that are shown at once; the newest ones win.
 const MAX_NOTES: usize = 4;
+/// How long after the last input pipelines that may be needed next are compiled.
+const REST_BEFORE_WARMING: Duration = Duration::from_secs(1);
 /// Time between two volumes of a cine loop.
 const CINE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -70,6 +72,8 @@ pub struct ConsoleOptions {
     pub startup_fault: Option<StartupFault>,
     /// Shaders to use instead of the embedded ones. The folder is watched, and shaders that change are loaded again.
     pub shaders: Option<Arc<ShaderFolder>>,
+    /// Compiles the pipelines of every mode, layout and preset in advance while the user rests.
+    pub warms: bool,
 }
 
 impl Default for ConsoleOptions {
@@ -95,6 +99,7 @@ impl Default for ConsoleOptions {
             wake: Arc::new(|| ()),
             startup_fault: None,
             shaders: None,
+            warms: true,
         }
     }
 }
@@ -169,6 +174,10 @@ pub struct Console {
     unsent_input: Option<Instant>,
     /// The first input that no picture shows yet, and when its settings were given to the stream.
     unshown_input: Option<(Instant, Instant)>,
+    /// When the user acted last.
+    last_input: Instant,
+    /// The settings around which pipelines were compiled in advance last.
+    warmed: Option<Settings>,
     /// When statistics were taken last.
     statistics_at: Instant,
     /// When a frame or a source came last.
@@ -199,6 +208,7 @@ struct FixedOptions {
     overlay: bool,
     exit: Option<Chord>,
     is_kiosk: bool,
+    warms: bool,
 }
 
 impl Console {
@@ -237,7 +247,12 @@ impl Console {
             rungs: options.rungs,
             panels: Panels::new(options.scale),
             times: Times::default(),
-            fixed: FixedOptions { overlay: options.overlay, is_kiosk: options.is_kiosk, exit: options.exit },
+            fixed: FixedOptions {
+                overlay: options.overlay,
+                is_kiosk: options.is_kiosk,
+                exit: options.exit,
+                warms: options.warms,
+            },
             size,
             started: now,
             sent_settings: None,
@@ -253,6 +268,8 @@ impl Console {
             next_cine_step: None,
             unsent_input: None,
             unshown_input: None,
+            last_input: now,
+            warmed: None,
             statistics_at: now,
             last_arrival: now,
             frames: 0,
@@ -348,6 +365,7 @@ impl Console {
         let now = Instant::now();
         // egui panics at coordinates that are not finite.
         let Some(input) = &input.sanitized() else { return };
+        self.user_acts(now);
         if self.fixed.overlay {
             self.panels.input(input);
             self.needs_redraw = true;
@@ -419,6 +437,7 @@ impl Console {
     /// Executes a command.
     pub fn execute(&mut self, command: &Command, now: Instant) {
         tracing::debug!("{command:?}");
+        self.user_acts(now);
         match self.controls.apply(command, self.stream.scene()) {
             Change::Nothing => return,
             Change::Tool => {}
@@ -515,6 +534,37 @@ impl Console {
         if let Err(fault) = saved {
             self.notify(&format!("The loop was not saved: {fault}"), true);
         }
+    }
+
+    /// Leaves the processor to what the user asks for.
+    fn user_acts(&mut self, now: Instant) {
+        self.last_input = self.last_input.max(now);
+        if self.warmed.take().is_some() {
+            self.stream.stop_warming();
+        }
+    }
+
+    /// While the user rests, compiles what may be asked for next: every mode, layout and preset, and the lower rungs of the quality
+    /// ladder. Frames that arrive meanwhile are drawn as before.
+    fn warm(&mut self, now: Instant) {
+        let is_due = self.fixed.warms && now >= self.last_input + REST_BEFORE_WARMING;
+        let is_done = self.stream.has_warmed() && self.warmed.as_ref() == Some(self.controls.settings());
+        if !is_due || is_done || !self.stream.renderer().is_some_and(|renderer| renderer.has_drawn()) {
+            return;
+        }
+        let voxel = self.stream.scene().map_or(0.5, |scene| scene.grid.pitch[0].min(scene.grid.pitch[1]));
+        let (_, settings) = self.effective_settings(now);
+        let lowered = self.rungs.iter().skip(1).filter(|_| self.frame_budget.budget().is_some());
+        let lowered: Vec<Settings> = lowered.map(|rung| rung.apply(&settings, voxel)).collect();
+        let switches = variants::switches(&settings).into_iter().map(|variant| variant.settings);
+        self.stream.warm(lowered.into_iter().chain(switches).collect());
+        self.warmed = Some(self.controls.settings().clone());
+    }
+
+    /// When pipelines are compiled in advance, if that is not yet done.
+    fn warms_at(&self, now: Instant) -> Option<Instant> {
+        let at = self.last_input + REST_BEFORE_WARMING;
+        (self.fixed.warms && self.warmed.is_none() && at > now).then_some(at)
     }
 
     /// The rung that keeps the frame budget now, and the settings on it.

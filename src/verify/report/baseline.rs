@@ -228,7 +228,8 @@ fn figures<'a>(old: &'a Outcome, new: &'a Outcome, pairs: &mut Vec<Pair<'a>>) ->
         match old.figures.iter().find(|f| f.what == figure.what) {
             Some(earlier) if earlier.unit == figure.unit => pairs.push(Pair { of: new, old: earlier, new: figure }),
             Some(_) => report(figure, "measured in another unit than before, not compared"),
-            None if both_passed => report(figure, "not measured before"),
+            // Runs of earlier versions have no times of compilation.
+            None if both_passed && !figure.is_single_time() => report(figure, "not measured before"),
             None => {}
         }
     }
@@ -340,9 +341,13 @@ struct TimeChanges {
 
 /// Changes of times by more than the noise of the device, by the method of `profile --compare`. `runs`: old, new.
 fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> TimeChanges {
-    let times: Vec<&Pair> = pairs.iter().filter(|p| p.new.unit == Unit::Ns).collect();
+    let times: Vec<&Pair> = pairs.iter().filter(|p| p.new.unit == Unit::Ns && !p.new.is_single_time()).collect();
+    let because = incomparable(runs);
+    let mut found = TimeChanges::default();
+    let singles = pairs.iter().filter(|p| p.new.is_single_time() && p.old.is_single_time());
+    found.changes.extend(singles.filter_map(|pair| single_change(pair, because.is_some())));
     if times.is_empty() {
-        return TimeChanges::default();
+        return found;
     }
     let both = times.iter().filter(|p| !usable(p.old).is_empty() && !usable(p.new).is_empty()).count();
     let blocks = profile::blocks_needed(both, ALPHA);
@@ -358,11 +363,10 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> Ti
     let lines = match profile::judge(lines.collect(), blocks, tick, &criteria) {
         Ok(lines) => lines,
         Err(fault) => {
-            return TimeChanges { changes: Vec::new(), notes: vec![format!("times are not compared: {fault}")] };
+            found.notes.push(format!("times are not compared: {fault}"));
+            return found;
         }
     };
-    let because = incomparable(runs);
-    let mut found = TimeChanges::default();
     let mut left: BTreeMap<String, usize> = BTreeMap::new();
     for (pair, line) in times.iter().zip(&lines) {
         match &line.note {
@@ -374,6 +378,28 @@ fn judge_times(pairs: &[Pair], runs: [&Run; 2], options: &BaselineOptions) -> Ti
     found.notes.extend(left.into_iter().map(|(why, count)| format!("{count} times are not compared: {why}")));
     found.notes.extend(profile::common_shift(&lines));
     found
+}
+
+/// Ratio of times measured once, such as those to compile a pass, beyond which there is a change. Other programs run meanwhile.
+const SINGLE_RATIO: f64 = 3.0;
+
+/// A smaller difference is none, ns.
+const SINGLE_FLOOR: f64 = 100e6;
+
+/// The change of a time that was measured once in each run.
+fn single_change(pair: &Pair, is_informative: bool) -> Option<Change> {
+    let (old, new) = (pair.old.value, pair.new.value);
+    if !(old.is_finite() && new.is_finite()) || (new - old).abs() <= SINGLE_FLOOR {
+        return None;
+    }
+    let class = match () {
+        _ if new > SINGLE_RATIO * old && is_informative => Class::Changed,
+        _ if new > SINGLE_RATIO * old => Class::Worse,
+        _ if old > SINGLE_RATIO * new => Class::Better,
+        _ => return None,
+    };
+    let bound = format!("more than {} times", number(SINGLE_RATIO));
+    Some(Change::new(class, pair.of, format!("{} {}: {bound}", escaped(&pair.new.what), change(old, new, Unit::Ns))))
 }
 
 /// The times; empty if one is not finite, since a file may contain anything.

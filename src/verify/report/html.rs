@@ -389,7 +389,7 @@ fn data_uri(picture: &Picture) -> Result<String, String> {
 fn times_section(run: &Run) -> Markup {
     let timed = |outcomes: &[&'_ Outcome]| -> Vec<(String, Figure)> {
         let figures = outcomes.iter().flat_map(|o| o.figures.iter().map(move |f| (o, f)));
-        let times = figures.filter(|(_, f)| f.unit == Unit::Ns && f.value.is_finite());
+        let times = figures.filter(|(_, f)| f.unit == Unit::Ns && !f.is_single_time() && f.value.is_finite());
         times.map(|(o, f)| (o.name.clone(), f.clone())).collect()
     };
     let groups: Vec<(&str, Vec<(String, Figure)>)> =

@@ -16,6 +16,7 @@ use baseline::{BaselineComparison, Class};
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
+use std::time::Duration;
 
 /// Version of the JSON format.
 pub const FORMAT: &str = "echolume-verify-1";
@@ -231,6 +232,17 @@ impl Figure {
     pub fn times(what: impl Into<String>, samples: Vec<f64>) -> Result<Figure, SampleError> {
         let value = Sample::new(&samples)?.median();
         Ok(Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples, fleeting: false })
+    }
+
+    /// A time that was measured once. It is compared with an earlier one by a generous ratio.
+    pub fn single_time(what: impl Into<String>, time: Duration) -> Figure {
+        let value = time.as_nanos() as f64;
+        Figure { what: what.into(), value, allowed: None, unit: Unit::Ns, samples: Vec::new(), fleeting: false }
+    }
+
+    /// True for a time without samples.
+    pub(crate) fn is_single_time(&self) -> bool {
+        self.unit == Unit::Ns && self.samples.is_empty()
     }
 
     /// Value over limit: above 1 fails, and NaN gives infinity. None without limit.

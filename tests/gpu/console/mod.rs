@@ -5,6 +5,7 @@ mod gestures;
 mod idle;
 mod monkey;
 mod shaders;
+mod warming;
 
 use crate::common::gpu::*;
 use crate::common::scenes::settings;
@@ -56,6 +57,7 @@ pub fn options() -> ConsoleOptions {
         wake: Arc::new(|| ()),
         startup_fault: None,
         shaders: None,
+        warms: false,
     }
 }
 

@@ -6,6 +6,7 @@ use super::simulated::{any_run, check, fail, outcome, run, slower};
 use echolume::verify::report::baseline::{BaselineComparison, BaselineOptions, Class, compare};
 use echolume::verify::report::{self, Figure, Level, Run, Unit, Verdict};
 use proptest::prelude::*;
+use std::time::Duration;
 
 fn compared(old: &Run, new: &Run) -> BaselineComparison {
     compare(old, new, &BaselineOptions::default())
@@ -158,6 +159,34 @@ fn fourteen_percent_slower_is_worse_and_faster_is_better() {
     };
     let line = &told(&compared(&steady(1.0), &steady(1.14)))[0];
     assert_eq!(line.1, "speed / shade: device time 14 % slower (1.14..1.14), 1 -> 1.14 ms");
+}
+
+/// Prevents a shader that suddenly takes seconds to compile, and an alarm because another program ran meanwhile.
+#[test]
+fn a_pass_that_compiles_much_longer_is_worse_and_a_busy_machine_is_not() {
+    let with = |ms: u64| {
+        let mut run = run(1);
+        let figure = Figure::single_time("time to compile", Duration::from_millis(ms));
+        check(&mut run, "speed", "shade").figures.push(figure);
+        run
+    };
+    for (old, new, expected) in [
+        (100, 700, Some((Class::Worse, "speed / shade: time to compile 100 -> 700 ms: more than 3 times"))),
+        (700, 100, Some((Class::Better, "speed / shade: time to compile 700 -> 100 ms: more than 3 times"))),
+        (300, 880, None),
+        (2, 90, None),
+        (100, 100, None),
+    ] {
+        let compared = compared(&with(old), &with(new));
+        let expected: Vec<_> = expected.into_iter().map(|(class, line)| (class, line.to_string())).collect();
+        assert_eq!(told(&compared), expected, "{old} -> {new} ms");
+    }
+    // A baseline of an earlier version, and another device.
+    assert!(compared(&run(1), &with(700)).changes.is_empty());
+    let mut other = with(700);
+    other.device.name = "another".into();
+    let informative = compared(&with(100), &other);
+    assert!(!informative.is_worse() && told(&informative).iter().any(|(_, line)| line.contains("100 -> 700")));
 }
 
 #[test]

@@ -1,0 +1,271 @@
+//! A thread that compiles pipelines in the background, so that drawing goes on meanwhile: first those that drawing waits for, then,
+//! while there is nothing else to compile, those of scenes that may come next.
+
+use super::error::GpuError;
+use super::formats::{self, TexelAccess};
+use super::pipelines::{Key, Pipelines};
+use crate::passes::{DispatchArgs, Pass};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Wakes the event loop of a view.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// Makes a scene that may come next; none where these settings cannot be drawn.
+pub type SceneMaker = Box<dyn FnOnce() -> Option<Scene> + Send>;
+
+/// Most pipelines that are compiled in advance: an eighth of a GiB where a driver keeps 256 KiB for one.
+const MAX_WARMED: usize = 512;
+/// Longest pause after a pipeline that nobody waits for.
+const MAX_PAUSE: Duration = Duration::from_millis(200);
+
+struct Job {
+    key: Key,
+    pass: &'static Pass,
+    scene: Arc<Scene>,
+    args: DispatchArgs,
+}
+
+/// What the thread has to do.
+#[derive(Default)]
+struct Queue {
+    /// What drawing waits for.
+    asked: VecDeque<Job>,
+    /// Scenes that may come next, and the pipelines of the one that was taken last.
+    scenes: VecDeque<SceneMaker>,
+    in_advance: VecDeque<Job>,
+    /// The thread works on a scene or a pipeline of those two.
+    is_warming: bool,
+    /// Pipelines compiled in advance so far.
+    warmed: usize,
+    is_over: bool,
+}
+
+/// The next piece of work.
+enum Work {
+    Asked(Job),
+    InAdvance(Job),
+    Scene(SceneMaker),
+}
+
+impl Queue {
+    fn next(&mut self) -> Option<Work> {
+        let work = match self.asked.pop_front() {
+            Some(job) => Some(Work::Asked(job)),
+            None => match self.in_advance.pop_front() {
+                Some(job) => Some(Work::InAdvance(job)),
+                None => self.scenes.pop_front().map(Work::Scene),
+            },
+        };
+        self.is_warming = matches!(work, Some(Work::InAdvance(_) | Work::Scene(_)));
+        work
+    }
+
+    fn stop_warming(&mut self) {
+        self.scenes.clear();
+        self.in_advance.clear();
+        self.is_warming = false;
+    }
+}
+
+/// Shared by the thread and whoever asks it.
+#[derive(Default)]
+struct Shared {
+    queue: Mutex<Queue>,
+    changed: Condvar,
+    faults: Mutex<HashMap<Key, String>>,
+}
+
+impl Shared {
+    fn queue(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn faults(&self) -> MutexGuard<'_, HashMap<Key, String>> {
+        self.faults.lock().unwrap_or_else(|e| e.into_inner())
+    }
+}
+
+/// A thread that compiles pipelines, and its requests.
+pub struct AsyncPipelineCompiler {
+    shared: Arc<Shared>,
+    pipelines: Arc<Pipelines>,
+    thread: Option<JoinHandle<()>>,
+    asked: HashSet<Key>,
+}
+
+impl AsyncPipelineCompiler {
+    /// `wake` is called after each pipeline that drawing waits for.
+    ///
+    /// # Errors
+    /// The thread cannot be started.
+    pub fn new(
+        pipelines: &Arc<Pipelines>,
+        texel_access: TexelAccess,
+        wake: Option<Wake>,
+    ) -> Result<AsyncPipelineCompiler, GpuError> {
+        let shared = Arc::new(Shared::default());
+        let worker = Worker { shared: shared.clone(), pipelines: pipelines.clone(), texel_access, wake };
+        let thread = std::thread::Builder::new().name("pipelines".into()).spawn(move || worker.run());
+        let thread =
+            thread.map_err(|e| GpuError::Memory { operation: "start a thread".into(), fault: e.to_string() })?;
+        Ok(AsyncPipelineCompiler { shared, pipelines: pipelines.clone(), thread: Some(thread), asked: HashSet::new() })
+    }
+
+    /// True if every pipeline of a plan is compiled; requests those that are not.
+    ///
+    /// # Errors
+    /// A pipeline that could not be compiled.
+    pub fn prepare(&mut self, plan: &Plan, scene: &Scene) -> Result<bool, GpuError> {
+        // If the thread has died, pipelines are compiled at their first use.
+        let is_alive = self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        let mut shared = None;
+        let mut is_ready = true;
+        for step in &plan.steps {
+            let args = step.args();
+            let key = Pipelines::key(step.pass, scene, &args);
+            if self.pipelines.cached(&key).is_some() {
+                continue;
+            }
+            if let Some(fault) = self.shared.faults().get(&key) {
+                return Err(GpuError::Shader { shader: key.0.into(), fault: fault.clone() });
+            }
+            is_ready &= !is_alive;
+            if self.asked.insert(key.clone()) {
+                let scene = shared.get_or_insert_with(|| Arc::new(scene.clone())).clone();
+                self.shared.queue().asked.push_back(Job { key, pass: step.pass, scene, args });
+                self.shared.changed.notify_one();
+            }
+        }
+        Ok(is_ready)
+    }
+
+    /// Compiles the pipelines of these scenes while drawing waits for none, instead of those asked for before.
+    pub fn warm(&self, scenes: Vec<SceneMaker>) {
+        let mut queue = self.shared.queue();
+        queue.stop_warming();
+        queue.scenes.extend(scenes);
+        self.shared.changed.notify_one();
+    }
+
+    /// Forgets the scenes of [`AsyncPipelineCompiler::warm`] that are left.
+    pub fn stop_warming(&self) {
+        self.shared.queue().stop_warming();
+    }
+
+    /// True while pipelines of [`AsyncPipelineCompiler::warm`] are left to compile.
+    pub fn is_warming(&self) -> bool {
+        let queue = self.shared.queue();
+        queue.is_warming || !queue.scenes.is_empty() || !queue.in_advance.is_empty()
+    }
+}
+
+impl Drop for AsyncPipelineCompiler {
+    fn drop(&mut self) {
+        self.shared.queue().is_over = true;
+        self.shared.changed.notify_one();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread's side.
+struct Worker {
+    shared: Arc<Shared>,
+    pipelines: Arc<Pipelines>,
+    texel_access: TexelAccess,
+    wake: Option<Wake>,
+}
+
+impl Worker {
+    fn run(self) {
+        let mut has_compiled = false;
+        loop {
+            let mut queue = self.shared.queue();
+            if queue.is_over {
+                return;
+            }
+            let Some(work) = queue.next() else {
+                if has_compiled {
+                    // Nothing is left: a program that is killed later has this on disk.
+                    has_compiled = false;
+                    drop(queue);
+                    let context = self.pipelines.context();
+                    context.pipeline_cache.store(&context.device);
+                    continue;
+                }
+                drop(self.shared.changed.wait(queue));
+                continue;
+            };
+            drop(queue);
+            match work {
+                Work::Asked(job) => {
+                    if let Err(fault) = self.compile(&job) {
+                        self.shared.faults().insert(job.key, fault.to_string());
+                    }
+                    has_compiled = true;
+                    if let Some(wake) = &self.wake {
+                        wake();
+                    }
+                }
+                Work::InAdvance(job) => {
+                    let begun = Instant::now();
+                    match self.compile(&job) {
+                        Ok(_) => has_compiled = true,
+                        // It is reported if it is ever asked for.
+                        Err(fault) => tracing::debug!("compiled in advance: {fault}"),
+                    }
+                    self.pause(begun.elapsed().min(MAX_PAUSE));
+                }
+                Work::Scene(make) => self.look_at(make),
+            }
+        }
+    }
+
+    /// Compiles a pipeline unless it is compiled.
+    fn compile(&self, job: &Job) -> Result<(), GpuError> {
+        let is_new = self.pipelines.cached(&job.key).is_none();
+        self.pipelines.get(job.pass, &job.scene, &job.args)?;
+        self.pipelines.context().counts.async_pipelines.fetch_add(is_new.into(), Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Lines up the pipelines of a scene that are missing.
+    fn look_at(&self, make: SceneMaker) {
+        let context = self.pipelines.context();
+        let Some(scene) = make() else { return };
+        let scene = formats::adapt_scene(context, self.texel_access, scene);
+        let plan = Plan::new(&scene);
+        if formats::check(context, &plan, &scene).is_err() {
+            return;
+        }
+        let scene = Arc::new(scene);
+        let mut lined_up = HashSet::new();
+        let missing = plan.steps.iter().filter_map(|step| {
+            let (args, pass) = (step.args(), step.pass);
+            let key = Pipelines::key(pass, &scene, &args);
+            let is_missing = self.pipelines.cached(&key).is_none() && lined_up.insert(key.clone());
+            is_missing.then(|| Job { key, pass, scene: scene.clone(), args })
+        });
+        let missing: Vec<Job> = missing.collect();
+        let mut queue = self.shared.queue();
+        // Meanwhile the user may have acted, and warming ended.
+        if queue.is_warming {
+            let room = MAX_WARMED.saturating_sub(queue.warmed);
+            queue.warmed += missing.len().min(room);
+            queue.in_advance.extend(missing.into_iter().take(room));
+        }
+    }
+
+    /// Leaves the processor to others for a time, unless there is something to do that drawing waits for.
+    fn pause(&self, time: Duration) {
+        let waits = |queue: &mut Queue| queue.asked.is_empty() && !queue.is_over;
+        drop(self.shared.changed.wait_timeout_while(self.shared.queue(), time, waits));
+    }
+}

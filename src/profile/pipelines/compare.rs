@@ -1,0 +1,231 @@
+//! Compares the statistics of pipelines with earlier ones of the same device. They are counts without noise: any loss of occupancy and
+//! any spill is a fact, and a few instructions or registers more are not worth a word.
+
+use super::{Pipeline, PipelineProfile};
+use serde::Serialize;
+use std::collections::HashMap;
+
+/// Ratio above which more registers or instructions are reported as worse.
+const GROWTH: f64 = 1.05;
+
+/// A pipeline of which a column differs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    pub pipeline: String,
+    /// "waves", "subgroup", "spills", "registers", "instructions".
+    pub column: &'static str,
+    pub old: f64,
+    pub new: f64,
+    /// True if it fails the comparison.
+    pub is_worse: bool,
+}
+
+/// Two sets of statistics compared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PipelineComparison {
+    pub format: &'static str,
+    /// Number of pipelines that both have.
+    pub compared: usize,
+    /// Only in the new one, and only in the old one.
+    pub added: usize,
+    pub gone: usize,
+    /// What became worse first.
+    pub changes: Vec<Change>,
+    /// Pipelines that only the new one has and that spill.
+    pub new_spills: Vec<String>,
+    /// Time to compile the pipelines that both have, without any cache, ms: old, new. Told, and never a failure: another machine is
+    /// faster or slower.
+    pub cold_ms: [f64; 2],
+    /// Other devices, drivers and inputs, one line each.
+    pub notes: Vec<String>,
+}
+
+/// Why two sets cannot be compared.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum CompareError {
+    #[error("{which} statistics: the device '{device}' told none; there is nothing to compare")]
+    NoStatistics { which: &'static str, device: String },
+    #[error(
+        "the devices differ ('{old}', '{new}'), and their statistics have nothing in common; compare runs of one device, or pass --force"
+    )]
+    Devices { old: String, new: String },
+    #[error("no pipeline is in both; measure the same input with the same flags")]
+    NothingInCommon,
+}
+
+impl PipelineComparison {
+    /// The pipelines of which something became worse, each once.
+    pub fn worse(&self) -> Vec<&str> {
+        let changed = self.changes.iter().filter(|change| change.is_worse).map(|change| &change.pipeline);
+        let mut titles: Vec<&str> = changed.chain(&self.new_spills).map(String::as_str).collect();
+        titles.dedup();
+        titles
+    }
+}
+
+/// Compares `new` with `old`. Pipelines are the same if shader, constants and formats are. `force`: also those of different devices.
+///
+/// # Errors
+/// Statistics of different devices unless forced, none at all, or of no pipeline in common.
+pub fn compare(old: &PipelineProfile, new: &PipelineProfile, force: bool) -> Result<PipelineComparison, CompareError> {
+    for (which, profile) in [("old", old), ("new", new)] {
+        if !profile.has_statistics {
+            return Err(CompareError::NoStatistics { which, device: profile.device.clone() });
+        }
+    }
+    if old.device != new.device && !force {
+        return Err(CompareError::Devices { old: old.device.clone(), new: new.device.clone() });
+    }
+    let key = |p: &Pipeline| (p.shader.clone(), p.constants.clone(), p.formats.clone());
+    let before: HashMap<_, &Pipeline> = old.pipelines.iter().map(|p| (key(p), p)).collect();
+    let (mut changes, mut new_spills, mut compared, mut cold_ms) = (Vec::new(), Vec::new(), 0, [0.0; 2]);
+    for pipeline in &new.pipelines {
+        match before.get(&key(pipeline)) {
+            Some(earlier) => {
+                compared += 1;
+                cold_ms = [cold_ms[0] + earlier.cold_ms, cold_ms[1] + pipeline.cold_ms];
+                changes.extend(changes_of(old, earlier, new, pipeline));
+            }
+            None if new.columns(pipeline).spills.is_some_and(|spills| spills > 0.0) => {
+                new_spills.push(pipeline.title())
+            }
+            None => {}
+        }
+    }
+    if compared == 0 {
+        return Err(CompareError::NothingInCommon);
+    }
+    // The sort is stable: the order of use stays.
+    changes.sort_by_key(|change| !change.is_worse);
+    let conditions =
+        [("device", &old.device, &new.device), ("driver", &old.driver, &new.driver), ("input", &old.input, &new.input)];
+    let differing = conditions.into_iter().filter(|(_, old, new)| old != new);
+    Ok(PipelineComparison {
+        format: "echolume-pipeline-comparison-1",
+        compared,
+        added: new.pipelines.len() - compared,
+        gone: old.pipelines.len() - compared,
+        changes,
+        new_spills,
+        cold_ms,
+        notes: differing.map(|(what, old, new)| format!("{what}: {old} -> {new}")).collect(),
+    })
+}
+
+/// Tells from the old value and the new one whether a column became worse.
+type IsWorse = fn(f64, f64) -> bool;
+
+/// What differs between two runs of a pipeline.
+fn changes_of(old: &PipelineProfile, earlier: &Pipeline, new: &PipelineProfile, pipeline: &Pipeline) -> Vec<Change> {
+    let (was, is) = (old.columns(earlier), new.columns(pipeline));
+    let subgroup = |columns: &super::Columns| columns.subgroup.map(f64::from);
+    let columns: [(&'static str, Option<f64>, Option<f64>, IsWorse); 5] = [
+        ("waves", was.waves, is.waves, |old, new| new < old),
+        ("subgroup", subgroup(&was), subgroup(&is), |old, new| new < old),
+        ("spills", was.spills, is.spills, |old, new| new > old),
+        ("registers", was.registers, is.registers, |old, new| new > old * GROWTH),
+        ("instructions", was.instructions, is.instructions, |old, new| new > old * GROWTH),
+    ];
+    let differing = columns.into_iter().filter_map(|(column, old, new, is_worse)| {
+        let (old, new) = (old?, new?);
+        let change = || Change { pipeline: pipeline.title(), column, old, new, is_worse: is_worse(old, new) };
+        (old != new).then(change)
+    });
+    differing.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Executable, FORMAT};
+    use super::*;
+
+    /// Waves, spills, registers, instructions of pipelines that differ by a constant.
+    fn profile(pipelines: &[(i32, [f64; 4])]) -> PipelineProfile {
+        let one = |(constant, values): &(i32, [f64; 4])| Pipeline {
+            shader: "a.b".into(),
+            constants: [("N".to_string(), *constant)].into(),
+            formats: vec!["R8".into()],
+            cold_ms: 2.0,
+            warm_ms: 0.5,
+            from_cache: Some(true),
+            executables: vec![Executable {
+                name: "main".into(),
+                subgroup: 32,
+                values: values.iter().copied().map(Some).collect(),
+            }],
+        };
+        PipelineProfile {
+            format: FORMAT.into(),
+            program: "p".into(),
+            date: "d".into(),
+            device: "GPU".into(),
+            driver: "1".into(),
+            input: "phantom".into(),
+            has_statistics: true,
+            statistics: ["Max warps/SM", "Spills to memory", "Number of GPRs", "Instruction count"]
+                .map(Into::into)
+                .into(),
+            pipelines: pipelines.iter().map(one).collect(),
+        }
+    }
+
+    const PLAIN: [f64; 4] = [48.0, 0.0, 40.0, 1000.0];
+
+    #[test]
+    fn a_loss_of_occupancy_a_spill_and_growth_beyond_a_twentieth_are_worse_and_less_is_not() {
+        for (values, worse) in [
+            ([47.0, 0.0, 40.0, 1000.0], Some("waves")),
+            ([48.0, 1.0, 40.0, 1000.0], Some("spills")),
+            ([48.0, 0.0, 43.0, 1000.0], Some("registers")),
+            ([48.0, 0.0, 40.0, 1051.0], Some("instructions")),
+            ([48.0, 0.0, 42.0, 1050.0], None),
+            ([56.0, 0.0, 24.0, 500.0], None),
+            (PLAIN, None),
+        ] {
+            let compared = compare(&profile(&[(1, PLAIN)]), &profile(&[(1, values)]), false).expect("compared");
+            let found: Vec<_> = compared.changes.iter().filter(|c| c.is_worse).map(|c| c.column).collect();
+            assert_eq!(found, worse.into_iter().collect::<Vec<_>>(), "{values:?}");
+            assert_eq!(compared.worse().len(), found.len());
+            assert_eq!(compared.changes.is_empty(), values == PLAIN, "{values:?}");
+        }
+        let mut narrower = profile(&[(1, PLAIN)]);
+        narrower.pipelines[0].executables[0].subgroup = 16;
+        let compared = compare(&profile(&[(1, PLAIN)]), &narrower, false).expect("compared");
+        assert_eq!(compared.worse(), ["a.b N=1 R8"]);
+    }
+
+    #[test]
+    fn pipelines_of_one_side_are_counted_and_a_new_one_must_not_spill() {
+        let old = profile(&[(1, PLAIN), (2, PLAIN)]);
+        let new = profile(&[(2, PLAIN), (3, PLAIN), (4, [48.0, 7.0, 40.0, 9.0])]);
+        let compared = compare(&old, &new, false).expect("compared");
+        assert_eq!((compared.compared, compared.added, compared.gone), (1, 2, 1));
+        assert_eq!(compared.worse(), ["a.b N=4 R8"]);
+        assert_eq!(compared.cold_ms, [2.0, 2.0]);
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_refused() {
+        let plain = profile(&[(1, PLAIN)]);
+        let other = PipelineProfile { device: "other".into(), ..plain.clone() };
+        assert!(matches!(compare(&plain, &other, false), Err(CompareError::Devices { .. })));
+        assert_eq!(compare(&plain, &other, true).expect("forced").notes, ["device: GPU -> other"]);
+        let none = PipelineProfile { has_statistics: false, ..plain.clone() };
+        assert!(matches!(compare(&none, &plain, false), Err(CompareError::NoStatistics { which: "old", .. })));
+        assert!(matches!(compare(&plain, &none, false), Err(CompareError::NoStatistics { which: "new", .. })));
+        assert_eq!(compare(&plain, &profile(&[(2, PLAIN)]), false), Err(CompareError::NothingInCommon));
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_and_nothing_else_is_accepted() {
+        let plain = profile(&[(1, PLAIN), (2, PLAIN)]);
+        let text = plain.to_json().expect("json");
+        assert_eq!(PipelineProfile::from_json(&text).expect("read back"), plain);
+        assert_eq!(text.lines().count(), 4, "a line for each pipeline: {text}");
+        assert!(PipelineProfile::from_json(&text.replace(FORMAT, "echolume-profile-2")).is_err());
+        assert!(PipelineProfile::from_json(&text.replace("\"N\":2", "\"N\":1")).is_err(), "twice the same");
+        assert!(PipelineProfile::from_json(&text.replace("48.0,0.0,", "48.0,")).is_err(), "a value is missing");
+        assert!(PipelineProfile::from_json(&text.replace("\"cold_ms\":2.0", "\"cold_ms\":-2.0")).is_err());
+        assert!(PipelineProfile::from_json("{}").is_err());
+    }
+}

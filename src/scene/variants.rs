@@ -1,0 +1,168 @@
+//! Settings that may follow upon others: what a view compiles in advance, and what `profile --pipelines --all` measures.
+
+use super::load::{Layers, PRESETS};
+use super::{Layout, Mode, Settings};
+use std::path::Path;
+
+/// Settings with a name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    pub name: String,
+    pub settings: Settings,
+}
+
+impl Variant {
+    fn new(name: impl Into<String>, settings: Settings) -> Variant {
+        Variant { name: name.into(), settings }
+    }
+}
+
+const MODES: [(Mode, &str); 10] = [
+    (Mode::Surface, "sr"),
+    (Mode::Volume, "vr"),
+    (Mode::Mixed, "mixed"),
+    (Mode::Mip, "mip"),
+    (Mode::MinIp, "minip"),
+    (Mode::Mean, "xray"),
+    (Mode::Plane, "mpr"),
+    (Mode::Orthogonal, "orthogonal"),
+    (Mode::Tomography, "tomography"),
+    (Mode::Cube, "cube"),
+];
+
+/// How rays may read the volume, each with another shader.
+const SAMPLINGS: [&str; 3] = ["hardware", "exact", "quads"];
+
+/// Filters, lights and other choices that are structure: each line is a table of a scene file.
+const CHOICES: [&str; 36] = [
+    "slices.median = true",
+    "slices.sigma = {}",
+    "slices.enhanced_sigma = { window = 5, largest = 19, sigma = 0.1 }",
+    "slices.enhanced_sigma = { growth = true }",
+    "slices.perona_malik = {}",
+    "slices.perona_malik = { scheme = 'aos', step = 2, repeat = 2 }",
+    "slices.perona_malik = { scheme = 'aos-richardson', step = 2, repeat = 2 }",
+    "slices.perona_malik = { scheme = 'rkl1', step = 2, repeat = 2 }",
+    "slices.smooth = { lateral = 1, depth = 1, elevation = 1 }",
+    "slices.estimator = 'median'",
+    "slices.estimator = 'perona-malik'",
+    "slices.estimator = 'gradient-inverse'",
+    "slices.estimator = 'nagao-matsuyama'",
+    "conditioning = { samples = 120, low_pass = 1, dynamic_range = 50 }",
+    "slices.format = 'r16'",
+    "slices.format = 'r32f'",
+    "distance = { median = 5, bilateral = { pixels = 2, distance = 1 }, sigma = {} }",
+    "distance.median = 19",
+    "distance.enhanced_sigma = {}",
+    "distance.perona_malik = {}",
+    "distance.perona_malik = { scheme = 'aos', step = 2 }",
+    "post.sigma = {}",
+    "post.enhanced_sigma = {}",
+    "post.perona_malik = {}",
+    "post.perona_malik = { scheme = 'aos', step = 2 }",
+    "post.floats = true",
+    "light = { shadow = {}, occlusion = {}, skin = {} }",
+    "surface.detector = 'adaptive'",
+    "surface.detector = 'lasting'",
+    "surface.colour = 'rendered'",
+    "surface.colour = 'behind'",
+    "ray.half = true",
+    "ray.rays = 2",
+    "mode = 'vr'\nvolume.compositing = 'pre-integrated'",
+    "mode = 'vr'\nvolume.shading = 'first-hit'",
+    "mode = 'vr'\nvolume.shading = 'depth-coded'",
+];
+
+/// Every mode, layout and preset that a user may switch to from these settings; these are first. A preset is laid over them.
+pub fn switches(from: &Settings) -> Vec<Variant> {
+    let mut variants = vec![Variant::new("as it is", from.clone())];
+    for (mode, name) in MODES {
+        let mut settings = from.clone();
+        settings.set_mode(mode);
+        settings.layout = Layout::Single;
+        variants.push(Variant::new(format!("mode {name}"), settings.clone()));
+        if !mode.is_flat() {
+            settings.layout = Layout::Four;
+            variants.push(Variant::new(format!("mode {name}, layout 4up"), settings));
+        }
+    }
+    variants.push(Variant::new("layout pair", Settings { mode: Mode::Surface, layout: Layout::Pair, ..from.clone() }));
+    variants.extend(PRESETS.iter().filter_map(|(preset, _)| preset_over(from, preset)));
+    variants
+}
+
+/// [`switches`], each way to sample the volume in every mode, every mode of every preset, and every filter and light.
+pub fn all(from: &Settings) -> Vec<Variant> {
+    let mut variants = switches(from);
+    for sampling in SAMPLINGS {
+        let text = format!("ray.sampling = '{sampling}'");
+        if let Some(sampled) = changed(from, &text) {
+            variants.extend(modes_of(&sampled, &text));
+        }
+    }
+    for (preset, _) in PRESETS {
+        if let Some(variant) = preset_over(from, preset) {
+            variants.extend(modes_of(&variant.settings, &variant.name));
+        }
+    }
+    variants
+        .extend(CHOICES.iter().filter_map(|text| Some(Variant::new(text.replace('\n', ", "), changed(from, text)?))));
+    variants
+}
+
+fn modes_of(from: &Settings, name: &str) -> Vec<Variant> {
+    let of = |(mode, mode_name): (Mode, &str)| {
+        let mut settings = from.clone();
+        settings.set_mode(mode);
+        Variant::new(format!("{name}, mode {mode_name}"), settings)
+    };
+    MODES.into_iter().map(of).collect()
+}
+
+fn preset_over(from: &Settings, preset: &str) -> Option<Variant> {
+    let mut layers = Layers::of(from)?;
+    layers.preset(preset).ok()?;
+    let mut settings = layers.finish().ok()?;
+    // The window decides, not the preset.
+    settings.picture.size = from.picture.size;
+    Some(Variant::new(format!("preset {preset}"), settings))
+}
+
+fn changed(from: &Settings, text: &str) -> Option<Settings> {
+    let mut layers = Layers::of(from)?;
+    layers.table("variant", toml::from_str(text).ok()?, Path::new("")).ok()?;
+    layers.finish().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A choice whose setting was renamed would be left out without a word.
+    #[test]
+    fn no_variant_is_lost_and_each_differs_from_the_start() {
+        let from = Settings::default();
+        let variants = all(&from);
+        let count = switches(&from).len() + SAMPLINGS.len() * MODES.len() + PRESETS.len() * MODES.len() + CHOICES.len();
+        assert_eq!(variants.len(), count);
+        let of_choices = &variants[count - CHOICES.len()..];
+        for variant in of_choices {
+            assert_ne!(variant.settings, from, "{} changes nothing", variant.name);
+        }
+        let names: std::collections::BTreeSet<_> = variants.iter().map(|v| &v.name).collect();
+        assert_eq!(names.len(), variants.len(), "two of the same name");
+    }
+
+    #[test]
+    fn every_mode_and_layout_is_among_the_switches() {
+        let from = Settings { layout: Layout::Pair, ..Settings::default() };
+        let variants = switches(&from);
+        assert_eq!(variants[0].settings, from);
+        for (mode, _) in MODES {
+            let layouts: Vec<Layout> =
+                variants[1..].iter().filter(|v| v.settings.mode == mode).map(|v| v.settings.layout).collect();
+            assert!(layouts.contains(&Layout::Single), "{mode:?}: {layouts:?}");
+            assert_eq!(layouts.contains(&Layout::Four), !mode.is_flat(), "{mode:?}: {layouts:?}");
+        }
+    }
+}
