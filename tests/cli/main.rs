@@ -19,6 +19,8 @@ mod signals;
 mod stream;
 mod support_bundle;
 mod verify;
+mod verify_gtest;
+mod verify_isolated;
 #[cfg(feature = "view")]
 mod view;
 
