@@ -93,14 +93,18 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
 /// device cannot filter the volume's format; and no packed neighbours if the device cannot hold them.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
-    let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
-    let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    let filters = filters(context, Slot::Volume.format(&scene));
     let scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
     let fits = fits
         .is_ok_and(|l| Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_bytes));
     if fits { scene } else { scene.without_quads() }
+}
+
+/// True if the device has a linear filter of images in this format.
+pub fn filters(context: &Context, format: Format) -> bool {
+    context.format_features(vulkan(format)).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR)
 }
 
 /// Checks that the device can hold the slots of a plan, before anything is allocated.

@@ -174,7 +174,7 @@ impl Verify {
     /// Runs the checks in processes of their own. Returns the outcomes, and the signal if one ended the run early.
     fn run_isolated(&self, level: Level) -> Result<(Run, Option<&'static str>), Failure> {
         let (begun, held) = (Instant::now(), Held::first());
-        let program = std::env::current_exe().map_err(|e| failed(format!("this program's file is not known: {e}")))?;
+        let program = this_program()?;
         let command = || self.worker_command(&program);
         let signal = || held.signal();
         let limit = Duration::from_secs(self.check_timeout);
@@ -284,13 +284,35 @@ impl Verify {
         announce(&dut, &mut lines);
         lines.iter().for_each(|line| say!("{line}"));
         let begun = Instant::now();
-        let tell = |detection: &Detection| match &detection.by {
-            _ if detection.left_out => say!("{}: left out\n    {}", detection.fault, detection.message),
-            Some(by) => say!("{}: caught by {by}\n    {}", detection.fault, detection.message),
-            None => say!("{}: NOT CAUGHT ({})\n    {}", detection.fault, detection.what, detection.message),
+        let tell = |detection: &Detection| {
+            match &detection.by {
+                _ if detection.left_out => say!("{}: left out\n    {}", detection.fault, detection.message),
+                Some(by) => say!("{}: caught by {by}\n    {}", detection.fault, detection.message),
+                None => say!("{}: NOT CAUGHT ({})\n    {}", detection.fault, detection.what, detection.message),
+            }
+            detection.history().for_each(|line| say!("    {line}"));
         };
-        let detection = self_test::run(dut.options(), tell).map_err(failed)?;
-        Ok(dut.run_of(detection.iter().map(Detection::outcome).collect(), begun))
+        let mut detections = self_test::run(dut.options(), tell).map_err(failed)?;
+        let crash = self.crash()?;
+        tell(&crash);
+        detections.push(crash);
+        Ok(dut.run_of(detections.iter().map(Detection::outcome).collect(), begun))
+    }
+
+    /// Lets the process of a check crash, as a faulty driver does.
+    fn crash(&self) -> Result<Detection, Failure> {
+        let program = this_program()?;
+        let crash = "segv:known answers / every level of a picture";
+        let command = || {
+            let mut command = self.worker_command(&program);
+            command.args(["--inject-crash", crash]);
+            command
+        };
+        let (mut workers, ready) =
+            Workers::start(&command, Duration::from_secs(self.check_timeout), &|| None, Arc::new(|_| ()))?;
+        let is_chosen = |check: &CheckName| crash.ends_with(&format!(":{} / {}", check.group, check.name));
+        let place = ready.checks.iter().position(is_chosen).ok_or_else(|| failed("there is no check to crash"))?;
+        Ok(self_test::crash(&workers.run(place, &ready.checks[place])))
     }
 
     /// Opens the device, with validation if its layer is installed. Adds what to print of it to `lines`.
@@ -395,6 +417,11 @@ impl Verify {
 fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) -> Result<(), Failure> {
     let Some(file) = file else { return Ok(()) };
     write_report(file, &text().map_err(failed)?)
+}
+
+/// The file of this program, which workers run.
+fn this_program() -> Result<PathBuf, Failure> {
+    std::env::current_exe().map_err(|e| failed(format!("this program's file is not known: {e}")))
 }
 
 fn announce(dut: &DeviceUnderTest, lines: &mut Vec<String>) {

@@ -22,6 +22,7 @@ pub mod passes;
 mod progress;
 pub mod render;
 pub mod report;
+pub mod sampling;
 pub mod self_test;
 mod speed;
 pub mod stress;
@@ -45,6 +46,7 @@ use std::time::Instant;
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         passes::checks,
+        sampling::checks,
         known_answers::checks,
         modes::checks,
         determinism::checks,
