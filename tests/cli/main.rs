@@ -7,6 +7,7 @@ mod common;
 #[cfg(feature = "view")]
 mod direct;
 mod docs;
+mod drivers;
 mod filter;
 mod frames;
 mod inputs;

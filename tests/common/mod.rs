@@ -5,6 +5,7 @@
 
 pub mod files;
 pub mod gpu;
+pub mod layer;
 #[cfg(target_os = "linux")]
 pub mod motor;
 pub mod own_process;
