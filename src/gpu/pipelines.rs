@@ -34,6 +34,15 @@ type Key = (&'static str, Vec<(&'static str, i32)>, Vec<Format>);
 /// Returns the SPIR-V words of a shader by name.
 pub type Shaders = dyn Fn(&str) -> Result<Vec<u32>, String> + Send + Sync;
 
+/// A shader as the driver gets it.
+pub struct Shader {
+    pub(super) name: &'static str,
+    pub words: Vec<u32>,
+    /// Specialization constants by name.
+    pub constants: Vec<(&'static str, i32)>,
+    pub module: Module,
+}
+
 /// A cache of all pipelines made so far: going back to an earlier setting compiles nothing.
 pub struct Pipelines {
     context: Arc<Context>,
@@ -97,7 +106,7 @@ impl Pipelines {
         if let Some(pipeline) = self.cached(&key) {
             return Ok(pipeline);
         }
-        let pipeline = self.make(&key, pass, scene, args)?;
+        let pipeline = self.make(pass, scene, args)?;
         // Another thread may have made the same pipeline meanwhile; either can be used.
         self.made.lock().unwrap_or_else(|e| e.into_inner()).insert(key, pipeline.clone());
         Ok(pipeline)
@@ -122,7 +131,7 @@ impl Pipelines {
             let key = Pipelines::key(step.pass, scene, &args);
             let pipeline = match made.get(&key) {
                 Some(pipeline) => pipeline.clone(),
-                None => self.make(&key, step.pass, scene, &args)?,
+                None => self.make(step.pass, scene, &args)?,
             };
             made.insert(key, pipeline.clone());
             steps.push(pipeline);
@@ -131,7 +140,12 @@ impl Pipelines {
         Ok(steps)
     }
 
-    fn make(&self, key: &Key, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
+    /// The shader of a pass as the driver gets it, with its specialization constants.
+    ///
+    /// # Errors
+    /// As of [`Pipelines::get`].
+    pub(super) fn shader(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Shader, GpuError> {
+        let key = Pipelines::key(pass, scene, args);
         let at_fault = |fault: String| GpuError::Shader { shader: key.0.to_string(), fault };
         let words = (self.shaders)(key.0).map_err(at_fault)?;
         let mut words = interface_check::for_scene(pass, scene, args, &words).map_err(at_fault)?;
@@ -146,7 +160,11 @@ impl Pipelines {
         let module = spirv::reflect(&words).map_err(|e| at_fault(e.to_string()))?;
         interface_check::check(pass, scene, args, &module).map_err(|e| at_fault(format!("{}: {e}", pass.name)))?;
         let constants = self.context.faults.constants(pass.name, &key.1);
-        Pipeline::new(&self.context, self.sampler, key.0, &constants, &words, module).map(Arc::new)
+        Ok(Shader { name: key.0, words, constants, module })
+    }
+
+    fn make(&self, pass: &Pass, scene: &Scene, args: &DispatchArgs) -> Result<Arc<Pipeline>, GpuError> {
+        Pipeline::new(&self.context, self.sampler, self.shader(pass, scene, args)?).map(Arc::new)
     }
 }
 
@@ -159,14 +177,8 @@ impl Drop for Pipelines {
 }
 
 impl Pipeline {
-    fn new(
-        context: &Arc<Context>,
-        sampler: vk::Sampler,
-        name: &'static str,
-        constants: &[(&'static str, i32)],
-        words: &[u32],
-        module: Module,
-    ) -> Result<Pipeline, GpuError> {
+    fn new(context: &Arc<Context>, sampler: vk::Sampler, shader: Shader) -> Result<Pipeline, GpuError> {
+        let Shader { name, words, constants, module } = shader;
         let device = &context.device;
         let operation = || format!("create pipeline '{name}'");
         let bindings: Vec<_> = module
@@ -203,7 +215,7 @@ impl Pipeline {
         context.name(set_layout, name);
         context.name(pipeline.layout, name);
         // SAFETY: the words were reflected, so they are a module; the driver checks the rest.
-        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(words), None) }
+        let shader = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(operation)?;
         context.name(shader, name);
         let values: Vec<(u32, i32)> = (pipeline.module.constants.iter())

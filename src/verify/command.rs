@@ -12,6 +12,7 @@ use crate::verify::progress::{self, Progress, Style};
 use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
 use crate::verify::report::prometheus::prometheus;
 use crate::verify::report::{self, CheckName, Level, Outcome, Run, Verdict, html, junit};
+use crate::verify::reproduce::{ReproduceError, reproduce};
 use crate::verify::self_test::{self, Detection};
 use crate::verify::{self, Check, DeviceUnderTest};
 use indicatif::ProgressBar;
@@ -76,6 +77,13 @@ pub struct Verify {
     /// List the checks and exit
     #[arg(long)]
     list: bool,
+    /// Write one dispatch of this check's pass for a bug report: shader, inputs, expected values, and a script for Amber. The smallest
+    /// that fails, or the smallest
+    #[arg(long, value_name = "CHECK", requires = "output")]
+    reproduce: Option<String>,
+    /// Folder for --reproduce. Created when needed
+    #[arg(short, long, value_name = "FOLDER", requires = "reproduce")]
+    output: Option<PathBuf>,
     /// Run each check in a process of its own, so that one that crashes or hangs is a failed check and the rest goes on (the default
     /// with --full)
     #[arg(long, conflicts_with_all = ["no_isolate", "self_test"])]
@@ -128,6 +136,9 @@ impl Verify {
                 false => names.iter().for_each(|check| say!("{} / {}", check.group, check.name)),
             }
             return Ok(());
+        }
+        if let (Some(check), Some(folder)) = (&self.reproduce, &self.output) {
+            return self.reproduce(level, check, folder);
         }
         let options = BaselineOptions::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
         let files = [
@@ -216,6 +227,24 @@ impl Verify {
         );
         progress.into_inner().finish();
         outcomes
+    }
+
+    /// Writes a dispatch as files.
+    fn reproduce(&self, level: Level, check: &str, folder: &Path) -> Result<(), Failure> {
+        let mut lines = Vec::new();
+        let mut dut = self.open(level, &mut lines)?;
+        announce(&dut, &mut lines);
+        lines.iter().for_each(|line| say!("{line}"));
+        let made = reproduce(&mut dut, check, folder).map_err(|error| match error {
+            ReproduceError::NoPass(_) => input(format!("--reproduce {error}")),
+            other => failed(other),
+        })?;
+        say!("{}: {}", made.title, if made.fails { "differs from its reference" } else { "as its reference" });
+        if let Some(why) = &made.without_script {
+            say!("no script for Amber: {why}");
+        }
+        say!("written: {} files in {}", made.files.len(), folder.display());
+        Ok(())
     }
 
     /// Runs checks for another process, which asks for them on standard input.

@@ -22,6 +22,7 @@ pub mod passes;
 mod progress;
 pub mod render;
 pub mod report;
+pub mod reproduce;
 pub mod sampling;
 pub mod self_test;
 mod speed;
