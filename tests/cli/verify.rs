@@ -22,8 +22,18 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 }
 
 /// All groups but the passes, which are checked one by one by tests/gpu: they would take half of the gate's time for this command.
-const GROUPS: [&str; 9] =
-    ["determinism", "failures", "formats", "hazards", "known answers", "memory", "modes", "speed", "stress"];
+const GROUPS: [&str; 10] = [
+    "determinism",
+    "failures",
+    "formats",
+    "hazards",
+    "known answers",
+    "memory",
+    "modes",
+    "sampling",
+    "speed",
+    "stress",
+];
 
 /// All quick checks of these groups pass on this device, and every report file says so.
 #[test]

@@ -79,6 +79,15 @@ fn a_crash_in_the_same_process_ends_the_run() {
     let (code, out, err) = run(&[&["verify"], &FEW[..], &flags].concat());
     assert_eq!(code, Some(7), "{out}{err}");
     assert!(!out.contains("passed "), "{out}");
+    // A full run isolates its checks unless told otherwise.
+    let folder = Folder::new("verify-full-crash");
+    let file = folder.path("run.json");
+    let crash = "exit:known answers / every level of a picture";
+    let only = ["--only", "every level of a picture", "--only", "a sphere in a sweep"];
+    let (code, out, err) = run(&[&["verify", "--full", "--json", &file, "--inject-crash", crash], &only[..]].concat());
+    assert_eq!(code, Some(1), "{out}{err}");
+    let full = report::from_json(&fs::read_to_string(&file).expect("written")).expect("read back");
+    assert_eq!((full.count(Verdict::Failed), full.count(Verdict::Passed)), (1, 1), "{out}");
 }
 
 #[test]

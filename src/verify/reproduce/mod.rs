@@ -17,6 +17,9 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Minimum number of texels of the outputs of a dispatch that does not fail: fewer say little.
+const MIN_TEXELS: u64 = 64;
+
 /// A dispatch with everything that it depends on.
 struct Case {
     /// One line: pass, scene and input.
@@ -82,7 +85,8 @@ pub struct Reproduction {
     pub files: Vec<String>,
 }
 
-/// Writes a dispatch of a pass into a folder, which is created when needed: the smallest that fails, otherwise the smallest.
+/// Writes a dispatch of a pass into a folder, which is created when needed: the smallest that fails, otherwise the smallest of at least
+/// [`MIN_TEXELS`] texels.
 ///
 /// # Errors
 /// No pass has this name, the device fails, or a file cannot be written.
@@ -106,7 +110,7 @@ pub enum ReproduceError {
     File(String),
 }
 
-/// The smallest dispatch of the pass that fails, or the smallest, and whether it fails.
+/// The smallest dispatch of the pass that fails, otherwise the smallest that tells something; and whether it fails.
 fn find(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<(Case, bool), ReproduceError> {
     let scenes = dut.scenes();
     let size = |scene: &Scene| -> u64 {
@@ -130,7 +134,12 @@ fn find(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<(Case, bool), 
             return Ok((case(dut, pass, choice)?, true));
         }
     }
-    let first = tried.first().ok_or_else(|| ReproduceError::NoPass(pass.name.into()))?;
+    let is_telling = |choice: &&Choice| {
+        let writes = pass.writes(choice.scene, &dispatch_args_of(choice.scene, choice.iteration));
+        writes.iter().map(|bind| bind.slot.shape(choice.scene).texels()).sum::<u64>() >= MIN_TEXELS
+    };
+    let first = tried.iter().find(is_telling).or(tried.first());
+    let first = first.ok_or_else(|| ReproduceError::NoPass(pass.name.into()))?;
     Ok((case(dut, pass, first)?, false))
 }
 
@@ -217,7 +226,10 @@ fn before(scene: &Scene, bind: &Bind, inputs: &Arrays, is_output: bool) -> (Vec<
     let given = inputs.iter().find(|(name, _)| *name == bind.name).filter(|_| !is_output);
     let texels = match given {
         Some((_, texels)) => texels.stored_part(bind.slot, scene),
-        None => Texels::from_fn(bind.slot.shape(scene).size(), format.channels(), |_, _| POISON),
+        None => {
+            let filler = if is_output { POISON } else { 0.0 };
+            Texels::from_fn(bind.slot.shape(scene).size(), format.channels(), |_, _| filler)
+        }
     };
     let mut size = texels.size;
     if bind.part == Part::Layer {
