@@ -1,6 +1,7 @@
 //! Arguments of commands that render live: the source of frames, and how volumes become pictures.
 
 use super::motor::{MotorArgs, PlannedSweep};
+use crate::gpu::TimeStamps;
 use crate::kiosk::config::Config;
 use crate::live::Update;
 use crate::probe::Geometry;
@@ -222,6 +223,9 @@ pub struct StreamArgs {
     /// Number of device queues to use, 1 to 3 [default: one for each kind of work that the device has a queue for]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
     queues: Option<u8>,
+    /// Time every pass, not only pictures and frames as a whole. Passes then do not overlap, so that pictures take longer
+    #[arg(long)]
+    timings: bool,
 }
 
 impl StreamArgs {
@@ -232,6 +236,11 @@ impl StreamArgs {
             "rolling" => Ok(Update::Rolling),
             other => Err(input(format!("--update {other}: must be whole or rolling"))),
         }
+    }
+
+    /// What is timed on the device.
+    pub fn time_stamps(&self) -> TimeStamps {
+        if self.timings { TimeStamps::EachPass } else { TimeStamps::Ends }
     }
 
     /// The value of `--queues`.

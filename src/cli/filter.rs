@@ -1,7 +1,7 @@
 //! `echolume filter`: applies the 2D slice filters to an ordinary picture.
 
 use crate::args::{check_outputs, open_device};
-use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions};
+use crate::gpu::{Context, DeviceChoice, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{Slot, Texels};
 use crate::picture::{self, Grey, Region};
 use crate::profile::export::pass_time_table;
@@ -114,7 +114,9 @@ impl Filter {
         say!("input: {} x {} pixels of {bits} bits{colour}", grey.width, grey.height);
 
         if let Some(output) = &self.output {
-            let mut renderer = Renderer::new(&context, scene, &RendererOptions::default()).map_err(failed)?;
+            let time_stamps = if self.timings { TimeStamps::EachPass } else { TimeStamps::None };
+            let options = RendererOptions { time_stamps, ..RendererOptions::default() };
+            let mut renderer = Renderer::new(&context, scene, &options).map_err(failed)?;
             renderer.frame(0, &grey.bytes(), 0).map_err(failed)?;
             let filtered = read(&mut renderer, Slot::Volume)?.values;
             let made = grey.with(&filtered);

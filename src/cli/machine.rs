@@ -33,6 +33,9 @@ impl Devices {
             if !device.missing.is_empty() {
                 say!("    cannot be used: lacks {}", device.missing.join(", "));
             }
+            if let Some(budget) = &device.budget {
+                say!("    memory budget: {}", budget.line());
+            }
             for without in &device.missing_optional {
                 say!("    works without {without}");
             }

@@ -8,8 +8,9 @@ use crate::error_report::command::{parse_nanoseconds, read_report};
 use crate::error_report::{Measure, choose, map};
 use crate::files;
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Bands, Context, GpuError, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{PassTime, Slot, Texels};
+use crate::picture::Picture;
 use crate::plan::Plan;
 use crate::probe::Probe;
 use crate::profile::export::pass_time_table;
@@ -91,21 +92,25 @@ impl Render {
             std::fs::create_dir_all(folder)
                 .map_err(|e| failed(format!("{}: cannot be written: {e}", folder.display())))?;
         }
-        let context = self.input.open_device(self.validate)?;
-        let mut kept = Vec::new();
-        let compared = finer.map(|finer| (scene.clone(), finer));
-        let mut renderer = Renderer::new(&context, scene, &options).map_err(|e| match e {
-            GpuError::Shader { .. } if self.glsl.is_some() => input(e),
-            e => failed(e),
-        })?;
-        let send = |frame: Frame| {
-            renderer.frame(frame.slice as u32, &frame.bytes, 0).map_err(failed)?;
-            kept.extend(compared.is_some().then_some(frame));
-            Ok(())
+        let mut context = self.input.open_device(self.validate)?;
+        let mut options = options;
+        let mut losses = 0;
+        let Drawn { mut renderer, picture, kept } = loop {
+            match self.draw(&context, &mut *source, scene.clone(), &options) {
+                Ok(drawn) => break drawn,
+                Err(DrawFault::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
+                    tracing::warn!("{lost}; the device is reopened, and its work is divided into smaller parts");
+                    losses += 1;
+                    options.bands = Bands::Measured { losses };
+                    context = self.input.open_device(self.validate)?;
+                    source = self.open()?.0;
+                }
+                Err(DrawFault::Gpu(e @ GpuError::Shader { .. })) if self.glsl.is_some() => return Err(input(e)),
+                Err(DrawFault::Gpu(e)) => return Err(failed(e)),
+                Err(DrawFault::Source(failure)) => return Err(failure),
+            }
         };
-        self.input.for_each_frame(&mut *source, send)?;
-        renderer.show(0).map_err(failed)?;
-        let picture = renderer.picture().map_err(failed)?;
+        let compared = finer.map(|finer| (scene, finer));
         picture.save(&self.output).map_err(failed)?;
         say!("picture: {}", self.output.display());
         let measured = renderer.take_times().map_err(failed)?;
@@ -131,6 +136,35 @@ impl Render {
             None => Ok(()),
             Some(first) => Err(failed(format!("validation: {first}"))),
         }
+    }
+
+    /// Sends a volume and draws its picture. The frames are kept for an error map.
+    fn draw(
+        &self,
+        context: &Arc<Context>,
+        source: &mut dyn Source,
+        scene: Scene,
+        options: &RendererOptions,
+    ) -> Result<Drawn, DrawFault> {
+        let mut renderer = Renderer::new(context, scene, options)?;
+        let (mut kept, mut fault) = (Vec::new(), None);
+        let send = |frame: Frame| {
+            if let Err(e) = renderer.frame(frame.slice as u32, &frame.bytes, 0) {
+                let failure = failed(&e);
+                fault = Some(e);
+                return Err(failure);
+            }
+            kept.extend(self.error_map.is_some().then_some(frame));
+            Ok(())
+        };
+        let sent = self.input.for_each_frame(source, send);
+        if let Some(fault) = fault {
+            return Err(DrawFault::Gpu(fault));
+        }
+        sent.map_err(DrawFault::Source)?;
+        renderer.show(0)?;
+        let picture = renderer.picture()?;
+        Ok(Drawn { renderer, picture, kept })
     }
 
     /// Opens the recording and builds its scene, with the settings that keep the budget if there is one.
@@ -206,7 +240,9 @@ impl Render {
     }
 
     fn options(&self) -> Result<RendererOptions, Failure> {
-        let mut options = RendererOptions::default();
+        let times_passes = self.timings || self.budget.is_some();
+        let time_stamps = if times_passes { TimeStamps::EachPass } else { TimeStamps::None };
+        let mut options = RendererOptions { time_stamps, ..RendererOptions::default() };
         if let Some(folder) = &self.glsl {
             options.shaders = ShaderFolder::open(folder).map_err(input)?.shaders();
         }
@@ -231,6 +267,28 @@ impl Render {
         }
         say!("slots: {}", folder.display());
         Ok(())
+    }
+}
+
+/// A device that was lost so often is given up: no band can become smaller.
+const MAX_LOSSES: u32 = 6;
+
+/// A picture, the renderer that drew it, and the frames that it shows, if they are needed again.
+struct Drawn {
+    renderer: Renderer,
+    picture: Picture,
+    kept: Vec<Frame>,
+}
+
+/// Why a picture could not be drawn.
+enum DrawFault {
+    Gpu(GpuError),
+    Source(Failure),
+}
+
+impl From<GpuError> for DrawFault {
+    fn from(error: GpuError) -> DrawFault {
+        DrawFault::Gpu(error)
     }
 }
 

@@ -12,13 +12,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// A device that is lost so often in a row is given up.
+const MAX_LOSSES: u32 = 6;
 /// Interval of the statistics lines.
 const INTERVAL: Duration = Duration::from_secs(1);
 
 #[derive(clap::Args)]
 #[command(
     after_help = "One line per second: frames, volumes and pictures per second, dropped volumes, latency from the arrival of a frame to \
-                        the pixels that show it, and the mean time and number of runs of every pass.\n\nExamples:\n  \
+                        the pixels that show it, and the mean time and number of pictures, of conversions of frames, and of copies on a \
+                        queue of their own; with --timings of every pass.\n\nExamples:\n  \
                         echolume stream --null --volumes 20\n  \
                         echolume stream --source sweep.frames --real-time --out pictures\n  \
                         tools/pipe_frames.py | echolume stream --source - --null\n  \
@@ -68,8 +71,8 @@ impl Stream {
         let mut context = self.scene.open_device(self.validate)?;
         let feed = Feed::new(source, self.record.as_deref())
             .map_err(|e| failed(format!("a thread for the source cannot be started: {e}")))?;
-        let (images, queues) = (self.stream.images, self.stream.queues());
-        let options = StreamOptions { update, images, queues, ..StreamOptions::default() };
+        let (images, queues, time_stamps) = (self.stream.images, self.stream.queues(), self.stream.time_stamps());
+        let options = StreamOptions { update, images, queues, time_stamps, ..StreamOptions::default() };
         let mut stream = Live::new(&context, feed, settings, options);
         let done = self.run_stream(&mut stream, update, &mut context);
         drop(stream);
@@ -86,15 +89,16 @@ impl Stream {
         let signals = Held::first();
         let began = Instant::now();
         let (mut last_status, mut all, mut memory) = (began, Statistics::default(), None);
-        let (mut pictures, mut lost_at, mut enough_at) = (0, None, None);
+        let (mut pictures, mut losses, mut enough_at) = (0, 0, None);
         // Said of the first picture that is wholly one colour, not of every one.
         let mut explained = false;
         let end = loop {
             let step = match stream.step(Duration::from_millis(50)) {
-                // A device that is lost again before its first picture is given up.
-                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && lost_at != Some(pictures) => {
+                // Each time the work is divided into smaller parts. A device that is lost all the same, without a picture in between, is
+                // given up.
+                Err(StreamError::Gpu(lost)) if lost.is_device_lost() && losses < MAX_LOSSES => {
                     tracing::warn!("{lost}; the device is reopened; rendering continues with the next volume");
-                    lost_at = Some(pictures);
+                    losses += 1;
                     *context = self.scene.open_device(self.validate)?;
                     stream.revive(context).map_err(fault)?;
                     continue;
@@ -109,6 +113,7 @@ impl Stream {
                         explained = explain_one_colour(stream, &shown, &file)?;
                     }
                     pictures += 1;
+                    losses = 0;
                 }
                 Step::Fault(fault) => tracing::warn!("{fault}"),
                 Step::Progress => {}

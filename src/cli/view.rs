@@ -180,6 +180,7 @@ impl View {
         options.retry = options.retry.or(Some(usual.live.retry)).filter(|_| self.kiosk);
         options.overlay = !self.no_ui;
         (options.images, options.queues) = (self.stream.images, self.stream.queues());
+        options.time_stamps = self.stream.time_stamps();
         Ok(wanted)
     }
 

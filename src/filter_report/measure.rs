@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, candidates};
 use super::quality::quality;
 use super::{Area, Areas, Row, Subject};
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{PassTime, Slot, Stage, by_name};
 use crate::picture::Region;
 use crate::scene::load::Layers;
@@ -191,7 +191,10 @@ impl Middle {
         bytes: &[u8],
     ) -> Result<(Vec<f64>, Vec<PassTime>), MeasureError> {
         let renderer: &mut Renderer = match &mut self.renderer {
-            None => self.renderer.insert(Renderer::new(context, scene, &RendererOptions::default())?),
+            None => {
+                let options = RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
+                self.renderer.insert(Renderer::new(context, scene, &options)?)
+            }
             Some(renderer) => {
                 renderer.change(scene)?;
                 renderer

@@ -1,9 +1,11 @@
 //! Instance, device, queues and memory allocator. Everything made from a context holds an `Arc` of it, and its `Drop` destroys them in
 //! order.
 
+use super::budget::MemoryBudget;
 use super::device_selection::{self, Candidate, DeviceChoice, QueueInfo};
 use super::error::{ErrorContext, GpuError};
 use super::faults::{Faults, InjectionPoint};
+use super::lost_device::LossReporting;
 use super::validation::{self, Layer, Messenger};
 use super::window::target::Target;
 use crate::queues::MAX_QUEUES;
@@ -11,7 +13,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::CString;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -44,6 +46,8 @@ pub struct Context {
     /// Reads the device's clock, if the device can.
     clock: Option<ash::ext::calibrated_timestamps::Device>,
     names: Option<ash::ext::debug_utils::Device>,
+    /// Reports why the device was lost.
+    pub(super) loss: LossReporting,
     /// In the order of `candidate.queues`: rendering, ingestion, copies.
     queues: Vec<Mutex<vk::Queue>>,
     /// The queue families that share slots used on several queues.
@@ -51,6 +55,8 @@ pub struct Context {
     /// Taken in `drop`, before the device is destroyed.
     pub(super) allocator: Mutex<Option<Allocator>>,
     formats: Mutex<HashMap<vk::Format, vk::FormatFeatureFlags>>,
+    /// The window shows more than 8 bits a channel.
+    pub is_deep: AtomicBool,
     pub faults: Faults,
     pub counts: Counts,
 }
@@ -61,6 +67,19 @@ pub struct Presentation {
     pub swapchains: ash::khr::swapchain::Device,
     /// If the target is a monitor.
     pub displays: Option<ash::khr::display::Instance>,
+    /// Waits until a picture is on the monitor, if the device can.
+    pub waits: Option<ash::khr::present_wait::Device>,
+}
+
+/// A reading of the device's clock and the host's.
+pub(super) struct ClockReading {
+    pub ticks: u64,
+    /// The host's monotonic clock, ns, if the driver reads it in the same call.
+    pub monotonic: Option<u64>,
+    /// The host's clock around the call.
+    pub at: Instant,
+    /// The largest time between the readings, ns.
+    pub deviation: u64,
 }
 
 /// Counts, since the start, of costly operations that must not happen for every frame.
@@ -83,7 +102,7 @@ pub struct Counts {
 pub fn list() -> Result<Vec<Candidate>, GpuError> {
     let entry = load()?;
     let instance = create_instance(&entry, None, false, None)?;
-    let candidates = device_selection::candidates(&instance);
+    let candidates = device_selection::candidates(&entry, &instance);
     // SAFETY: nothing made from the instance is left.
     unsafe { instance.destroy_instance(None) };
     candidates
@@ -135,7 +154,7 @@ impl Context {
         layer: Option<Layer>,
         target: Option<&Target>,
     ) -> Result<Arc<Context>, GpuError> {
-        let mut candidates = device_selection::candidates(instance)?;
+        let mut candidates = device_selection::candidates(&entry, instance)?;
         if let Some(target) = target {
             candidates.iter_mut().for_each(|candidate| target.check_support(&entry, instance, candidate));
         }
@@ -172,6 +191,11 @@ impl Context {
             clock: (candidate.calibrated_timestamps)
                 .then(|| ash::ext::calibrated_timestamps::Device::new(instance, &device)),
             names: debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, &device)),
+            loss: LossReporting {
+                faults: candidate.device_fault.then(|| ash::ext::device_fault::Device::new(instance, &device)),
+                checkpoints: (candidate.checkpoints)
+                    .then(|| ash::nv::device_diagnostic_checkpoints::Device::new(instance, &device)),
+            },
             queues: {
                 // SAFETY: the device was created with these queues.
                 let get = |q: &QueueInfo| unsafe { device.get_device_queue(q.family, q.index) };
@@ -183,6 +207,7 @@ impl Context {
                 surfaces: ash::khr::surface::Instance::new(&entry, instance),
                 swapchains: ash::khr::swapchain::Device::new(instance, &device),
                 displays: target.is_monitor().then(|| ash::khr::display::Instance::new(&entry, instance)),
+                waits: candidate.present_wait.then(|| ash::khr::present_wait::Device::new(instance, &device)),
             }),
             instance: instance.clone(),
             entry,
@@ -192,6 +217,7 @@ impl Context {
             device,
             allocator: Mutex::new(Some(allocator)),
             formats: Mutex::default(),
+            is_deep: AtomicBool::new(false),
             faults: Faults::default(),
             counts: Counts::default(),
         });
@@ -228,14 +254,42 @@ impl Context {
         own.map(|heap| heap.size).sum()
     }
 
-    /// A time stamp of the device, and the time at which the host read it; `None` if the device's clock cannot be read.
-    pub(super) fn device_ticks(&self) -> Option<(u64, Instant)> {
+    /// The clock of the device and that of the host, read by one call; `None` if the device's clock cannot be read.
+    pub(super) fn device_ticks(&self) -> Option<ClockReading> {
         let clock = self.clock.as_ref()?;
-        let info = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::DEVICE)];
+        let domain = |domain| vk::CalibratedTimestampInfoEXT::default().time_domain(domain);
+        let both = [domain(vk::TimeDomainEXT::DEVICE), domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
+        let asked = if self.candidate.reads_monotonic { &both[..] } else { &both[..1] };
         let before = Instant::now();
-        // SAFETY: the extension is enabled; the device's own domain is always among its domains.
-        let (ticks, _) = unsafe { clock.get_calibrated_timestamps(&info) }.ok()?;
-        Some((*ticks.first()?, before + before.elapsed() / 2))
+        // SAFETY: the extension is enabled; the device's own domain is always among its domains, the other one was listed.
+        let (read, deviation) = unsafe { clock.get_calibrated_timestamps(asked) }.ok()?;
+        let took = before.elapsed();
+        // Without the host's clock in the same call, the device's was read at some time during it.
+        let around = if self.candidate.reads_monotonic { 0 } else { took.as_nanos() as u64 / 2 };
+        Some(ClockReading {
+            ticks: *read.first()?,
+            monotonic: read.get(1).copied(),
+            at: before + took / 2,
+            deviation: deviation.saturating_add(around),
+        })
+    }
+
+    /// The host's clock, and the same instant on the monotonic clock that the driver reads, ns, if it does.
+    pub(super) fn clocks_now(&self) -> (Instant, Option<u64>) {
+        let asked = [vk::CalibratedTimestampInfoEXT::default().time_domain(vk::TimeDomainEXT::CLOCK_MONOTONIC)];
+        let read = || {
+            let clock = self.clock.as_ref().filter(|_| self.candidate.reads_monotonic)?;
+            let before = Instant::now();
+            // SAFETY: the extension is enabled and the domain was listed.
+            let (read, _) = unsafe { clock.get_calibrated_timestamps(&asked) }.ok()?;
+            let took = before.elapsed();
+            Some((took, before + took / 2, *read.first()?))
+        };
+        // The shortest of a few calls relates both best.
+        match (0..8).filter_map(|_| read()).min_by_key(|(took, ..)| *took) {
+            Some((_, at, monotonic)) => (at, Some(monotonic)),
+            None => (Instant::now(), None),
+        }
     }
 
     /// Features of a format with optimal tiling.
@@ -302,6 +356,26 @@ impl Context {
                 unsafe { self.device.queue_submit2(*queue, &[*submit], done) }
             })
             .context(operation)
+            .map_err(|error| self.explain(error))
+    }
+
+    /// An error with the report of the driver, if the device is lost and its driver reports anything.
+    pub(super) fn explain(&self, error: GpuError) -> GpuError {
+        let GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST } = error else { return error };
+        let report = self.faults.loss_report().unwrap_or_else(|| {
+            let queues: Vec<_> = self.queues.iter().map(|q| q.lock().unwrap_or_else(|e| e.into_inner())).collect();
+            self.loss.read(self.device.handle(), &queues.iter().map(|q| **q).collect::<Vec<_>>())
+        });
+        match report.is_empty() {
+            true => GpuError::Vulkan { operation, result: vk::Result::ERROR_DEVICE_LOST },
+            false => GpuError::Lost { operation, report: report.to_string() },
+        }
+    }
+
+    /// The current budget of the device's memory; `None` if the device reports none.
+    pub(super) fn memory_budget(&self) -> Option<MemoryBudget> {
+        let read = || self.candidate.budget.as_ref().map(|_| MemoryBudget::read(&self.instance, self.candidate.handle));
+        self.faults.budget().or_else(read)
     }
 
     /// Runs `work` with exclusive access to the rendering queue, for uses other than [`Context::submit`].
@@ -406,6 +480,13 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
     extensions.extend(candidate.push_descriptors.then_some(ash::khr::push_descriptor::NAME.as_ptr()));
     extensions.extend(candidate.calibrated_timestamps.then_some(ash::ext::calibrated_timestamps::NAME.as_ptr()));
     extensions.extend(presents.then_some(ash::khr::swapchain::NAME.as_ptr()));
+    extensions.extend(candidate.budget.is_some().then_some(ash::ext::memory_budget::NAME.as_ptr()));
+    extensions.extend(candidate.device_fault.then_some(ash::ext::device_fault::NAME.as_ptr()));
+    extensions.extend(candidate.checkpoints.then_some(ash::nv::device_diagnostic_checkpoints::NAME.as_ptr()));
+    let waits = presents && candidate.present_wait;
+    if waits {
+        extensions.extend([ash::khr::present_id::NAME.as_ptr(), ash::khr::present_wait::NAME.as_ptr()]);
+    }
     let core = vk::PhysicalDeviceFeatures::default()
         .pipeline_statistics_query(candidate.pipeline_statistics)
         .shader_storage_image_extended_formats(true)
@@ -418,12 +499,21 @@ fn create_device(instance: &ash::Instance, candidate: &Candidate, presents: bool
         .synchronization2(true)
         .maintenance4(true)
         .dynamic_rendering(presents);
-    let create = vk::DeviceCreateInfo::default()
+    let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
+    let mut present_id = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
+    let mut present_wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
+    let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .enabled_features(&core)
         .push_next(&mut v12)
         .push_next(&mut v13);
+    if candidate.device_fault {
+        create = create.push_next(&mut fault);
+    }
+    if waits {
+        create = create.push_next(&mut present_id).push_next(&mut present_wait);
+    }
     // SAFETY: `choose` checked that every requested feature is supported; every pointer outlives the call.
     unsafe { instance.create_device(candidate.handle, &create, None) }
         .context(|| format!("create device '{}'", candidate.name))

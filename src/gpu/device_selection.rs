@@ -1,5 +1,6 @@
 //! Device selection: the properties of each device, what it lacks, and which one is used.
 
+use super::budget::MemoryBudget;
 use super::error::GpuError;
 use ash::vk;
 use std::borrow::Cow;
@@ -41,12 +42,22 @@ pub struct Candidate {
     pub queues: Vec<QueueInfo>,
     /// Time stamps can be converted to the host's clock.
     pub calibrated_timestamps: bool,
+    /// The same call reads the host's monotonic clock.
+    pub reads_monotonic: bool,
     /// Supports push descriptors.
     pub push_descriptors: bool,
     /// Can count shader invocations.
     pub pipeline_statistics: bool,
     /// Can present pictures, with panels drawn over them.
     pub can_present: bool,
+    /// Reports when a picture is on the monitor.
+    pub present_wait: bool,
+    /// Reports why it was lost.
+    pub device_fault: bool,
+    /// Reports the passes that its queues had reached when it was lost.
+    pub checkpoints: bool,
+    /// The budget of its memory when it was listed, if it reports one.
+    pub budget: Option<MemoryBudget>,
     pub limits: vk::PhysicalDeviceLimits,
     /// The smaller of the largest allocation and the largest buffer, bytes.
     pub max_bytes: u64,
@@ -108,14 +119,14 @@ impl Candidate {
 }
 
 /// Every device of an instance, in the driver's order.
-pub fn candidates(instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
+pub fn candidates(entry: &ash::Entry, instance: &ash::Instance) -> Result<Vec<Candidate>, GpuError> {
     // SAFETY: the instance is alive; the call only reads.
     let handles = unsafe { instance.enumerate_physical_devices() }
         .map_err(|result| GpuError::Vulkan { operation: "list devices".into(), result })?;
-    Ok(handles.into_iter().map(|handle| candidate(instance, handle)).collect())
+    Ok(handles.into_iter().map(|handle| candidate(entry, instance, handle)).collect())
 }
 
-fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
+fn candidate(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -170,6 +181,11 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         missing_optional
             .push("VK_EXT_calibrated_timestamps: a trace aligns the device's times with the host's by estimate");
     }
+    let reads_monotonic = calibrated_timestamps && reads_monotonic(entry, instance, handle);
+    if calibrated_timestamps && !reads_monotonic {
+        missing_optional
+            .push("CLOCK_MONOTONIC among the calibrated clocks: a trace's clocks are read one after the other");
+    }
     let push_descriptors = has(ash::khr::push_descriptor::NAME);
     if !push_descriptors {
         missing_optional.push("VK_KHR_push_descriptor: descriptors are sets of a pool");
@@ -183,8 +199,35 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
     if !can_present {
         missing_optional.push("VK_KHR_swapchain and dynamicRendering: no presentation");
     }
-    if !has(ash::ext::memory_budget::NAME) {
-        missing_optional.push("VK_EXT_memory_budget");
+    let budget = has(ash::ext::memory_budget::NAME).then(|| MemoryBudget::read(instance, handle));
+    if budget.is_none() {
+        missing_optional.push("VK_EXT_memory_budget: memory is allocated until the driver refuses");
+    }
+    let (mut present_wait, mut device_fault) = (false, false);
+    if properties.api_version >= vk::API_VERSION_1_3 {
+        let mut id = vk::PhysicalDevicePresentIdFeaturesKHR::default();
+        let mut wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default();
+        let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default();
+        let mut features =
+            vk::PhysicalDeviceFeatures2::default().push_next(&mut id).push_next(&mut wait).push_next(&mut fault);
+        // SAFETY: as above. A driver ignores structures of extensions that it does not have.
+        unsafe { instance.get_physical_device_features2(handle, &mut features) };
+        present_wait = can_present
+            && has(ash::khr::present_id::NAME)
+            && has(ash::khr::present_wait::NAME)
+            && id.present_id == vk::TRUE
+            && wait.present_wait == vk::TRUE;
+        device_fault = has(ash::ext::device_fault::NAME) && fault.device_fault == vk::TRUE;
+    }
+    if !present_wait {
+        missing_optional.push("VK_KHR_present_wait: the time from a picture to the monitor is not known");
+    }
+    if !device_fault {
+        missing_optional.push("VK_EXT_device_fault: the driver does not report why a device was lost");
+    }
+    let checkpoints = has(ash::nv::device_diagnostic_checkpoints::NAME);
+    if !checkpoints {
+        missing_optional.push("VK_NV_device_diagnostic_checkpoints: no report of the pass in which a device was lost");
     }
     Candidate {
         handle,
@@ -196,13 +239,26 @@ fn candidate(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Candidate 
         missing_optional,
         queues,
         calibrated_timestamps,
+        reads_monotonic,
         push_descriptors,
         pipeline_statistics,
         can_present,
+        present_wait,
+        device_fault,
+        checkpoints,
+        budget,
         limits: properties.limits,
         // A driver older than Vulkan 1.3 leaves this 0; it is rejected anyway.
         max_bytes: v11.max_memory_allocation_size.min(v13.max_buffer_size),
     }
+}
+
+/// True if the device's clock and the host's monotonic clock can be read in one call.
+fn reads_monotonic(entry: &ash::Entry, instance: &ash::Instance, handle: vk::PhysicalDevice) -> bool {
+    let clocks = ash::ext::calibrated_timestamps::Instance::new(entry, instance);
+    // SAFETY: `handle` comes from this instance and has the extension; the call only reads.
+    let there = unsafe { clocks.get_physical_device_calibrateable_time_domains(handle) }.unwrap_or_default();
+    there.contains(&vk::TimeDomainEXT::CLOCK_MONOTONIC)
 }
 
 /// The queues to use: one for compute, preferably with graphics, since that one may present pictures; another for compute, preferably
@@ -286,9 +342,14 @@ mod tests {
             missing_optional: vec![],
             queues: vec![],
             calibrated_timestamps: true,
+            reads_monotonic: true,
             push_descriptors: true,
             pipeline_statistics: true,
             can_present: true,
+            present_wait: true,
+            device_fault: true,
+            checkpoints: true,
+            budget: None,
             limits: vk::PhysicalDeviceLimits::default(),
             max_bytes: u64::MAX,
         }

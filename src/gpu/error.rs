@@ -22,6 +22,13 @@ pub enum GpuError {
     NoValidation,
     #[error("{operation}: {}", describe(*.result))]
     Vulkan { operation: String, result: vk::Result },
+    #[error("{operation}: the device was lost; its driver reports: {report}")]
+    Lost { operation: String, report: String },
+    #[error(
+        "{what}: needs {} MiB, the budget of this device's memory is {} MiB, of which {} MiB are used",
+        needed.div_ceil(1 << 20), budget >> 20, used >> 20
+    )]
+    Budget { what: String, needed: u64, budget: u64, used: u64 },
     #[error("{operation}: {fault}")]
     Memory { operation: String, fault: String },
     #[error("{what}: needs {needed}, the device allows {allowed}")]
@@ -51,7 +58,7 @@ pub enum GpuError {
 impl GpuError {
     /// True if the device was lost: everything has to be recreated from a new context.
     pub fn is_device_lost(&self) -> bool {
-        matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. })
+        matches!(self, GpuError::Vulkan { result: vk::Result::ERROR_DEVICE_LOST, .. } | GpuError::Lost { .. })
     }
 }
 

@@ -1,6 +1,8 @@
 //! Fault injection. Failures of driver calls test the error paths for out of memory, a lost device and a time-out. Slow passes test
 //! the detection of slowness. Wrong results test the checks of `verify`.
 
+use super::budget::{HeapBudget, MemoryBudget};
+use super::lost_device::LossReport;
 use crate::passes::fault_injection::Change;
 use crate::passes::slots::{Format, Initializer};
 use crate::passes::{DispatchArgs, Params, Pass, Slot};
@@ -76,6 +78,8 @@ pub struct Faults {
     planned: Mutex<Option<(InjectionPoint, u32, vk::Result)>>,
     slow: Mutex<Option<(&'static str, u32)>>,
     poison: Mutex<Option<Poison>>,
+    loss: Mutex<Option<LossReport>>,
+    budget: Mutex<Option<MemoryBudget>>,
     change: OnceLock<Change>,
     changes: AtomicU64,
 }
@@ -105,6 +109,26 @@ impl Faults {
     /// Cancels a planned failure that has not happened.
     pub fn forget(&self) {
         *self.planned.lock().unwrap_or_else(|e| e.into_inner()) = None;
+    }
+
+    /// From now on the driver reports this of a lost device.
+    pub fn report_loss(&self, report: LossReport) {
+        *self.loss.lock().unwrap_or_else(|e| e.into_inner()) = Some(report);
+    }
+
+    pub(super) fn loss_report(&self) -> Option<LossReport> {
+        self.loss.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+
+    /// From now on the device reports that its memory has room for so many bytes of allocations more.
+    pub fn limit_memory(&self, bytes: u64) {
+        let heap = HeapBudget { size: bytes, budget: bytes, used: 0, is_device_local: true };
+        let types = vec![(0, vk::MemoryPropertyFlags::from_raw(u32::MAX)); 32];
+        *self.budget.lock().unwrap_or_else(|e| e.into_inner()) = Some(MemoryBudget { heaps: vec![heap], types });
+    }
+
+    pub(super) fn budget(&self) -> Option<MemoryBudget> {
+        self.budget.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 
     /// From now on new memory holds this; slots that must start with zeros still do ([`Slot::starts_clear`](crate::passes::Slot::starts_clear)).

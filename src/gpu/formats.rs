@@ -9,6 +9,7 @@ use crate::passes::slots::{Format, Shape};
 use crate::plan::Plan;
 use crate::scene::{Sampling, Scene};
 use ash::vk;
+use std::sync::atomic::Ordering;
 
 /// How single texels are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,10 +92,14 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 }
 
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
-/// device cannot filter the volume's format; and no packed neighbours if the device cannot hold them.
+/// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; and a deep picture for a deep window.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
     let filters = filters(context, Slot::Volume.format(&scene));
-    let scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
+    let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
+    // It is copied to the window by a blit.
+    let wide = context.format_features(vulkan(Format::Rgba16f));
+    scene.is_deep = context.is_deep.load(Ordering::Relaxed)
+        && wide.contains(vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::BLIT_SRC);
     let format = vulkan(Slot::PackedNeighbours.format(&scene));
     let fits = context.image_limits(format, vk::ImageType::TYPE_3D, usage(context, Slot::PackedNeighbours));
     let fits = fits

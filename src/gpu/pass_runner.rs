@@ -7,7 +7,7 @@ use super::pipelines::{Pipeline, Pipelines, Shader, embedded};
 use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
 use super::resources::{Buffer, Purpose, SlotResources};
 use super::timeline::Timelines;
-use super::timing::Timings;
+use super::timing::{TimeStamps, Timings};
 use crate::passes::slots::{Initializer, Shape};
 use crate::passes::{Arrays, Bind, DispatchArgs, Frequency, Part, Pass, Slot, Texels};
 use crate::plan::Plan;
@@ -76,7 +76,7 @@ impl PassRunner {
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = SlotResources::new(&self.context, args.image + 1);
         let mut timelines = Timelines::new(&self.context, 1)?;
-        let mut recorder = Recorder::new(&self.context, 0, pass.name, false)?;
+        let mut recorder = Recorder::new(&self.context, 0, pass.name, TimeStamps::None, false)?;
         let mut barriers = BarrierRecorder::default();
         let pipeline = self.pipelines.get(pass, scene, args)?;
         let new = slots.fit(&plan, scene)?;
@@ -200,7 +200,7 @@ impl PassTimer {
         plan.slots.sort();
         plan.slots.dedup();
         let mut timed = PassTimer {
-            recorder: Recorder::new(context, 0, pass.name, false)?,
+            recorder: Recorder::new(context, 0, pass.name, TimeStamps::EachPass, false)?,
             dispatches,
             _pipelines: pipelines,
             slots: SlotResources::new(context, 1),

@@ -1,6 +1,7 @@
 //! Compute pipelines: a layout from the reflected bindings, and a pipeline for each set of specialization constants; a thread that
 //! compiles them in the background, so that drawing goes on meanwhile; and their descriptor sets.
 
+use super::bands::InvocationTime;
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats::{self, TexelAccess};
@@ -26,6 +27,8 @@ pub struct Pipeline {
     pub set_layout: vk::DescriptorSetLayout,
     pub layout: vk::PipelineLayout,
     pub handle: vk::Pipeline,
+    /// The time of an invocation, as its last dispatches took.
+    pub time: Arc<InvocationTime>,
 }
 
 /// Shader, constants, and the formats of the inputs, because the formats of storage images are part of the module.
@@ -207,6 +210,7 @@ impl Pipeline {
             set_layout,
             layout: vk::PipelineLayout::null(),
             handle: vk::Pipeline::null(),
+            time: Arc::default(),
         };
         let layouts = [set_layout];
         let create = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
@@ -233,7 +237,11 @@ impl Pipeline {
             .module(shader)
             .name(c"main")
             .specialization_info(&specialization);
-        let create = vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout);
+        let create = vk::ComputePipelineCreateInfo::default()
+            // Dispatches in bands begin at another workgroup than the first.
+            .flags(vk::PipelineCreateFlags::DISPATCH_BASE)
+            .stage(stage)
+            .layout(pipeline.layout);
         // SAFETY: as above; the shader module is alive until after the call.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
         context.counts.pipelines.fetch_add(1, Ordering::Relaxed);

@@ -1,16 +1,17 @@
 //! Records one command buffer: dispatches and copies with the barriers that they need, labels, time stamps, and parameters.
 
+use super::bands::{Band, BandLimit, Work};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use super::formats;
 use super::pipelines::{DescriptorSets, Pipeline, descriptor_type};
 use super::resources::{Buffer, Image, Purpose, Resource, SlotResources, WHOLE};
 use super::timeline::Timelines;
-use super::timing::{Stamps, Timings};
+use super::timing::{Stamps, TimeStamps, Timings};
 use crate::barriers::{self, Access, Barrier, PipelineStage, PipelineStages};
 use crate::passes::slots::Shape;
 use crate::passes::{DispatchArgs, Part, Pass, Slot, interface_check};
-use crate::queues::oracle::SubmissionLog;
+use crate::queues::oracle::{Event, SubmissionLog};
 use crate::queues::{QueueTracker, Wait};
 use crate::scene::Scene;
 use crate::spirv::Kind;
@@ -21,8 +22,8 @@ use std::sync::atomic::Ordering;
 
 /// Size of the uniform buffer for the parameters of one command buffer, bytes.
 const PARAMS_BYTES: u64 = 64 << 10;
-/// Capacity for time stamps.
-const STAMPS: u32 = 128;
+/// Capacity for time stamps. A picture in bands has two for each.
+const STAMPS: u32 = 1024;
 /// Maximum number of submissions of a command buffer whose time stamps wait to be read.
 const MAX_UNREAD: usize = 64;
 
@@ -55,11 +56,17 @@ pub struct BufferLayout {
     pub image_height: u32,
 }
 
-/// A command buffer that is recorded and submitted again and again.
+/// Command buffers that are recorded and submitted again and again. One is enough, except for work in bands.
 pub struct Recorder {
     context: Arc<Context>,
     pool: vk::CommandPool,
+    /// The one that is being recorded.
     commands: vk::CommandBuffer,
+    /// All of the pool, and how many of them the recording uses.
+    allocated: Vec<vk::CommandBuffer>,
+    used: usize,
+    /// The passes in the command buffer that is being recorded, if they are timed.
+    open: Vec<Work>,
     params: Buffer,
     params_used: u64,
     /// For a device without push descriptors.
@@ -69,6 +76,7 @@ pub struct Recorder {
     unread: Vec<Stamps>,
     /// Time stamps that were read, for later submissions.
     spare: Vec<Stamps>,
+    time_stamps: TimeStamps,
     /// Invocations are counted.
     statistics: bool,
     /// The value of the timeline at which the last submission is done.
@@ -81,80 +89,123 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// With `statistics`, the invocations of every dispatch are counted, if the device can.
+    /// With `statistics`, the invocations of every dispatch that is timed are counted, if the device can.
     pub fn new(
         context: &Arc<Context>,
         queue: usize,
         label: &'static str,
+        time_stamps: TimeStamps,
         statistics: bool,
     ) -> Result<Recorder, GpuError> {
         let create = vk::CommandPoolCreateInfo::default().queue_family_index(context.queue(queue).family);
         let params = Buffer::new(context, "params", PARAMS_BYTES, Purpose::Params)?;
-        let stamps = Stamps::new(context, queue, STAMPS, statistics)?;
+        let statistics = statistics && time_stamps == TimeStamps::EachPass;
+        let stamps = match time_stamps {
+            TimeStamps::None => None,
+            TimeStamps::Ends | TimeStamps::EachPass => Stamps::new(context, queue, STAMPS, statistics)?,
+        };
         // SAFETY: the create structure is complete.
         let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
         context.name(pool, label);
-        let allocate = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-        // SAFETY: the pool was just made; one buffer is asked for.
-        let commands = unsafe { context.device.allocate_command_buffers(&allocate) };
         let mut recorder = Recorder {
             context: context.clone(),
             pool,
             commands: vk::CommandBuffer::null(),
+            allocated: Vec::new(),
+            used: 0,
+            open: Vec::new(),
             params,
             params_used: 0,
             sets: DescriptorSets::new(context),
             stamps,
             unread: Vec::new(),
             spare: Vec::new(),
+            time_stamps,
             statistics,
             done_at: 0,
             collected_to: 0,
             label,
             queue,
         };
-        recorder.commands = commands.context(|| "create commands".into())?[0];
-        context.name(recorder.commands, label);
+        recorder.allocate()?;
         Ok(recorder)
+    }
+
+    fn allocate(&mut self) -> Result<(), GpuError> {
+        let allocate = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+        // SAFETY: the pool is alive; one buffer is asked for.
+        let commands = unsafe { self.context.device.allocate_command_buffers(&allocate) };
+        let commands = commands.context(|| "create commands".into())?[0];
+        self.context.name(commands, self.label);
+        self.allocated.push(commands);
+        Ok(())
     }
 
     /// Waits until the last submission is done, then begins a new recording.
     pub fn begin(&mut self, barriers: &mut BarrierRecorder, timelines: &Timelines) -> Result<(), GpuError> {
         barriers.begin(self.queue);
         self.wait(timelines)?;
-        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the device is done with this pool's only command buffer.
-        unsafe {
-            self.context
-                .device
-                .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
-                .and_then(|()| self.context.device.begin_command_buffer(self.commands, &begin))
-        }
-        .context(|| format!("record '{}'", self.label))?;
+        // SAFETY: the device is done with every command buffer of this pool.
+        unsafe { self.context.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .context(|| format!("record '{}'", self.label))?;
+        self.used = 0;
         self.params_used = 0;
         self.sets.begin()?;
         if let Some(stamps) = &mut self.stamps {
-            stamps.begin(self.commands);
-            self.flush_timestamps();
+            stamps.begin();
+        }
+        self.begin_commands(barriers)
+    }
+
+    /// Begins the next command buffer of the recording.
+    fn begin_commands(&mut self, barriers: &mut BarrierRecorder) -> Result<(), GpuError> {
+        if self.used == self.allocated.len() {
+            self.allocate()?;
+        }
+        self.commands = self.allocated[self.used];
+        self.used += 1;
+        self.open.clear();
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer is in its initial state: it is new, or its pool was reset, and it was not used since.
+        unsafe { self.context.device.begin_command_buffer(self.commands, &begin) }
+            .context(|| format!("record '{}'", self.label))?;
+        if let Some(stamps) = &mut self.stamps {
+            if self.time_stamps == TimeStamps::EachPass {
+                serialize(&self.context.device, self.commands, self.queue, barriers);
+            }
+            stamps.start(self.commands);
+            barriers.stamped(self.queue);
+            self.after_stamp(barriers);
         }
         Ok(())
     }
 
-    /// Flushes after a time stamp. Once anything was drawn on a window, llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp only
-    /// at its next flush, so that the following dispatch would seem to take no time. A barrier is a flush.
-    fn flush_timestamps(&self) {
-        if self.context.presentation.is_none() || !self.context.candidate.is_software() {
-            return;
+    /// Ends the recording here and continues it in another command buffer, which is submitted on its own.
+    fn cut(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
+        self.submit(barriers, timelines)?;
+        // Where each pass is timed, that of a band is a run of its own.
+        if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
+            stamps.continues();
         }
-        // It covers no memory, so that validation still notices a barrier that is missing.
-        flush(&self.context.device, self.commands, vk::AccessFlags2::NONE);
+        barriers.begin(self.queue);
+        self.begin_commands(barriers)
+    }
+
+    /// What has to follow a time stamp: where passes are timed, nothing may begin before it.
+    fn after_stamp(&self, barriers: &mut BarrierRecorder) {
+        // Once anything was drawn on a window, llvmpipe (Mesa 22.3, `lp_setup_end_query`) writes a time stamp only at its next flush, so
+        // that the following dispatch would seem to take no time. A barrier is a flush.
+        let needs_flush = self.context.presentation.is_some() && self.context.candidate.is_software();
+        if self.time_stamps == TimeStamps::EachPass || needs_flush {
+            serialize(&self.context.device, self.commands, self.queue, barriers);
+        }
     }
 
     /// Adds the times of the last submission, and of those that were set aside, once, when they are done.
     pub fn collect(&mut self, timelines: &Timelines, timings: &mut Timings) -> Result<(), GpuError> {
         let (bits, period) = (self.context.queue(self.queue).valid_bits, self.context.limits.timestamp_period);
         while let Some(stamps) = self.unread.first() {
-            timings.add(&stamps.read()?, bits, period);
+            timings.add(&stamps.read(bits, period)?, bits, period);
             self.spare.push(self.unread.remove(0));
         }
         if self.collected_to == self.done_at {
@@ -163,7 +214,8 @@ impl Recorder {
         self.wait(timelines)?;
         self.collected_to = self.done_at;
         if let Some(stamps) = &self.stamps {
-            timings.add(&stamps.read()?, bits, period);
+            timings.add(&stamps.read(bits, period)?, bits, period);
+            timings.leave_out(stamps.left_out());
         }
         Ok(())
     }
@@ -201,6 +253,11 @@ impl Recorder {
 
     /// Submits the recording, after waits for other queues.
     pub fn submit(&mut self, barriers: &mut BarrierRecorder, timelines: &mut Timelines) -> Result<(), GpuError> {
+        if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::Ends) {
+            stamps.end_of(self.commands, self.label, std::mem::take(&mut self.open));
+            barriers.stamped(self.queue);
+            self.after_stamp(barriers);
+        }
         // SAFETY: the command buffer is being recorded.
         unsafe { self.context.device.end_command_buffer(self.commands) }
             .context(|| format!("record '{}'", self.label))?;
@@ -237,41 +294,106 @@ impl Recorder {
     /// # Errors
     /// More parameters than one command buffer can hold.
     pub fn dispatch(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch) -> Result<(), GpuError> {
+        self.dispatch_by(barriers, dispatch, None)
+    }
+
+    /// As [`Recorder::dispatch`], in bands that `limit` allows, each in a submission of its own.
+    ///
+    /// # Errors
+    /// More parameters than one command buffer can hold; a device that fails.
+    pub fn dispatch_in_bands(
+        &mut self,
+        barriers: &mut BarrierRecorder,
+        timelines: &mut Timelines,
+        dispatch: &Dispatch,
+        limit: &BandLimit,
+    ) -> Result<(), GpuError> {
+        self.dispatch_by(barriers, dispatch, Some((timelines, limit)))
+    }
+
+    fn dispatch_by(
+        &mut self,
+        barriers: &mut BarrierRecorder,
+        dispatch: &Dispatch,
+        mut by: Option<(&mut Timelines, &BandLimit)>,
+    ) -> Result<(), GpuError> {
         let Dispatch { pipeline, scene, pass, args, .. } = *dispatch;
-        self.barrier(barriers, &barriers::accesses(scene, pass, args));
-        let Some(args) = &self.context.faults.args(pass, scene, args) else { return Ok(()) };
+        let accesses = barriers::accesses(scene, pass, args);
+        let Some(args) = &self.context.faults.args(pass, scene, args) else {
+            self.barrier(barriers, &accesses);
+            return Ok(());
+        };
         let dispatch = &Dispatch { args, ..*dispatch };
-        self.context.begin_label(self.commands, pass.name);
+        let extent = self.context.faults.invocations(pass, scene, args);
+        let local = pipeline.module.local_size;
+        let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(local[i]));
+        let invocations = |of: [u32; 3]| of.iter().map(|n| u64::from(*n)).product::<u64>();
+        let mut bands = vec![Band { base: [0; 3], groups }];
+        let mut expected = 0.0;
+        if let Some((timelines, limit)) = &mut by {
+            expected = limit.expected(pass, &pipeline.time, invocations(extent));
+            if limit.is_full(self.open.iter().map(|work| work.expected).sum(), expected) {
+                self.cut(barriers, timelines)?;
+            }
+            bands = limit.bands(groups, invocations(extent), expected);
+        }
         let block = interface_check::pack(&pipeline.module, &self.context.faults.numbers(pass, scene, args));
         let offset = self.place_params(&block)?;
-        self.bind(dispatch, offset, block.len() as u64)?;
-        let extent = self.context.faults.invocations(pass, scene, args);
-        let groups: [u32; 3] = std::array::from_fn(|i| extent[i].div_ceil(pipeline.module.local_size[i]));
+        let last = bands.len() - 1;
+        for (n, band) in bands.iter().enumerate() {
+            // Of the invocations that the band's workgroups have, those inside the dispatch's extent.
+            let size = std::array::from_fn(|i| {
+                let from = band.base[i] * local[i];
+                (band.groups[i] * local[i]).min(extent[i].saturating_sub(from))
+            });
+            let share = invocations(size) as f64 / invocations(extent).max(1) as f64;
+            let work = Work { time: pipeline.time.clone(), expected: share * expected, invocations: invocations(size) };
+            self.barrier(barriers, &accesses);
+            self.context.begin_label(self.commands, pass.name);
+            self.context.loss.mark(self.commands, pass.name);
+            self.bind(dispatch, offset, block.len() as u64)?;
+            self.dispatch_band(barriers, dispatch, band, work);
+            self.context.end_label(self.commands);
+            if let Some(dispatched) = &mut barriers.dispatched {
+                dispatched.push((pass.name, size));
+            }
+            if let (Some((timelines, _)), true) = (&mut by, n < last) {
+                self.cut(barriers, timelines)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn dispatch_band(&mut self, barriers: &mut BarrierRecorder, dispatch: &Dispatch, band: &Band, work: Work) {
+        let Dispatch { pipeline, pass, .. } = *dispatch;
         let (device, commands) = (&self.context.device, self.commands);
         // Before any query begins, because lavapipe reads the pipeline then.
         // SAFETY: the pipeline is alive until the device is done.
         unsafe { device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle) };
+        let ([x, y, z], [wide, high, deep]) = (band.base, band.groups);
         let repeat = || {
             for n in 0..self.context.faults.times(pass.name) {
                 // Repetitions of a slowed pass must not overlap.
                 if n > 0 {
                     flush(device, commands, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
                 }
-                // SAFETY: everything the pipeline's layout names was bound; extents are within limits checked with the formats.
-                unsafe { device.cmd_dispatch(commands, groups[0], groups[1], groups[2]) };
+                // SAFETY: everything the pipeline's layout names was bound, and it allows a base; extents are within limits checked with
+                // the formats.
+                unsafe { device.cmd_dispatch_base(commands, x, y, z, wide, high, deep) };
             }
         };
-        match &mut self.stamps {
-            Some(stamps) => stamps.dispatch(commands, pass.name, repeat),
-            None => repeat(),
+        match (&mut self.stamps, self.time_stamps) {
+            (Some(stamps), TimeStamps::EachPass) => {
+                stamps.dispatch(commands, pass.name, vec![work], repeat);
+                barriers.stamped(self.queue);
+                self.after_stamp(barriers);
+            }
+            _ => {
+                repeat();
+                self.open.push(work);
+            }
         }
-        self.flush_timestamps();
         self.context.counts.dispatches.fetch_add(1, Ordering::Relaxed);
-        self.context.end_label(self.commands);
-        if let Some(dispatched) = &mut barriers.dispatched {
-            dispatched.push((pass.name, extent));
-        }
-        Ok(())
     }
 
     /// Copies parameters into the uniform buffer; returns their byte offset.
@@ -291,11 +413,12 @@ impl Recorder {
         Ok(offset)
     }
 
-    /// Writes a time stamp; the work since the last one is called `name`.
-    pub fn stamp(&mut self, name: &'static str) {
-        if let Some(stamps) = &mut self.stamps {
-            stamps.end_of(self.commands, name);
-            self.flush_timestamps();
+    /// Where each pass is timed, writes a time stamp; the work since the last one is called `name`.
+    pub fn stamp(&mut self, barriers: &mut BarrierRecorder, name: &'static str) {
+        if let Some(stamps) = self.stamps.as_mut().filter(|_| self.time_stamps == TimeStamps::EachPass) {
+            stamps.end_of(self.commands, name, Vec::new());
+            barriers.stamped(self.queue);
+            self.after_stamp(barriers);
         }
     }
 
@@ -314,6 +437,13 @@ fn flush(device: &ash::Device, commands: vk::CommandBuffer, memory: vk::AccessFl
     let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
     // SAFETY: the command buffer is being recorded, outside any render pass.
     unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+}
+
+/// Records an execution barrier between everything before and after it. It covers no memory, so that validation still notices a
+/// memory barrier that is missing.
+fn serialize(device: &ash::Device, commands: vk::CommandBuffer, queue: usize, barriers: &mut BarrierRecorder) {
+    flush(device, commands, vk::AccessFlags2::NONE);
+    barriers.log.iter_mut().for_each(|log| log.event(queue, Event::Serialize));
 }
 
 /// The index of a binding's descriptor in the list of its kind.
@@ -558,6 +688,11 @@ impl BarrierRecorder {
         let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
         // SAFETY: the command buffer is being recorded, outside any render pass.
         unsafe { context.device.cmd_pipeline_barrier2(commands, &dependency) };
+    }
+
+    /// A time stamp was recorded on this queue.
+    fn stamped(&mut self, queue: usize) {
+        self.log.iter_mut().for_each(|log| log.event(queue, Event::Stamp));
     }
 
     /// Begins the recording of a submission to this queue.

@@ -52,7 +52,7 @@ pub enum Purpose {
     Readback,
 }
 
-fn allocate(
+pub(super) fn allocate(
     context: &Context,
     name: &str,
     requirements: vk::MemoryRequirements,
@@ -66,6 +66,19 @@ fn allocate(
     let Some(allocator) = allocator.as_mut() else {
         return Err(GpuError::Memory { operation: operation(), fault: "the context is shutting down".into() });
     };
+    if let Some(budget) = context.memory_budget() {
+        let required = match location {
+            MemoryLocation::GpuOnly => vk::MemoryPropertyFlags::DEVICE_LOCAL,
+            _ => vk::MemoryPropertyFlags::HOST_VISIBLE,
+        };
+        let check =
+            |reserve| budget.check(operation, requirements.size, requirements.memory_type_bits, required, reserve);
+        // What is allocated and free is only added up where it decides.
+        if check(0).is_err() {
+            let report = allocator.generate_report();
+            check(report.total_capacity_bytes.saturating_sub(report.total_allocated_bytes))?;
+        }
+    }
     allocator
         .allocate(&AllocationCreateDesc {
             name,
@@ -77,7 +90,7 @@ fn allocate(
         .map_err(|e| GpuError::Memory { operation: operation(), fault: e.to_string() })
 }
 
-fn free(context: &Context, allocation: Option<Allocation>) {
+pub(super) fn free(context: &Context, allocation: Option<Allocation>) {
     let mut allocator = context.allocator.lock().unwrap_or_else(|e| e.into_inner());
     if let (Some(allocator), Some(allocation)) = (allocator.as_mut(), allocation) {
         // Freeing an allocation of this allocator cannot fail, and a Drop could not report it.

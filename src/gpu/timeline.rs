@@ -47,7 +47,7 @@ impl Timeline {
             Err(vk::Result::TIMEOUT) => {
                 Err(GpuError::TimedOut { seconds: TIMEOUT_SECONDS, operation: self.label.clone() })
             }
-            other => other.context(|| format!("run {}", self.label)),
+            other => other.context(|| format!("run {}", self.label)).map_err(|error| self.context.explain(error)),
         }
     }
 
@@ -59,7 +59,10 @@ impl Timeline {
     pub fn is_done(&self, value: u64) -> Result<bool, GpuError> {
         // SAFETY: the semaphore is alive.
         let reached = unsafe { self.context.device.get_semaphore_counter_value(self.semaphore) };
-        reached.map(|reached| reached >= value).context(|| format!("run {}", self.label))
+        reached
+            .map(|reached| reached >= value)
+            .context(|| format!("run {}", self.label))
+            .map_err(|error| self.context.explain(error))
     }
 
     /// To be called before resources in flight are destroyed: waits for all submissions, and if that fails for an idle device. A

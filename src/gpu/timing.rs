@@ -1,6 +1,7 @@
 //! GPU time stamps around every pass, and the times that follow from them: a sum for every pass, and optionally every span, the
 //! device's on the host's clock.
 
+use super::bands::{self, Work};
 use super::context::Context;
 use super::error::{ErrorContext, GpuError};
 use crate::passes::{PassTime, Span};
@@ -8,16 +9,46 @@ use ash::vk;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The time stamps of one command buffer.
+/// What is timed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimeStamps {
+    /// Nothing.
+    None,
+    /// Each submission as a whole: a picture, the conversion of a frame, its copy. Two stamps a command buffer, which wait for nothing,
+    /// so that passes overlap as if there were none.
+    #[default]
+    Ends,
+    /// Each pass. An execution barrier at every stamp keeps passes from overlapping, so that a time is the pass's own and their sum is
+    /// more than the time of a picture without these stamps.
+    EachPass,
+}
+
+/// The time stamps of one recording, which may be several command buffers.
 pub struct Stamps {
     context: Arc<Context>,
     pool: vk::QueryPool,
     capacity: u32,
-    /// The name of the work between stamp i and i + 1, and the query that counted its invocations.
-    between: Vec<(&'static str, Option<u32>)>,
+    /// Number of time stamps written.
+    written: u32,
+    /// The stamp that the next interval begins with.
+    since: Option<u32>,
+    intervals: Vec<Interval>,
+    /// Number of intervals for which there was no room.
+    left_out: u64,
     statistics: Option<vk::QueryPool>,
     /// Number of statistics queries used.
     counted: u32,
+}
+
+/// The work between two time stamps.
+struct Interval {
+    name: &'static str,
+    stamps: [u32; 2],
+    /// The query that counted its invocations.
+    counted: Option<u32>,
+    work: Vec<Work>,
+    /// It goes on in the next submission.
+    is_part: bool,
 }
 
 /// The work between two time stamps, in ticks of the device.
@@ -27,6 +58,8 @@ pub struct Stamp {
     pub from: u64,
     pub to: u64,
     pub invocations: Option<u64>,
+    /// The work goes on in the next submission, so that this is no run of its own.
+    pub is_part: bool,
 }
 
 /// Time between two stamps, ns. The counter has `valid_bits` bits and wraps; `period` is ns per tick.
@@ -59,8 +92,19 @@ impl Stamps {
         let pool =
             unsafe { context.device.create_query_pool(&create, None) }.context(|| "create time stamps".into())?;
         context.name(pool, "time stamps");
-        let mut stamps =
-            Stamps { context: context.clone(), pool, capacity, between: Vec::new(), statistics: None, counted: 0 };
+        // SAFETY: the pool was just made, with so many queries.
+        unsafe { context.device.reset_query_pool(pool, 0, capacity) };
+        let mut stamps = Stamps {
+            context: context.clone(),
+            pool,
+            capacity,
+            written: 0,
+            since: None,
+            intervals: Vec::new(),
+            left_out: 0,
+            statistics: None,
+            counted: 0,
+        };
         if statistics && context.candidate.pipeline_statistics && queue.computes {
             let create = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::PIPELINE_STATISTICS)
@@ -68,33 +112,56 @@ impl Stamps {
                 .query_count(capacity);
             // SAFETY: the create structure is complete and the feature enabled; a failure drops `stamps`, which frees its pool.
             let pool = unsafe { context.device.create_query_pool(&create, None) };
-            stamps.statistics = Some(pool.context(|| "create statistics".into())?);
+            let pool = pool.context(|| "create statistics".into())?;
+            // SAFETY: the pool was just made, with so many queries.
+            unsafe { context.device.reset_query_pool(pool, 0, capacity) };
+            stamps.statistics = Some(pool);
         }
         Ok(Some(stamps))
     }
 
-    /// Resets all queries and writes the first stamp.
-    pub(super) fn begin(&mut self, commands: vk::CommandBuffer) {
-        self.between.clear();
-        self.counted = 0;
-        for pool in [Some(self.pool), self.statistics].into_iter().flatten() {
-            // SAFETY: the device is done with this pool's last use, or the command buffer could not be recorded anew.
-            unsafe { self.context.device.reset_query_pool(pool, 0, self.capacity) };
+    /// Begins a recording: resets the queries that the last one used.
+    pub(super) fn begin(&mut self) {
+        for (pool, used) in [(Some(self.pool), self.written), (self.statistics, self.counted)] {
+            if let (Some(pool), 1..) = (pool, used) {
+                // SAFETY: the device is done with this pool's last use, or the command buffer could not be recorded anew.
+                unsafe { self.context.device.reset_query_pool(pool, 0, used) };
+            }
         }
-        self.stamp(commands, 0);
+        self.intervals.clear();
+        (self.written, self.counted, self.left_out, self.since) = (0, 0, 0, None);
     }
 
-    /// Writes a stamp; the work since the last one is called `name`. Does nothing once the capacity is used up.
-    pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str) {
-        let at = self.between.len() as u32 + 1;
-        if at < self.capacity {
-            self.between.push((name, None));
-            self.stamp(commands, at);
+    /// Writes the stamp that the next interval begins with.
+    pub(super) fn start(&mut self, commands: vk::CommandBuffer) {
+        self.since = self.stamp(commands);
+    }
+
+    /// Writes a stamp: the work since the last one is called `name`. Once the capacity is used up, it is only counted.
+    pub(super) fn end_of(&mut self, commands: vk::CommandBuffer, name: &'static str, work: Vec<Work>) {
+        let from = self.since;
+        self.since = self.stamp(commands);
+        match (from, self.since) {
+            (Some(from), Some(to)) => {
+                self.intervals.push(Interval { name, stamps: [from, to], counted: None, work, is_part: false });
+            }
+            _ => self.left_out += 1,
         }
+    }
+
+    /// The last interval goes on in the next submission.
+    pub(super) fn continues(&mut self) {
+        self.intervals.iter_mut().last().into_iter().for_each(|last| last.is_part = true);
     }
 
     /// Records a dispatch with `record`, writes a stamp, and counts invocations if enabled.
-    pub(super) fn dispatch(&mut self, commands: vk::CommandBuffer, name: &'static str, record: impl FnOnce()) {
+    pub(super) fn dispatch(
+        &mut self,
+        commands: vk::CommandBuffer,
+        name: &'static str,
+        work: Vec<Work>,
+        record: impl FnOnce(),
+    ) {
         let pool = self.statistics.filter(|_| self.counted < self.capacity);
         let (device, query) = (&self.context.device, self.counted);
         // SAFETY: the command buffer is being recorded; the query is below the capacity, was reset, and ends below.
@@ -104,42 +171,54 @@ impl Stamps {
         // SAFETY: as above.
         pool.iter().for_each(|p| unsafe { device.cmd_end_query(commands, *p, query) });
         self.counted += u32::from(pool.is_some());
-        self.end_of(commands, name);
-        if let (Some(_), Some(last)) = (pool, self.between.last_mut()) {
-            last.1 = Some(query);
+        let before = self.intervals.len();
+        self.end_of(commands, name, work);
+        if let (Some(_), Some(last)) = (pool, self.intervals.get_mut(before)) {
+            last.counted = Some(query);
         }
     }
 
-    fn stamp(&self, commands: vk::CommandBuffer, at: u32) {
+    fn stamp(&mut self, commands: vk::CommandBuffer) -> Option<u32> {
+        let at = self.written;
+        if at >= self.capacity {
+            return None;
+        }
         let device = &self.context.device;
         // SAFETY: the command buffer is being recorded and the query is below the capacity.
         unsafe { device.cmd_write_timestamp2(commands, vk::PipelineStageFlags2::ALL_COMMANDS, self.pool, at) };
+        self.written += 1;
+        Some(at)
     }
 
-    /// Number of pieces of work that were stamped.
+    /// Number of pieces of work that were stamped, or would have been.
     pub(super) fn count(&self) -> u64 {
-        self.between.len() as u64
+        self.intervals.len() as u64 + self.left_out
     }
 
-    /// The measured work. The device must be done with the command buffer.
-    pub fn read(&self) -> Result<Vec<Stamp>, GpuError> {
-        let ticks = self.results(self.pool, self.between.len() as u32 + 1)?;
+    /// Number of pieces of work for which there was no room.
+    pub(super) fn left_out(&self) -> u64 {
+        self.left_out
+    }
+
+    /// The measured work. The device must be done with the recording. What it says of the time of each pass is noted there.
+    pub fn read(&self, valid_bits: u32, period: f32) -> Result<Vec<Stamp>, GpuError> {
+        let ticks = self.results(self.pool, self.written)?;
         let counts = match self.statistics {
             Some(pool) => self.results(pool, self.counted)?,
             None => Vec::new(),
         };
-        let pairs = self.between.iter().zip(ticks.windows(2));
-        Ok(pairs
-            .map(|((name, query), w)| {
-                let invocations = query.and_then(|q| counts.get(q as usize).copied());
-                Stamp { name, from: w[0], to: w[1], invocations }
-            })
-            .collect())
+        let stamp = |interval: &Interval| {
+            let [from, to] = interval.stamps.map(|at| ticks.get(at as usize).copied().unwrap_or(0));
+            bands::measured(&interval.work, elapsed(from, to, valid_bits, period));
+            let invocations = interval.counted.and_then(|q| counts.get(q as usize).copied());
+            Stamp { name: interval.name, from, to, invocations, is_part: interval.is_part }
+        };
+        Ok(self.intervals.iter().map(stamp).collect())
     }
 
     fn results(&self, pool: vk::QueryPool, count: u32) -> Result<Vec<u64>, GpuError> {
         let mut results = vec![0u64; count as usize];
-        if self.between.is_empty() || count == 0 {
+        if count == 0 {
             return Ok(Vec::new());
         }
         // SAFETY: the pool is alive; every query read was written by the command buffer that has finished.
@@ -170,19 +249,26 @@ struct SpanLog {
     context: Arc<Context>,
     list: Vec<Span>,
     began: Instant,
+    /// The host's monotonic clock when the run began, ns; `None` if the device's driver does not read that clock.
+    monotonic: Option<u64>,
     /// A time stamp of the device, and the corresponding host time in ns since the run began.
     anchor: (u64, f64),
+    /// The largest error of an anchor, ns; `None` before the first, and if the device's clock cannot be read.
+    deviation: Option<u64>,
 }
 
 impl Timings {
     pub fn new(context: &Arc<Context>, spans: bool) -> Timings {
-        let spans = spans.then(|| SpanLog {
-            context: context.clone(),
-            list: Vec::new(),
-            began: Instant::now(),
-            anchor: (0, 0.0),
+        let spans = spans.then(|| {
+            let (began, monotonic) = context.clocks_now();
+            SpanLog { context: context.clone(), list: Vec::new(), began, monotonic, anchor: (0, 0.0), deviation: None }
         });
         Timings { times: Vec::new(), untimed: 0, spans }
+    }
+
+    /// The largest error, ns, with which a time of the device was placed on the host's clock; `None` if its clock cannot be read.
+    pub fn clock_deviation(&self) -> Option<u64> {
+        self.spans.as_ref()?.deviation
     }
 
     /// Runs host work, and records its span if spans are enabled.
@@ -204,10 +290,13 @@ impl Timings {
             let ns = elapsed(stamp.from, stamp.to, valid_bits, period);
             match self.times.iter_mut().find(|t| t.name == stamp.name) {
                 Some(time) => {
-                    time.runs += 1;
+                    time.runs += u32::from(!stamp.is_part);
                     time.total += ns;
                 }
-                None => self.times.push(PassTime { name: stamp.name, runs: 1, total: ns }),
+                None => {
+                    let runs = u32::from(!stamp.is_part);
+                    self.times.push(PassTime { name: stamp.name, runs, total: ns });
+                }
             }
             if let Some(spans) = &mut self.spans {
                 let begin = spans.on_host_clock(stamp.from, valid_bits, period);
@@ -245,7 +334,14 @@ impl SpanLog {
     fn set_anchor(&mut self, ticks: u64) {
         let submitted = || self.list.iter().rev().find(|s| !s.on_device).map_or(0.0, |s| s.end);
         self.anchor = match self.context.device_ticks() {
-            Some((now, at)) => (now, at.duration_since(self.began).as_nanos() as f64),
+            Some(read) => {
+                self.deviation = self.deviation.max(Some(read.deviation));
+                let since = match (read.monotonic, self.monotonic) {
+                    (Some(now), Some(began)) => now as f64 - began as f64,
+                    _ => read.at.duration_since(self.began).as_nanos() as f64,
+                };
+                (read.ticks, since)
+            }
             None => (ticks, submitted()),
         };
     }
@@ -284,10 +380,13 @@ mod tests {
     #[test]
     fn runs_of_one_pass_are_added_up() {
         let mut timings = Timings { times: Vec::new(), untimed: 0, spans: None };
-        let stamp = |name, from, to| Stamp { name, from, to, invocations: None };
+        let stamp = |name, from, to| Stamp { name, from, to, invocations: None, is_part: false };
         timings.add(&[stamp("a", 0, 1), stamp("b", 1, 3)], 64, 1.0);
         timings.add(&[stamp("a", 5, 8)], 64, 1.0);
         assert_eq!(timings.take_times()[0], PassTime { name: "a", runs: 2, total: 4.0 });
         assert!(timings.take_times().is_empty() && timings.take_spans().is_empty());
+        let part = Stamp { is_part: true, ..stamp("a", 0, 5) };
+        timings.add(&[part, stamp("a", 6, 8)], 64, 1.0);
+        assert_eq!(timings.take_times(), [PassTime { name: "a", runs: 1, total: 7.0 }], "one run in two submissions");
     }
 }

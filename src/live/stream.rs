@@ -7,7 +7,7 @@ use super::session::{Begun, FinishedPicture, Session, Views};
 use super::statistics::Statistics;
 use super::volume_pool::{Update, VolumeCounts, VolumePool};
 use crate::gpu::shader_reload::ShaderFolder;
-use crate::gpu::{self, Context, GpuError, Renderer, Wake};
+use crate::gpu::{self, Bands, Context, GpuError, Renderer, TimeStamps, Wake};
 use crate::probe::Probe;
 use crate::scene::{Scene, SceneError, Settings};
 use crate::source::Frame;
@@ -35,6 +35,8 @@ pub struct StreamOptions {
     /// Called when the next step has work: the source reported an event, or a pipeline was compiled. If set, pipelines of changed
     /// settings are compiled in the background.
     pub wake: Option<Wake>,
+    /// What is timed on the device. With [`TimeStamps::EachPass`] passes do not overlap, so that pictures take longer.
+    pub time_stamps: TimeStamps,
     /// Shaders to use instead of the embedded ones. Those that change are loaded again between two pictures.
     pub shaders: Option<Arc<ShaderFolder>>,
 }
@@ -48,6 +50,7 @@ impl Default for StreamOptions {
             readback: true,
             cine: CineLimits::default(),
             wake: None,
+            time_stamps: TimeStamps::default(),
             shaders: None,
         }
     }
@@ -99,6 +102,8 @@ pub struct Stream {
     /// The source has ended, and why.
     end: Option<Option<String>>,
     began: Instant,
+    /// How often the device was lost. It may have been lost to a watchdog, so each time halves what a submission may take.
+    losses: u32,
     statistics: Statistics,
     /// The statistics that were reported last.
     reported: Statistics,
@@ -122,6 +127,7 @@ impl Stream {
             previous_pool: None,
             end: None,
             began: Instant::now(),
+            losses: 0,
             statistics: Statistics::default(),
             reported: Statistics::default(),
         }
@@ -336,6 +342,8 @@ impl Stream {
             queues: self.options.queues,
             readback: self.options.readback,
             wake: self.options.wake.clone(),
+            time_stamps: self.options.time_stamps,
+            bands: Bands::Measured { losses: self.losses },
             ..gpu::RendererOptions::default()
         };
         if let Some(folder) = &self.options.shaders {
@@ -355,6 +363,7 @@ impl Stream {
     /// A device that cannot hold what the geometry needs.
     pub fn revive(&mut self, context: &Arc<Context>) -> Result<(), StreamError> {
         self.context = context.clone();
+        self.losses += 1;
         match self.header.clone() {
             Some(header) => self.begin_geometry(header),
             None => Ok(()),

@@ -247,7 +247,7 @@ slots! {
     PictureForward = D::image("picture_forward", per_pixel, |_| Format::Rgba32f);
     PictureRows = D::image("picture_rows", per_pixel, |_| Format::Rgba32f);
     /// 8-bit result.
-    Screen = D::image("screen", per_pixel, |_| Format::Rgba8);
+    Screen = D::image("screen", per_pixel, |s| if s.is_deep { Format::Rgba16f } else { Format::Rgba8 });
 }
 
 fn frame_layers(scene: &Scene) -> Shape {

@@ -149,10 +149,11 @@ fn conditions(profile: &Profile) -> String {
     let clock = match (profile.has_time_stamps(), device.calibrated) {
         (false, _) => "none".into(),
         (true, tied) => format!(
-            "{} ns a tick, {} bits, {} to the host's clock",
+            "{} ns a tick, {} bits, {} to the host's clock{}",
             device.timestamp_period_ns,
             device.valid_bits,
-            if tied { "tied" } else { "not tied" }
+            if tied { "tied" } else { "not tied" },
+            profile.clock_deviation_ns.map_or(String::new(), |ns| format!(" within {:.1} us", ns as f64 / 1e3))
         ),
     };
     let clocks = device.clocks.as_deref().unwrap_or("not known: runs at other clocks or power states do not compare");
@@ -453,6 +454,7 @@ pub fn chrome_trace(profile: &Profile, spans: &[Span]) -> Result<String, TraceEr
             "input": profile.input,
             "settings": profile.settings_hash,
             "clocks tied": profile.device.calibrated,
+            "clock deviation ns": profile.clock_deviation_ns,
         },
         "traceEvents": events,
     });

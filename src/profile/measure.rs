@@ -1,6 +1,6 @@
 //! Profiles a scene: renders it repeatedly and records where the time goes, pass by pass.
 
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions, pass_runner};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps, pass_runner};
 use crate::machine::{self, CpuTime};
 use crate::passes::measure as loops;
 use crate::passes::{Bind, DispatchArgs, Frequency, Part, Pass, RUN, Slot, Span, chain, layer, slice};
@@ -65,7 +65,8 @@ impl ProfileRun {
     /// The device cannot hold the scene, or fails.
     pub fn new(context: &Arc<Context>, scene: &Scene, options: &ProfileOptions) -> Result<ProfileRun, GpuError> {
         let ceilings = if options.ceilings { measure_ceilings(context)? } else { None };
-        let renderer_options = RendererOptions { spans: true, ..RendererOptions::default() };
+        let renderer_options =
+            RendererOptions { spans: true, time_stamps: TimeStamps::EachPass, ..RendererOptions::default() };
         Ok(ProfileRun {
             context: context.clone(),
             renderer: Renderer::new(context, scene.clone(), &renderer_options)?,
@@ -160,6 +161,7 @@ impl ProfileRun {
             device,
             ceilings: self.ceilings,
             sampling: Some(format!("{}; {}", scene.sampling.words(), self.renderer.texel_access().describe())),
+            clock_deviation_ns: self.renderer.clock_deviation(),
         };
         let spans = repeats.into_iter().enumerate().flat_map(|(n, r)| r.spans.into_iter().map(move |s| traced(n, s)));
         (profile, spans.collect())

@@ -87,6 +87,9 @@ pub struct Profile {
     /// Description of how the volume is sampled and texels are read.
     #[serde(default)]
     pub sampling: Option<String>,
+    /// Largest error with which spans of the device are placed on the host's clock, ns; None if its clock cannot be read.
+    #[serde(default)]
+    pub clock_deviation_ns: Option<u64>,
 }
 
 /// Sizes of what was processed.

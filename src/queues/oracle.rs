@@ -14,6 +14,10 @@ pub enum Event {
     Barrier(Barrier),
     /// An operation, by its memory accesses.
     Operation(Vec<Access>),
+    /// A time stamp.
+    Stamp,
+    /// A barrier of execution alone, around a time stamp. It makes no memory visible, so that no order is derived from it.
+    Serialize,
 }
 
 /// One submission.
@@ -53,6 +57,13 @@ impl SubmissionLog {
         let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) else { return };
         events.extend(barrier.map(Event::Barrier));
         events.push(Event::Operation(accesses.to_vec()));
+    }
+
+    /// Records an event of a queue that touches no memory.
+    pub fn event(&mut self, queue: usize, event: Event) {
+        if let Some((_, events)) = self.open.iter_mut().find(|(of, _)| *of == queue) {
+            events.push(event);
+        }
     }
 
     /// Submits the recording of a queue.
@@ -99,7 +110,7 @@ impl SubmissionLog {
             let events = self.submissions[s].events.iter().enumerate();
             let operations = events.filter_map(|(e, event)| match event {
                 Event::Operation(accesses) => Some((e, accesses)),
-                Event::Barrier(_) => None,
+                Event::Barrier(_) | Event::Stamp | Event::Serialize => None,
             });
             operations.flat_map(|(e, accesses)| accesses.iter().map(move |a| (e, a))).find_map(|(e, access)| {
                 let (later, resource) = self.first_conflict_after((s, e), access, &is_volume)?;
@@ -142,6 +153,7 @@ impl SubmissionLog {
                             ordered[here] = ordered[here].with(*to);
                         }
                     }
+                    Event::Stamp | Event::Serialize => {}
                     Event::Operation(later) => {
                         let conflict =
                             later.iter().find(|l| !ordered[here].has(l.stage) && must_order(access, l, is_volume));

@@ -145,6 +145,8 @@ pub struct Scene {
     pub ring: Ring,
     /// Whether rays skip bricks if no setting says so: true, or the last choice of [`Scene::sampled`].
     pub bricks_pay: bool,
+    /// The picture has more than 8 bits a channel, because the window shows them. The device resolves this.
+    pub is_deep: bool,
     /// How the volume is sampled: the setting, or for `Auto` the last choice of [`Scene::sampled`].
     pub sampling: Sampling,
     /// Margin in pixels around the sector in which pixels take the nearest sample inside: the reach of the filters. 0 is the strict rule
@@ -239,6 +241,7 @@ impl Scene {
             step,
             ring,
             bricks_pay: true,
+            is_deep: false,
             sampling,
             apron: 0.0,
             distance,

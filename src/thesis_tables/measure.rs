@@ -78,7 +78,9 @@ fn measure(
     let mut renderers = Vec::new();
     for row in &table.rows {
         let scene = scene(&row.conditions).map_err(|e| broken(&e))?;
-        renderers.push(Renderer::new(context, scene, &gpu::RendererOptions::default())?);
+        let options =
+            gpu::RendererOptions { time_stamps: gpu::TimeStamps::EachPass, ..gpu::RendererOptions::default() };
+        renderers.push(Renderer::new(context, scene, &options)?);
     }
     for n in 0..options.warm_up + options.repeats {
         for (row, renderer) in table.rows.iter_mut().zip(&mut renderers) {

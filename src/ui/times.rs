@@ -41,6 +41,8 @@ pub(super) struct Times {
     pub(super) pictures: RecentTimes,
     /// Time from an input to the picture that shows its effect.
     pub(super) input_latency: RecentTimes,
+    /// Time from the presentation of a picture to its first pixel on the monitor. Empty if the device cannot measure it.
+    pub(super) scan_out: RecentTimes,
     /// Rates per second, for the last complete second.
     pub(super) frames: f64,
     pub(super) volumes: f64,

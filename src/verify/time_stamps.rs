@@ -5,7 +5,7 @@
 use super::built_in::{BYTES, scene, wall, wobbler};
 use super::compare::{count_figure, expect_same_picture};
 use super::{Check, DeviceUnderTest, Findings, IsolatedContext, render};
-use crate::gpu::{Context, GpuError, Renderer, RendererOptions};
+use crate::gpu::{Context, GpuError, Renderer, RendererOptions, TimeStamps};
 use crate::passes::{PassTime, Span};
 use crate::picture::Picture;
 use crate::probe::Geometry;
@@ -44,6 +44,11 @@ fn picture_scene(toml: &str) -> Result<Scene, GpuError> {
 
 fn has_stamps(context: &Context) -> bool {
     context.candidate.valid_bits() > 0
+}
+
+/// Each pass is timed.
+fn timed() -> RendererOptions {
+    RendererOptions { time_stamps: TimeStamps::EachPass, ..RendererOptions::default() }
 }
 
 const NONE: &str = "this device has no time stamps";
@@ -108,7 +113,7 @@ fn within(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let toml = "mode = 'sr'\npicture = { size = [192, 192] }\nslices = { pixels = 64 }\nray = { step = 0.1 }\ndistance = { median = 9 }";
     let scene = picture_scene(toml)?;
-    let options = RendererOptions { spans: true, ..RendererOptions::default() };
+    let options = RendererOptions { spans: true, ..timed() };
     // The first picture compiles shaders.
     let mut renderer = render::sent(context, &scene, &wall(&scene, 0), &options)?;
     renderer.picture()?;
@@ -169,7 +174,7 @@ fn slowed(dut: &mut DeviceUnderTest) -> Result<Findings, GpuError> {
     let mut findings = Findings::default();
     let scene =
         picture_scene("mode = 'vr'\npicture = { size = [192, 192] }\nslices = { pixels = 64 }\nray = { step = 0.2 }")?;
-    let mut renderer = render::sent(context, &scene, &wall(&scene, 0), &RendererOptions::default())?;
+    let mut renderer = render::sent(context, &scene, &wall(&scene, 0), &timed())?;
     let (mut plain, mut slow, mut runs) = (f64::INFINITY, f64::INFINITY, 0);
     time_of(&mut renderer, "raycast_volume")?;
     while runs < MAX_RUNS && (runs < 3 || slow < 1.5 * plain) {
@@ -199,7 +204,7 @@ fn as_if(
     let isolated = IsolatedContext::lacking(dut, change)?;
     let context: &Arc<Context> = &isolated.context;
     let scene = picture_scene("mode = 'vr'\npicture = { size = [96, 96] }")?;
-    let mut renderer = render::sent(context, &scene, &wall(&scene, 0), &RendererOptions::default())?;
+    let mut renderer = render::sent(context, &scene, &wall(&scene, 0), &timed())?;
     let picture = renderer.picture()?;
     let times = renderer.take_times()?;
     drop(renderer);

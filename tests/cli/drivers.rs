@@ -10,7 +10,7 @@ fn validation_notices_barriers_that_are_dropped() {
     let folder = Folder::new("dropped");
     let (picture, report) = (folder.path("x.png"), folder.path("report.json"));
     let arguments = ["render", "--validate", "--size", "64x64", "-o", &picture];
-    let mut render = |settings: &[(&str, &str)]| {
+    let render = |settings: &[(&str, &str)]| {
         finish(under_layer(Command::new(PROGRAM).args(arguments), &[&[("REPORT", &report as &str)], settings].concat()))
     };
     let (code, _, err) = render(&[]);

@@ -24,6 +24,7 @@ mod verify_gtest;
 mod verify_isolated;
 #[cfg(feature = "view")]
 mod view;
+mod watchdog;
 
 use common::program::*;
 use std::collections::BTreeSet;

@@ -2,7 +2,7 @@
 
 use crate::common::gpu::*;
 use crate::common::scenes;
-use echolume::gpu::{Renderer, RendererOptions};
+use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
 use echolume::live::{self, Feed, Statistics, Step, Stream, Update};
 use echolume::passes::{Slot, Texels};
 use echolume::probe::{Advance, Geometry, Probe};
@@ -174,7 +174,8 @@ fn a_complete_volume_never_mixes_frames_of_two() {
 fn every_pass_of_every_frame_is_timed_or_counted() {
     let device = Device::new();
     for (update, images) in [(Update::Whole, 3), (Update::Rolling, 2)] {
-        let options = live::StreamOptions { update, images, ..live::StreamOptions::default() };
+        let time_stamps = TimeStamps::EachPass;
+        let options = live::StreamOptions { update, images, time_stamps, ..live::StreamOptions::default() };
         let settings = settings("mode = 'mip'\nslices.median = true");
         let frames = (0..12).flat_map(speckled);
         let mut stream = stream(&device, events(header(0.3), frames), settings, options);

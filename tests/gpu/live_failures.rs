@@ -5,6 +5,7 @@ use crate::live::*;
 use echolume::gpu::{Renderer, RendererOptions};
 use echolume::live::{self, Step};
 use echolume::probe::Geometry;
+use echolume::scene::Scene;
 use echolume::source::Frame;
 use echolume::source::live::Event;
 use echolume::source::recorder::Header;
@@ -108,6 +109,14 @@ fn a_lost_device_costs_a_volume_and_not_the_stream() {
     let counts = stream.statistics().expect("statistics").volumes;
     assert_eq!(counts.shown + counts.dropped + counts.incomplete, 6, "{counts:?}");
     assert!(counts.incomplete >= 1, "{counts:?}");
+    // It may have been lost to a watchdog: from then on pictures of 512 x 512 are drawn in bands, also where none were needed before.
+    let renderer = stream.renderer().expect("begun");
+    let mut scene = renderer.scene().clone();
+    scene.settings.picture.size = [512, 512];
+    let large = Scene::new(scene.geometry, scene.input, scene.settings).expect("scene");
+    let dispatched = renderer.dispatched_passes(|r| r.change(large).and_then(|_| r.picture())).expect("picture");
+    let rays = dispatched.iter().filter(|name| **name == "raycast_projection").count();
+    assert!(rays > 1, "{dispatched:?}");
 }
 
 /// Prevents volumes that are never complete if some slices are outside the visible bounds and frames arrive line by line.

@@ -2,12 +2,14 @@
 //! every test, and any message fails the test that caused it.
 
 mod any_scene;
+mod bands;
 #[path = "../common/mod.rs"]
 mod common;
 mod conditioning;
 #[cfg(feature = "view")]
 mod console;
 mod cube;
+mod deep_pictures;
 mod detector;
 mod detector_convergence;
 mod detector_false_positives;
@@ -24,6 +26,7 @@ mod known_answers;
 mod live;
 mod live_control;
 mod live_failures;
+mod lost_device;
 mod modes;
 mod motion;
 mod pair;

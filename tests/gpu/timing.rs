@@ -2,8 +2,10 @@
 
 use crate::common::gpu::*;
 use echolume::gpu::pass_runner::{PassRunner, PassTimer};
+use echolume::gpu::{Renderer, RendererOptions, TimeStamps};
 use echolume::passes::{Arrays, DispatchArgs, Slot, Texels, by_name};
 use echolume::probe::Geometry;
+use echolume::queues::oracle::Event;
 
 /// The timed work is the intended work: every iteration, on the given contents, the same each time.
 #[test]
@@ -51,4 +53,77 @@ fn a_timed_pass_works_on_the_contents_given() {
             "{name}: the contents do not matter"
         );
     }
+}
+
+/// A surface with shadow and ambient occlusion: two passes that no barrier separates unless they are timed.
+fn timed(device: &Device, time_stamps: TimeStamps) -> Renderer {
+    let toml = "mode = 'sr'\npicture = { size = [40, 52] }\nslices = { pixels = 40, median = true }\n\
+                distance = { median = 3 }\nlight = { shadow = {}, occlusion = {} }";
+    let scene = scene(Geometry::Sweep(wobbler()), BYTES, toml);
+    let frames = body_frames(&scene, |p| if p.y > 40.0 { 0.9 } else { 0.1 });
+    let options = RendererOptions { time_stamps, log: true, ..RendererOptions::default() };
+    let mut renderer = Renderer::new(device, scene, &options).expect("renderer");
+    send(&mut renderer, &frames, 0);
+    renderer.picture().expect("picture");
+    renderer
+}
+
+/// Prevents times of passes that overlap: between any two stamped pieces of work there is an execution barrier, and before the first.
+#[test]
+fn passes_that_are_timed_do_not_overlap() {
+    let device = Device::new();
+    let mut renderer = timed(&device, TimeStamps::EachPass);
+    let log = renderer.log().expect("log");
+    let mut stamps = 0;
+    for (n, submission) in log.submissions.iter().enumerate() {
+        let mut is_serial = false;
+        for event in &submission.events {
+            match event {
+                Event::Serialize => is_serial = true,
+                Event::Operation(_) => {
+                    let touched = |slot| format!("{event:?}").contains(slot);
+                    // What only makes results visible to the host, or clears new images, is not timed.
+                    let is_timed = submission.events.iter().filter(|e| **e == Event::Stamp).count() > 1;
+                    assert!(is_serial || !is_timed || touched("Readback"), "submission {n}: {event:?}");
+                    is_serial = false;
+                }
+                Event::Stamp => stamps += 1,
+                Event::Barrier(_) => {}
+            }
+        }
+    }
+    let times = renderer.take_times().expect("times");
+    let steps = renderer.plan().steps.iter().map(|s| s.pass.name);
+    for name in steps.chain(["upload", "readback"]) {
+        assert!(times.iter().any(|t| t.name == name && t.total > 0.0), "{name} has no time");
+    }
+    let runs: u32 = times.iter().map(|t| t.runs).sum();
+    // Each recording begins with one more.
+    let recordings = renderer.log().expect("log").submissions.len() as u32;
+    assert_eq!(stamps, runs + recordings);
+}
+
+/// Prevents stamps and barriers that slow down a live picture: two stamps a submission, at its ends, and nothing that serializes.
+#[test]
+fn a_live_picture_has_two_stamps_a_command_buffer() {
+    let device = Device::new();
+    let mut renderer = timed(&device, TimeStamps::Ends);
+    for (n, submission) in renderer.log().expect("log").submissions.iter().enumerate() {
+        let events = &submission.events;
+        let stamps = events.iter().filter(|e| **e == Event::Stamp).count();
+        assert_eq!(stamps, 2, "submission {n}");
+        assert_eq!([events.first(), events.last()], [Some(&Event::Stamp); 2], "submission {n}");
+        assert!(!events.contains(&Event::Serialize), "submission {n}");
+    }
+    let times = renderer.take_times().expect("times");
+    let names: Vec<_> = times.iter().map(|t| t.name).collect();
+    assert!(
+        names.iter().all(|name| ["picture", "frame", "copy"].contains(name)) && names.contains(&"frame"),
+        "{names:?}"
+    );
+    // The last submission of each recorder is always timed.
+    assert!(times.iter().any(|t| t.name == "picture" && t.total > 0.0), "{times:?}");
+    let mut untimed = timed(&device, TimeStamps::None);
+    assert!(untimed.take_times().expect("times").is_empty());
+    assert!(untimed.log().expect("log").submissions.iter().all(|s| !s.events.contains(&Event::Stamp)));
 }

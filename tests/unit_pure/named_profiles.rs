@@ -2,6 +2,7 @@
 
 use echolume::passes::raycast::composite::{March, Medium, Place, Rule};
 use echolume::scene::{self_attenuation, transfer};
+use std::cell::OnceCell;
 
 /// Values along a ray, and the transfer table that they go through.
 struct Profile {
@@ -9,9 +10,10 @@ struct Profile {
     path: f64,
     value: fn(f64) -> f64,
     table: Vec<[f64; 4]>,
-    pre_integrated: Vec<[f64; 4]>,
-    /// Light and opacity of steps of `step` voxels.
-    self_attenuated: Vec<[f64; 4]>,
+    /// Made where a rule asks for it.
+    pre_integrated: OnceCell<Vec<[f64; 4]>>,
+    /// Light and opacity of steps of `step` voxels, by the value at their front; each row is made where a step asks for it.
+    self_attenuated: Vec<OnceCell<Vec<[f64; 4]>>>,
     step: f64,
 }
 
@@ -21,13 +23,21 @@ impl Profile {
         let n = transfer::ENTRIES;
         let entry = |i: usize| i as f64 / (n - 1) as f64;
         let table: Vec<[f64; 4]> = (0..n).map(entry).map(|v| [v, v, v, kappa(v)]).collect();
-        let pre_integrated = transfer::pre_integrated(&table);
-        let self_attenuated = (0..n).flat_map(|front| self_attenuation::row(&table, front, step)).collect();
-        Profile { path, value, table, pre_integrated, self_attenuated, step }
+        Profile { path, value, table, pre_integrated: OnceCell::new(), self_attenuated: vec![OnceCell::new(); n], step }
     }
 
-    fn at(&self, table: &[[f64; 4]], places: &[(usize, f64)]) -> [f64; 4] {
-        std::array::from_fn(|c| places.iter().map(|(n, weight)| weight * table[*n][c]).sum())
+    fn pre_integrated(&self, front: usize, back: usize) -> [f64; 4] {
+        let table = self.pre_integrated.get_or_init(|| transfer::pre_integrated(&self.table));
+        table[front * transfer::ENTRIES + back]
+    }
+
+    fn self_attenuated(&self, front: usize, back: usize) -> [f64; 4] {
+        let row = self.self_attenuated[front].get_or_init(|| self_attenuation::row(&self.table, front, self.step));
+        row[back]
+    }
+
+    fn mean(values: &[([f64; 4], f64)]) -> [f64; 4] {
+        std::array::from_fn(|c| values.iter().map(|(value, weight)| weight * value[c]).sum())
     }
 
     fn placed(value: f64) -> (usize, f64) {
@@ -36,20 +46,15 @@ impl Profile {
         (n, at - n as f64)
     }
 
-    fn between_in(&self, table: &[[f64; 4]], from: Place, to: Place) -> [f64; 4] {
+    fn between_in(&self, table: impl Fn(usize, usize) -> [f64; 4], from: Place, to: Place) -> [f64; 4] {
         let ((row, down), (column, along)) =
             (Profile::placed((self.value)(from.offset)), Profile::placed((self.value)(to.offset)));
-        let n = row * transfer::ENTRIES + column;
-        let below = n + transfer::ENTRIES;
-        self.at(
-            table,
-            &[
-                (n, (1.0 - down) * (1.0 - along)),
-                (n + 1, (1.0 - down) * along),
-                (below, down * (1.0 - along)),
-                (below + 1, down * along),
-            ],
-        )
+        Profile::mean(&[
+            (table(row, column), (1.0 - down) * (1.0 - along)),
+            (table(row, column + 1), (1.0 - down) * along),
+            (table(row + 1, column), down * (1.0 - along)),
+            (table(row + 1, column + 1), down * along),
+        ])
     }
 
     fn light(&self, rule: Rule) -> f64 {
@@ -72,7 +77,7 @@ impl Profile {
 
     fn at_value(&self, value: f64) -> [f64; 4] {
         let (n, share) = Profile::placed(value);
-        self.at(&self.table, &[(n, 1.0 - share), (n + 1, share)])
+        Profile::mean(&[(self.table[n], 1.0 - share), (self.table[n + 1], share)])
     }
 }
 
@@ -82,12 +87,12 @@ impl Medium for Profile {
     }
 
     fn between(&self, from: Place, to: Place) -> Option<[f64; 4]> {
-        Some(self.between_in(&self.pre_integrated, from, to))
+        Some(self.between_in(|front, back| self.pre_integrated(front, back), from, to))
     }
 
     fn self_attenuated(&self, from: Place, to: Place, length: f64) -> Option<[f64; 4]> {
         Some(match length > self.step * (1.0 - 1e-9) {
-            true => self.between_in(&self.self_attenuated, from, to),
+            true => self.between_in(|front, back| self.self_attenuated(front, back), from, to),
             false => self_attenuation::step(&self.table, (self.value)(from.offset), (self.value)(to.offset), length),
         })
     }
@@ -96,10 +101,8 @@ impl Medium for Profile {
 const STEPS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 
 fn errors(name: &'static str, path: f64, value: fn(f64) -> f64, kappa: fn(f64) -> f64, rule: Rule) -> [f64; 4] {
-    let errors = STEPS.map(|step| {
-        let profile = Profile::new(path, value, kappa, step);
-        (profile.light(rule) - profile.truth()).abs()
-    });
+    let truth = Profile::new(path, value, kappa, STEPS[0]).truth();
+    let errors = STEPS.map(|step| (Profile::new(path, value, kappa, step).light(rule) - truth).abs());
     println!("{name}, {rule:?}: errors at steps of 8, 4, 2, 1 voxels {errors:.5?}");
     errors
 }

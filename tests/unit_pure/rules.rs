@@ -133,6 +133,17 @@ fn unsafe_code_is_forbidden_in_every_module_but_one_and_has_its_reasons_there() 
 }
 
 /// The crate that `tools/mutants` makes is complete: no file in it names a module that is not copied.
+/// A wait for a queue waits for the picture in flight too, which may take seconds. egui-ash-renderer's own uploads of textures do that.
+#[test]
+fn nothing_waits_for_a_whole_queue() {
+    for (path, text) in sources("src") {
+        let code = code(&text);
+        for call in ["queue_wait_idle", ".set_texture(", ".set_textures("] {
+            assert!(!code.contains(call), "{path} uses {call}");
+        }
+    }
+}
+
 #[test]
 fn the_crate_of_tools_mutants_is_complete() {
     let tool = std::fs::read_to_string(repository("tools/mutants")).expect("tools/mutants");

@@ -548,7 +548,11 @@ static VKAPI_ATTR VkResult VKAPI_CALL Submit2(VkQueue q, uint32_t n, const VkSub
                 if (s[i].pSignalSemaphoreInfos[j].value > *value) *value = s[i].pSignalSemaphoreInfos[j].value;
             }
     pthread_mutex_unlock(&lock);
-    if (d->lost) return VK_ERROR_DEVICE_LOST;
+    if (d->lost) {
+        // A device that is lost runs nothing any more, and the program may destroy what earlier submissions use.
+        NEXT(d, vkQueueWaitIdle)(q);
+        return VK_ERROR_DEVICE_LOST;
+    }
     if (swallowed) return VK_SUCCESS;
     VkSubmitInfo2 *copies = malloc(n * sizeof *copies);
     if (n) memcpy(copies, s, n * sizeof *copies);

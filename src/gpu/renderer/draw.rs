@@ -64,9 +64,17 @@ impl Renderer {
     pub fn end_picture(&mut self) -> Result<Picture, GpuError> {
         self.wait_drawn()?;
         let [width, height] = self.scene.picture_size();
+        // A deep picture is rounded here, where a window shows more.
+        let in_8_bits = |bytes: &[u8], format| match format {
+            Format::Rgba8 => bytes.to_vec(),
+            _ => Texels::decode([width as usize, height as usize, 1], format, bytes).encode(Format::Rgba8),
+        };
         let rgba = match &self.readback {
-            Some(buffer) => buffer.bytes().to_vec(),
-            None => self.bring_back(Slot::Screen)?.map_or(Vec::new(), |(buffer, ..)| buffer.bytes().to_vec()),
+            Some(buffer) => in_8_bits(buffer.bytes(), Slot::Screen.format(&self.scene)),
+            None => {
+                let there = self.bring_back(Slot::Screen)?;
+                there.map_or(Vec::new(), |(buffer, _, format)| in_8_bits(buffer.bytes(), format))
+            }
         };
         Ok(Picture { width, height, rgba })
     }
@@ -124,14 +132,18 @@ impl Renderer {
                 let (slice, slices) = (slices.start, slices.end - slices.start);
                 let args = DispatchArgs { image: self.shown, slice, slices, ..step.args() };
                 let dispatch = Dispatch { slots, pipeline, scene, pass: step.pass, args: &args };
-                self.picture.dispatch(&mut self.barriers, &dispatch)?;
+                let (barriers, timelines) = (&mut self.barriers, &mut self.timelines);
+                match &self.limit {
+                    Some(limit) => self.picture.dispatch_in_bands(barriers, timelines, &dispatch, limit)?,
+                    None => self.picture.dispatch(barriers, &dispatch)?,
+                }
             }
             // The slots count as written from here on. If the submission fails, all steps stay stale.
             self.contents.extend(step.writes(scene).into_iter().map(|slot| (slot, step.id())));
         }
         if let (Some(screen), Some(readback)) = (self.slots.image(Slot::Screen, 0), &self.readback) {
             self.picture.copy_out(&mut self.barriers, screen, Slot::Screen, 0, readback);
-            self.picture.stamp("readback");
+            self.picture.stamp(&mut self.barriers, "readback");
         }
         let (picture, barriers, timelines) = (&mut self.picture, &mut self.barriers, &mut self.timelines);
         self.timings.host("submit", || picture.submit(barriers, timelines))?;

@@ -39,7 +39,7 @@ impl InFlight {
             let InFlight { copier, recorder, staging } = self;
             let by = copier.as_mut().unwrap_or(recorder);
             by.copy_in(barriers, (staging, BufferLayout::default()), target, place);
-            by.stamp("upload");
+            by.stamp(barriers, "upload");
         }
         if let Some(copier) = &mut self.copier {
             copier.submit(barriers, timelines)?;
@@ -216,10 +216,10 @@ impl Renderer {
         // Slices of a 3D image are not subresources: not every queue can copy a single one.
         let copies = copy != ingest && (chain::copied(&self.scene).is_none() || context.queue(copy).copies_slices);
         let entry = |_| {
-            let copier = || Recorder::new(context, copy, "copy", false);
+            let copier = || Recorder::new(context, copy, "copy", self.time_stamps, false);
             Ok(InFlight {
                 copier: copies.then(copier).transpose()?,
-                recorder: Recorder::new(context, ingest, "frame", self.spans)?,
+                recorder: Recorder::new(context, ingest, "frame", self.time_stamps, self.spans)?,
                 staging: Buffer::new(context, "staging", bytes, Purpose::Staging)?,
             })
         };
@@ -295,7 +295,7 @@ impl InFlight {
         by.begin(barriers, timelines)?;
         if let Some(target) = slots.image(place.slot, place.copy) {
             by.copy_in(barriers, (&self.staging, layout), target, place);
-            by.stamp("upload");
+            by.stamp(barriers, "upload");
         }
         timings.host("submit", || by.submit(barriers, timelines))
     }

@@ -4,6 +4,7 @@
 mod draw;
 mod ingest;
 
+use super::bands::{BandLimit, Bands};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
@@ -11,10 +12,10 @@ use super::pipelines::{AsyncPipelineCompiler, Pipeline, Pipelines, Shaders, Wake
 use super::recorder::{BarrierRecorder, BufferLayout, Dispatch, Recorder, SlotParts};
 use super::resources::{Buffer, Purpose, SlotResources};
 use super::timeline::Timelines;
-use super::timing::Timings;
+use super::timing::{TimeStamps, Timings};
 use crate::passes::chain;
 use crate::passes::slots::{FRAMES_IN_FLIGHT, Format, Initializer};
-use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Texels};
+use crate::passes::{DispatchArgs, Frequency, PassTime, Slot, Span, Stage, Texels};
 use crate::picture::Picture;
 use crate::plan::{Contents, Plan, Rerun, affected};
 use crate::queues::oracle::SubmissionLog;
@@ -30,8 +31,12 @@ pub struct RendererOptions {
     pub volume_images: u32,
     /// Where the SPIR-V of a shader comes from; the embedded shaders by default.
     pub shaders: Arc<Shaders>,
-    /// Record a span of time for each host and device operation, and count shader invocations.
+    /// Record a span of time for each host and device operation; where each pass is timed, count shader invocations too.
     pub spans: bool,
+    /// What is timed on the device.
+    pub time_stamps: TimeStamps,
+    /// How the passes over the volume and the picture are divided, so that no submission takes too long.
+    pub bands: Bands,
     /// How single texels are read; `None` selects what is fast on the device.
     pub texel_access: Option<TexelAccess>,
     /// Number of queues, 1..=3; `None` uses all that the device has. With fewer on the device than given, several of them share
@@ -51,6 +56,8 @@ impl Default for RendererOptions {
             volume_images: 1,
             shaders: embedded(),
             spans: false,
+            time_stamps: TimeStamps::default(),
+            bands: Bands::default(),
             texel_access: None,
             queues: None,
             readback: true,
@@ -139,6 +146,9 @@ pub struct Renderer {
     skipped: u64,
     timings: Timings,
     spans: bool,
+    time_stamps: TimeStamps,
+    /// `None` if no dispatch is divided.
+    limit: Option<BandLimit>,
     texel_access: TexelAccess,
     wake: Option<Wake>,
 }
@@ -158,7 +168,7 @@ impl Renderer {
         let queues = options.queues.unwrap_or(context.queue_count()).clamp(1, MAX_QUEUES);
         let mut renderer = Renderer {
             ring: Vec::new(),
-            picture: Recorder::new(context, 0, "picture", options.spans)?,
+            picture: Recorder::new(context, 0, "picture", options.time_stamps, options.spans)?,
             readback: options.readback.then(|| readback(context, &scene)).transpose()?,
             slots: SlotResources::new(context, options.volume_images.max(1)),
             steps,
@@ -191,6 +201,8 @@ impl Renderer {
             shown: 0,
             timings: Timings::new(context, options.spans),
             spans: options.spans,
+            time_stamps: options.time_stamps,
+            limit: BandLimit::new(options.bands, context.candidate.is_software()),
             texel_access,
             wake: options.wake.clone(),
         };
@@ -366,6 +378,10 @@ impl Renderer {
         if sends_frames || scene.smoothing_radius() != self.scene.smoothing_radius() {
             self.filtered_bounds = scene.visible_bounds;
         }
+        // Rays of smaller steps take longer than the last ones did.
+        for (_, pipeline) in plan.steps.iter().zip(&steps).filter(|(s, _)| s.pass.stage == Stage::Raycast) {
+            pipeline.time.lengthen(self.scene.step / scene.step);
+        }
         (self.plan, self.steps, self.scene) = (plan, steps, scene);
         self.broken = None;
         self.rebuild(&rerun).inspect_err(|error| self.broken = Some(error.to_string()))?;
@@ -462,8 +478,8 @@ impl Renderer {
         Ok(Some((buffer, size, format)))
     }
 
-    /// Waits for the device, and returns the times of every pass and copy since the last call, ns. Empty if the device has no
-    /// time stamps.
+    /// Waits for the device, and returns the times of what [`RendererOptions::time_stamps`] selects since the last call, ns. Empty if the
+    /// device has no time stamps.
     pub fn take_times(&mut self) -> Result<Vec<PassTime>, GpuError> {
         self.collect()?;
         Ok(self.timings.take_times())
@@ -486,6 +502,12 @@ impl Renderer {
         Ok(self.timings.take_spans())
     }
 
+    /// The largest error, ns, with which spans of the device were placed on the host's clock; `None` without spans, and if the device's
+    /// clock cannot be read.
+    pub fn clock_deviation(&self) -> Option<u64> {
+        self.timings.clock_deviation()
+    }
+
     /// The names of the passes that `work` dispatches, in order.
     pub fn dispatched_passes<T>(
         &mut self,
@@ -494,7 +516,7 @@ impl Renderer {
         Ok(self.dispatch_extents(work)?.into_iter().map(|(name, _)| name).collect())
     }
 
-    /// The names of the passes that `work` dispatches, and their invocations along x, y, z.
+    /// The names of the passes that `work` dispatches, and their invocations along x, y, z; in bands, those of each band.
     pub fn dispatch_extents<T>(
         &mut self,
         work: impl FnOnce(&mut Renderer) -> Result<T, GpuError>,

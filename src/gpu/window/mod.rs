@@ -1,6 +1,10 @@
 //! Presentation: `target` is a window or a monitor, `swapchain` the images of its surface, `screen` copies the picture into
-//! one of them and draws the panels over it. A build without the feature `view` has only a target that cannot exist.
+//! one of them and draws the panels over it, whose textures `panel_textures` keeps. `present_wait` measures when a picture is seen. A build without the feature `view` has only a target that cannot exist.
 
+#[cfg(feature = "view")]
+mod panel_textures;
+#[cfg(feature = "view")]
+mod present_wait;
 #[cfg(feature = "view")]
 pub(super) mod screen;
 #[cfg(feature = "view")]

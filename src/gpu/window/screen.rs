@@ -1,6 +1,7 @@
 //! Presents a picture and panels: copies them into the next image of the swapchain. One such drawing is in flight at a time: a copy
 //! and a few triangles take little time compared with a picture.
 
+use super::panel_textures::PanelTextures;
 use super::swapchain::{PresentMode, Swapchain};
 use super::target::{MonitorChoice, Target, choose_monitor};
 use crate::barriers::{Access, PipelineStage};
@@ -14,6 +15,7 @@ use ash::vk;
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Time-out for acquiring an image of the window, ns. A window that is covered or unplugged may never provide one.
 const ACQUIRE_TIMEOUT_NS: u64 = 100_000_000;
@@ -116,6 +118,11 @@ impl Screen {
         self.shown
     }
 
+    /// Times from presentation to the monitor that were measured since the last call; none if the device cannot measure them.
+    pub fn take_latencies(&mut self) -> Vec<Duration> {
+        self.chain.take_latencies()
+    }
+
     /// Presents panels without a picture.
     ///
     /// # Errors
@@ -136,7 +143,8 @@ impl Screen {
             }
             // Also if nothing can be presented: each change is reported only once.
             if let Some(overlay) = &mut self.overlay {
-                overlay.take_textures(std::mem::take(&mut panels.textures))?;
+                overlay.textures.take(&mut overlay.renderer, std::mem::take(&mut panels.textures))?;
+                overlay.textures.translate(&mut panels.shapes);
             }
         }
         // Tries again if the swapchain turns out to be out of date.
@@ -276,6 +284,7 @@ impl Screen {
             queued = Some((&mut *drawn.barriers, &mut *drawn.timelines));
         }
         if let (Some(panels), Some(overlay)) = (panels, &mut self.overlay) {
+            overlay.textures.record(commands);
             go(Stage::Drawn);
             let area = vk::Rect2D { extent: vk::Extent2D { width: size[0], height: size[1] }, ..Default::default() };
             let colour = [vk::RenderingAttachmentInfo::default()
@@ -462,16 +471,11 @@ impl Drop for Panels {
 
 /// Draws the panels that egui laid out over the picture, with dynamic rendering.
 struct Overlay {
-    context: Arc<Context>,
-    // Taken in `drop`, before the pool is destroyed.
-    renderer: Option<Renderer<DefaultAllocator>>,
-    /// For uploads of textures.
-    pool: vk::CommandPool,
-    /// Freed textures that the drawing in flight may still use.
-    freed: Vec<egui::TextureId>,
+    renderer: Renderer<DefaultAllocator>,
+    textures: PanelTextures,
 }
 
-fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
+pub(super) fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
     match error {
         egui_ash_renderer::RendererError::Vulkan(result) => {
             GpuError::Vulkan { operation: "draw the panels".into(), result }
@@ -483,12 +487,7 @@ fn failed(error: egui_ash_renderer::RendererError) -> GpuError {
 impl Overlay {
     /// `format`: the format of the images that it draws on.
     fn new(context: &Arc<Context>, format: vk::Format) -> Result<Overlay, GpuError> {
-        let create = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(context.queue(0).family)
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-        // SAFETY: the create structure is complete.
-        let pool = unsafe { context.device.create_command_pool(&create, None) }.context(|| "create commands".into())?;
-        let mut overlay = Overlay { context: context.clone(), renderer: None, pool, freed: Vec::new() };
+        let textures = PanelTextures::new(context)?;
         let mode = RenderMode::DynamicRendering(DynamicRendering {
             color_attachment_format: format,
             depth_attachment_format: None,
@@ -497,38 +496,12 @@ impl Overlay {
         let (instance, device) = (&context.instance, context.device.clone());
         let made =
             Renderer::with_default_allocator(instance, context.candidate.handle, device, mode, Options::default());
-        overlay.renderer = Some(made.map_err(failed)?);
-        Ok(overlay)
-    }
-
-    /// Uploads added and changed textures, and frees those that the last call listed as freed. Nothing drawn with it may be in flight.
-    fn take_textures(&mut self, mut textures: egui::TexturesDelta) -> Result<(), GpuError> {
-        let (Some(renderer), pool) = (&mut self.renderer, self.pool) else { return Ok(()) };
-        self.freed.drain(..).try_for_each(|id| renderer.free_texture(id)).map_err(failed)?;
-        for (id, deltas) in textures.set.drain() {
-            for delta in deltas {
-                // This waits on the queue for the upload.
-                self.context.on_queue(|queue| renderer.set_texture(queue, pool, id, &delta)).map_err(failed)?;
-            }
-        }
-        self.freed.extend(textures.free.drain());
-        Ok(())
+        Ok(Overlay { renderer: made.map_err(failed)?, textures })
     }
 
     /// Records the drawing, inside dynamic rendering to an image of this size, pixels.
     fn record(&mut self, commands: vk::CommandBuffer, size: [u32; 2], panels: &Panels) -> Result<(), GpuError> {
         let extent = vk::Extent2D { width: size[0], height: size[1] };
-        match &mut self.renderer {
-            Some(renderer) => renderer.cmd_draw(commands, extent, panels.scale, &panels.shapes).map_err(failed),
-            None => Ok(()),
-        }
-    }
-}
-
-impl Drop for Overlay {
-    fn drop(&mut self) {
-        self.renderer = None;
-        // SAFETY: its owner waited for the device.
-        unsafe { self.context.device.destroy_command_pool(self.pool, None) };
+        self.renderer.cmd_draw(commands, extent, panels.scale, &panels.shapes).map_err(failed)
     }
 }

@@ -1,5 +1,6 @@
 //! The swapchain: the images of a surface.
 
+use super::present_wait::PresentWaiter;
 use super::target::Target;
 use crate::gpu::context::{Context, Presentation};
 use crate::gpu::error::{ErrorContext, GpuError};
@@ -7,6 +8,8 @@ use crate::gpu::faults::InjectionPoint;
 use crate::gpu::resources::WHOLE;
 use ash::vk;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 /// When a picture is presented.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +44,8 @@ pub struct Swapchain {
     pub format: vk::Format,
     pub size: [u32; 2],
     present_mode: PresentMode,
+    /// Measures when the pictures of `handle` are on the monitor, if the device can.
+    waiter: Option<PresentWaiter>,
 }
 
 /// An image of a swapchain.
@@ -51,8 +56,18 @@ pub struct SwapchainImage {
     pub drawn: vk::Semaphore,
 }
 
+/// Formats that pass values of 10 bits to the monitor unchanged: four times as many levels of grey.
+const DEEP: [vk::Format; 2] = [vk::Format::A2B10G10R10_UNORM_PACK32, vk::Format::A2R10G10B10_UNORM_PACK32];
 /// Formats that pass 8-bit values to the monitor unchanged.
 const FORMATS: [vk::Format; 2] = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];
+
+/// The deepest format that the surface offers and for which `can_draw` says that pictures can be copied and panels drawn.
+fn choose(offered: &[vk::SurfaceFormatKHR], can_draw: impl Fn(vk::Format) -> bool) -> Option<vk::Format> {
+    let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
+    let is_offered = |format: &vk::Format| offered.iter().any(|o| o.format == *format && is_plain(o));
+    let deep = DEEP.into_iter().filter(|format| can_draw(*format));
+    deep.chain(FORMATS).find(is_offered)
+}
 
 impl Swapchain {
     /// A surface without images; [`Swapchain::fit`] creates them.
@@ -62,8 +77,17 @@ impl Swapchain {
     pub fn new(context: &Arc<Context>, target: Target, present_mode: PresentMode) -> Result<Swapchain, GpuError> {
         let surface = target.surface(&context.entry, &context.instance, context.candidate.handle)?;
         let (handle, images, format) = (vk::SwapchainKHR::null(), Vec::new(), vk::Format::UNDEFINED);
-        let mut made =
-            Swapchain { context: context.clone(), target, surface, handle, images, format, size: [0; 2], present_mode };
+        let mut made = Swapchain {
+            context: context.clone(),
+            target,
+            surface,
+            handle,
+            images,
+            format,
+            size: [0; 2],
+            present_mode,
+            waiter: None,
+        };
         made.format = made.choose_format()?;
         Ok(made)
     }
@@ -91,9 +115,12 @@ impl Swapchain {
                 .get_physical_device_surface_formats(self.context.candidate.handle, self.surface)
         }
         .context(|| "list the formats of the surface".into())?;
-        let is_plain = |f: &vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
-        let found = FORMATS.into_iter().find(|f| there.iter().any(|t| t.format == *f && is_plain(t)));
-        found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))
+        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
+        let found = choose(&there, |format| self.context.format_features(format).contains(needed));
+        let found = found.ok_or_else(|| GpuError::Window("the surface supports no 8-bit UNORM format".into()))?;
+        // Pictures are made with as many bits from the next change of the scene on.
+        self.context.is_deep.store(DEEP.contains(&found), Ordering::Relaxed);
+        Ok(found)
     }
 
     /// Replaces a lost surface by a new one on the same target.
@@ -109,6 +136,8 @@ impl Swapchain {
     /// Recreates the images with the size of the surface, or with `wanted`, pixels, if the surface has no size of its own. Returns false
     /// if the surface is empty, as with a minimised window. Nothing may be in flight.
     pub fn fit(&mut self, wanted: [u32; 2]) -> Result<bool, GpuError> {
+        // It waits with the swapchain that is replaced.
+        self.waiter = None;
         let presentation = self.presentation()?;
         let device = self.context.candidate.handle;
         // SAFETY: surface and device belong to this instance; the calls only read.
@@ -161,6 +190,7 @@ impl Swapchain {
             unsafe { presentation.swapchains.create_swapchain(&create, None) }.context(|| "create a swapchain".into());
         self.drop_images();
         self.handle = made?;
+        self.waiter = PresentWaiter::new(&self.context, self.handle);
         // SAFETY: the swapchain is alive.
         let images = unsafe { self.presentation()?.swapchains.get_swapchain_images(self.handle) }
             .context(|| "list the images of the swapchain".into())?;
@@ -208,15 +238,32 @@ impl Swapchain {
     }
 
     /// Presents an image when it has been drawn. Returns true if the swapchain should be recreated.
-    pub fn present(&self, image: u32) -> Result<bool, vk::Result> {
+    pub fn present(&mut self, image: u32) -> Result<bool, vk::Result> {
         let Some(presentation) = &self.context.presentation else { return Err(vk::Result::ERROR_SURFACE_LOST_KHR) };
         let (chains, images, drawn) = ([self.handle], [image], [self.images[image as usize].drawn]);
-        let present = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        let number = [self.waiter.as_mut().map_or(0, PresentWaiter::number)];
+        let mut numbered = vk::PresentIdKHR::default().present_ids(&number);
+        let mut present =
+            vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        if self.waiter.is_some() {
+            present = present.push_next(&mut numbered);
+        }
+        let at = Instant::now();
         // SAFETY: the image was acquired and a submission in flight signals `drawn`.
-        self.context.on_queue(|queue| unsafe { presentation.swapchains.queue_present(queue, &present) })
+        let outcome = self.context.on_queue(|queue| unsafe { presentation.swapchains.queue_present(queue, &present) });
+        if let (Ok(_), Some(waiter)) = (&outcome, &mut self.waiter) {
+            waiter.presented(number[0], at);
+        }
+        outcome
+    }
+
+    /// Times from presentation to the monitor that were measured since the last call.
+    pub fn take_latencies(&mut self) -> Vec<Duration> {
+        self.waiter.as_mut().map(PresentWaiter::take).unwrap_or_default()
     }
 
     fn drop_images(&mut self) {
+        self.waiter = None;
         // SAFETY: nothing is in flight.
         unsafe {
             for SwapchainImage { view, drawn, .. } in self.images.drain(..) {
@@ -244,5 +291,25 @@ impl Drop for Swapchain {
     fn drop(&mut self) {
         self.context.wait_idle();
         self.destroy();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_format_of_10_bits_is_preferred_where_it_can_be_drawn_on() {
+        let plain = |format| vk::SurfaceFormatKHR { format, color_space: vk::ColorSpaceKHR::SRGB_NONLINEAR };
+        let [deep, other] = DEEP;
+        let [usual, swapped] = FORMATS;
+        let all = [plain(swapped), plain(usual), plain(other), plain(deep)];
+        assert_eq!(choose(&all, |_| true), Some(deep));
+        assert_eq!(choose(&all, |format| format != deep), Some(other));
+        assert_eq!(choose(&all, |_| false), Some(usual));
+        assert_eq!(choose(&all[..1], |_| true), Some(swapped));
+        let wide = vk::SurfaceFormatKHR { format: deep, color_space: vk::ColorSpaceKHR::HDR10_ST2084_EXT };
+        assert_eq!(choose(&[wide, plain(usual)], |_| true), Some(usual), "a monitor would show other levels");
+        assert_eq!(choose(&[plain(vk::Format::B8G8R8A8_SRGB)], |_| true), None);
     }
 }

@@ -225,6 +225,8 @@ impl Console {
                 (self.has_new_picture, self.needs_redraw) = (false, self.panels.has_pending_input());
                 self.present_retry_at = None;
                 self.measure_input_latency();
+                let shown = self.screen.as_mut().map(|screen| screen.take_latencies()).unwrap_or_default();
+                shown.into_iter().for_each(|time| self.times.scan_out.add(time));
             }
             // Try again when the window asks for it, or after a moment.
             Ok(PresentOutcome::NotPresentable) => self.present_retry_at = Some(now + PRESENT_RETRY),
@@ -252,12 +254,16 @@ impl Console {
         let still = self.stream.last_begun().map_or(0.0, |begun| begun.elapsed().as_secs_f64());
         format!(
             "{:.1} s: {} volumes, {} shown on the window, {dispatched} dispatches, none in the last {still:.1} s; ms: picture {}, \
-             input to picture {}",
+             input to picture {}{}",
             self.started.elapsed().as_secs_f64(),
             self.stream.volumes_shown(),
             shown,
             percentiles(&self.times.pictures),
             percentiles(&self.times.input_latency),
+            match self.times.scan_out.newest() {
+                Some(_) => format!(", presentation to monitor {}", percentiles(&self.times.scan_out)),
+                None => String::new(),
+            }
         )
     }
 

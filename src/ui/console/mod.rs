@@ -15,7 +15,7 @@ use super::source_supervisor::{OpenSource, SourceSupervisor};
 use super::times::Times;
 use crate::gpu::shader_reload::{ShaderFolder, Watch};
 use crate::gpu::window::Screen;
-use crate::gpu::{Context, GpuError, Wake};
+use crate::gpu::{Context, GpuError, TimeStamps, Wake};
 use crate::kiosk::chord::Chord;
 use crate::live::cine::CineLimits;
 use crate::live::{self, Feed, Stream, StreamError, Update};
@@ -40,6 +40,8 @@ pub struct ConsoleOptions {
     /// Number of volume images, 2 or 3.
     pub images: u32,
     pub queues: Option<usize>,
+    /// What the display of times shows of the device.
+    pub time_stamps: TimeStamps,
     pub cine: CineLimits,
     /// The frame budget: longest time of a picture while the view moves.
     pub budget: Option<Duration>,
@@ -76,6 +78,7 @@ impl Default for ConsoleOptions {
             update: Update::Whole,
             images: 3,
             queues: None,
+            time_stamps: TimeStamps::default(),
             cine: CineLimits::default(),
             budget: None,
             rungs: built_in_ladder(),
@@ -205,6 +208,7 @@ impl Console {
             update: options.update,
             images: options.images,
             queues: options.queues,
+            time_stamps: options.time_stamps,
             readback: false,
             cine: options.cine,
             wake: Some(options.wake.clone()),

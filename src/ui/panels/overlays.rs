@@ -116,6 +116,10 @@ fn figures(ui: &mut Ui, state: &PanelState) {
         ),
         TEXT,
     );
+    if times.scan_out.newest().is_some() {
+        let [p50, p95] = [0.5, 0.95].map(|share| ms(times.scan_out.percentile(share)));
+        small(ui, format!("presentation to monitor p50 {p50}  p95 {p95}"), TEXT);
+    }
     let colour = if times.dropped + times.lost > 0 { WARNING } else { WEAK_TEXT };
     small(ui, format!("{} volumes dropped, {} frames lost", times.dropped, times.lost), colour);
 }

@@ -41,6 +41,7 @@ pub fn options() -> ConsoleOptions {
         update: Update::Whole,
         images: 3,
         queues: None,
+        time_stamps: echolume::gpu::TimeStamps::default(),
         cine: ROOM,
         budget: None,
         rungs: built_in_ladder(),

@@ -118,5 +118,6 @@ pub fn profile(repeats: usize) -> Profile {
         device_ns: vec![0.0; repeats],
         ceilings: Some(Ceilings { copy: ceiling(4e11), sampling: ceiling(1e11), exact: None, fetch: ceiling(2e11) }),
         sampling: None,
+        clock_deviation_ns: Some(250),
     }
 }

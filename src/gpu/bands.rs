@@ -1,0 +1,239 @@
+//! Bands: a long dispatch in several parts, each in a submission of its own. The watchdog of a driver ends a submission that takes too
+//! long, and the device is lost: after 2 s (Windows), 7.5 s (i915) or 10 s (amdgpu). The size of a band follows from the time that
+//! the pass took on this device.
+//!
+//! Invocations of every pass are independent: no shader has shared memory, a barrier or an atomic operation. So any division into
+//! workgroups gives the same texels. A software device has no watchdog and gets no bands, until it is lost.
+
+use crate::passes::{Pass, Stage};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Time that a submission may take, ns: far less than any watchdog allows, since the next picture may be slower than the last.
+const TARGET_NS: f64 = 100e6;
+/// The shortest such time after losses, ns.
+const LEAST_NS: f64 = 1e6;
+/// Invocations of a pass that casts rays, in its first band on a device, when its time is not known.
+const FIRST_RAYS: u64 = 1 << 18;
+/// Invocations of any other pass in its first band.
+const FIRST_TEXELS: u64 = 1 << 21;
+/// The least share of the last time that a newer measurement replaces it by: one fast picture does not make the bands of the next ones
+/// long.
+const DECAY: f64 = 0.75;
+
+/// How long dispatches are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bands {
+    /// By measured time. Each loss of the device so far halves the time that a submission may take.
+    Measured { losses: u32 },
+    /// Into bands of at most so many invocations, but at least one row of workgroups: for tests.
+    Fixed(u64),
+}
+
+impl Default for Bands {
+    fn default() -> Bands {
+        Bands::Measured { losses: 0 }
+    }
+}
+
+/// The measured time of an invocation of a pipeline, ns. 0 until it is measured.
+#[derive(Debug, Default)]
+pub struct InvocationTime(AtomicU64);
+
+impl InvocationTime {
+    fn measured(&self) -> Option<f64> {
+        Some(f64::from_bits(self.0.load(Ordering::Relaxed))).filter(|ns| *ns > 0.0)
+    }
+
+    fn measure(&self, ns: f64) {
+        let least = self.measured().map_or(0.0, |before| DECAY * before);
+        if ns.is_finite() && ns > 0.0 {
+            self.0.store(ns.max(least).to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// From now on each invocation is expected to take `factor` times as long, if that is longer.
+    pub fn lengthen(&self, factor: f64) {
+        if let Some(ns) = self.measured().filter(|_| factor.is_finite() && factor > 1.0) {
+            self.0.store((factor * ns).to_bits(), Ordering::Relaxed);
+        }
+    }
+}
+
+/// A part of a dispatch, in workgroups.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Band {
+    pub base: [u32; 3],
+    pub groups: [u32; 3],
+}
+
+/// What one submission may hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BandLimit {
+    /// Time, ns; and how often the first bands were halved.
+    Time { target: f64, losses: u32 },
+    /// Invocations of a band.
+    Invocations(u64),
+}
+
+impl BandLimit {
+    /// The limit of a device; `None` if nothing is divided.
+    pub fn new(bands: Bands, is_software: bool) -> Option<BandLimit> {
+        match bands {
+            Bands::Measured { losses: 0 } if is_software => None,
+            Bands::Measured { losses } => {
+                Some(BandLimit::Time { target: (TARGET_NS / 2f64.powi(losses.min(64) as i32)).max(LEAST_NS), losses })
+            }
+            Bands::Fixed(invocations) => Some(BandLimit::Invocations(invocations.max(1))),
+        }
+    }
+
+    /// The expected time of a dispatch, ns; 0 under a limit of invocations.
+    pub fn expected(&self, pass: &Pass, time: &InvocationTime, invocations: u64) -> f64 {
+        let BandLimit::Time { target, losses } = *self else { return 0.0 };
+        let each = time.measured().unwrap_or_else(|| {
+            let first = match pass.stage {
+                Stage::Raycast | Stage::Shade => FIRST_RAYS,
+                _ => FIRST_TEXELS,
+            };
+            // Halved after a loss, as the time is: unless that is at its least.
+            target / (first >> losses.min(12)).max(1) as f64
+        });
+        each * invocations as f64
+    }
+
+    /// True if a dispatch of this expected time does not fit into a submission with work of `open` ns.
+    pub fn is_full(&self, open: f64, expected: f64) -> bool {
+        match *self {
+            BandLimit::Time { target, .. } => open > 0.0 && open + expected > target,
+            BandLimit::Invocations(_) => false,
+        }
+    }
+
+    /// The bands of a dispatch of so many workgroups, invocations, and this expected time. They are slabs along the axis with the most
+    /// workgroups.
+    pub fn bands(&self, groups: [u32; 3], invocations: u64, expected: f64) -> Vec<Band> {
+        let count = match *self {
+            BandLimit::Time { target, .. } => (expected / target).ceil() as u64,
+            BandLimit::Invocations(most) => invocations.div_ceil(most),
+        };
+        // Of equally many, the rows before the columns: a row of texels is contiguous in memory.
+        let axis = (0..3).rev().max_by_key(|axis| (groups[*axis], *axis)).unwrap_or(0);
+        let all = groups[axis];
+        let each = u64::from(all).div_ceil(count.max(1)).max(1) as u32;
+        let band = |first: u32| {
+            let (mut base, mut size) = ([0; 3], groups);
+            (base[axis], size[axis]) = (first, each.min(all - first));
+            Band { base, groups: size }
+        };
+        match all {
+            0 => vec![Band { base: [0; 3], groups }],
+            _ => (0..all).step_by(each as usize).map(band).collect(),
+        }
+    }
+}
+
+/// Work in a submission whose time is measured: a pass, by the time of its invocations, and their number.
+#[derive(Clone, Debug)]
+pub struct Work {
+    pub time: std::sync::Arc<InvocationTime>,
+    /// What it was expected to take, ns.
+    pub expected: f64,
+    pub invocations: u64,
+}
+
+/// Notes that this work took so long together, ns. Where it is several passes, each took its share of what was expected.
+pub fn measured(work: &[Work], ns: f64) {
+    let expected: f64 = work.iter().map(|w| w.expected).sum();
+    for w in work.iter().filter(|w| w.invocations > 0) {
+        let share = if work.len() == 1 { 1.0 } else { w.expected / expected };
+        w.time.measure(share * ns / w.invocations as f64);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::passes::by_name;
+    use std::sync::Arc;
+
+    fn limit(losses: u32) -> BandLimit {
+        BandLimit::new(Bands::Measured { losses }, false).expect("a limit")
+    }
+
+    fn covers(bands: &[Band], groups: [u32; 3]) {
+        let volume = |g: [u32; 3]| g.iter().map(|n| u64::from(*n)).product::<u64>();
+        assert_eq!(bands.iter().map(|b| volume(b.groups)).sum::<u64>(), volume(groups));
+        let axis = (0..3).find(|a| bands.iter().any(|b| b.base[*a] > 0)).unwrap_or(0);
+        for pair in bands.windows(2) {
+            assert_eq!(pair[0].base[axis] + pair[0].groups[axis], pair[1].base[axis], "{bands:?}");
+        }
+    }
+
+    #[test]
+    fn bands_cover_every_workgroup_once() {
+        for groups in [[1, 1, 1], [64, 48, 1], [7, 513, 1], [16, 16, 300], [900, 1, 1], [5, 0, 1]] {
+            for most in [1, 1000, 1 << 14, u64::MAX] {
+                let invocations = 64 * groups.iter().map(|n| u64::from(*n)).product::<u64>();
+                let bands = BandLimit::Invocations(most).bands(groups, invocations, 0.0);
+                covers(&bands, groups);
+                assert!(bands.len() == 1 || most < invocations, "{groups:?} {most}");
+            }
+        }
+        let rows = BandLimit::Invocations(64 * 512 * 128).bands([512, 512, 1], 64 * 512 * 512, 0.0);
+        assert_eq!(rows.len(), 4);
+        assert_eq!(rows[1], Band { base: [0, 128, 0], groups: [512, 128, 1] });
+    }
+
+    #[test]
+    fn an_unknown_pass_begins_with_small_bands_and_measured_ones_take_the_target() {
+        let (rays, tone) = (by_name("raycast_surface").expect("pass"), by_name("tone").expect("pass"));
+        let time = InvocationTime::default();
+        let bands = |losses: u32, time: &InvocationTime| {
+            let expected = limit(losses).expected(rays, time, 1 << 24);
+            limit(losses).bands([512, 512, 1], 1 << 24, expected).len()
+        };
+        assert_eq!((bands(0, &time), bands(1, &time), bands(2, &time)), (64, 128, 256));
+        assert!(limit(0).expected(tone, &time, 1 << 18) < limit(0).expected(rays, &time, 1 << 18));
+        // A second for the picture: ten bands.
+        time.measure(1e9 / f64::from(1 << 24));
+        assert!((10..=11).contains(&bands(0, &time)), "{}", bands(0, &time));
+        assert!((20..=22).contains(&bands(1, &time)), "{}", bands(1, &time));
+        // One fast picture does not make them much longer; a slow one makes them shorter at once.
+        time.measure(1e-3);
+        assert!((7..=9).contains(&bands(0, &time)), "{}", bands(0, &time));
+        time.measure(4e9 / f64::from(1 << 24));
+        assert!((40..=42).contains(&bands(0, &time)), "{}", bands(0, &time));
+        time.lengthen(2.0);
+        time.lengthen(0.1);
+        assert!((80..=84).contains(&bands(0, &time)), "{}", bands(0, &time));
+    }
+
+    #[test]
+    fn a_software_device_gets_bands_after_it_was_lost() {
+        assert_eq!(BandLimit::new(Bands::default(), true), None);
+        assert!(BandLimit::new(Bands::Measured { losses: 1 }, true).is_some());
+        assert_eq!(
+            BandLimit::new(Bands::Measured { losses: 99 }, true),
+            Some(BandLimit::Time { target: LEAST_NS, losses: 99 })
+        );
+    }
+
+    #[test]
+    fn a_submission_of_several_passes_is_measured_by_their_expected_shares() {
+        let times: [Arc<InvocationTime>; 2] = Default::default();
+        let of = |n: usize, expected| Work { time: times[n].clone(), expected, invocations: 100 };
+        measured(&[of(0, 3.0), of(1, 1.0)], 400.0);
+        assert_eq!([times[0].measured(), times[1].measured()], [Some(3.0), Some(1.0)]);
+        measured(&[of(0, 0.0)], 800.0);
+        assert_eq!(times[0].measured(), Some(8.0));
+        measured(&[of(1, 0.0)], 0.0);
+        assert_eq!(times[1].measured(), Some(1.0), "no time is no measurement");
+    }
+
+    #[test]
+    fn submissions_are_filled_up_to_the_target() {
+        assert!(!limit(0).is_full(0.0, 1e12), "an empty one takes anything");
+        assert!(!limit(0).is_full(40e6, 60e6) && limit(0).is_full(40e6, 61e6));
+        assert!(!BandLimit::Invocations(1).is_full(40e6, 61e6));
+    }
+}

@@ -1,0 +1,267 @@
+//! The textures of the panels: glyphs and pictures that egui reports as they change. They are copied by the command buffer that draws
+//! the panels, so that nothing waits for the queue: a picture may take long, and egui adds a glyph at any time.
+
+use super::screen::failed;
+use crate::gpu::context::Context;
+use crate::gpu::error::{ErrorContext, GpuError};
+use crate::gpu::resources::{self, Buffer, Purpose, WHOLE};
+use ash::vk;
+use egui::epaint::{ImageData, ImageDelta, Primitive};
+use egui_ash_renderer::Renderer;
+use egui_ash_renderer::allocator::DefaultAllocator;
+use egui_ash_renderer::vulkan::{create_vulkan_descriptor_set, create_vulkan_descriptor_set_layout};
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Number of textures at a time. egui has one for its glyphs, the panels a few more.
+const MAX_TEXTURES: u32 = 64;
+/// What egui expects: its colours are in sRGB.
+const FORMAT: vk::Format = vk::Format::R8G8B8A8_SRGB;
+
+/// The textures, by egui's number.
+pub(super) struct PanelTextures {
+    context: Arc<Context>,
+    layout: vk::DescriptorSetLayout,
+    sets: vk::DescriptorPool,
+    sampler: vk::Sampler,
+    textures: HashMap<egui::TextureId, Texture>,
+    /// Copies that no command buffer has recorded yet, in order.
+    pending: Vec<Upload>,
+    /// What the command buffer in flight copies from.
+    in_flight: Vec<Buffer>,
+    /// Freed textures that the drawing in flight may still use.
+    freed: Vec<egui::TextureId>,
+}
+
+struct Texture {
+    context: Arc<Context>,
+    image: vk::Image,
+    view: vk::ImageView,
+    allocation: Option<Allocation>,
+    set: vk::DescriptorSet,
+    /// The number under which the renderer draws it.
+    drawn_as: egui::TextureId,
+    /// A copy into it was recorded: it has a layout and content.
+    is_filled: bool,
+}
+
+struct Upload {
+    texture: egui::TextureId,
+    staging: Buffer,
+    at: [u32; 2],
+    size: [u32; 2],
+}
+
+impl PanelTextures {
+    pub(super) fn new(context: &Arc<Context>) -> Result<PanelTextures, GpuError> {
+        let device = &context.device;
+        let mut textures = PanelTextures {
+            context: context.clone(),
+            layout: create_vulkan_descriptor_set_layout(device).map_err(failed)?,
+            sets: vk::DescriptorPool::null(),
+            sampler: vk::Sampler::null(),
+            textures: HashMap::new(),
+            pending: Vec::new(),
+            in_flight: Vec::new(),
+            freed: Vec::new(),
+        };
+        let sizes =
+            [vk::DescriptorPoolSize { ty: vk::DescriptorType::COMBINED_IMAGE_SAMPLER, descriptor_count: MAX_TEXTURES }];
+        let pool = vk::DescriptorPoolCreateInfo::default()
+            .pool_sizes(&sizes)
+            .max_sets(MAX_TEXTURES)
+            .flags(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET);
+        let sampler = vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR)
+            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE);
+        // SAFETY: the create structures are complete; a failure drops `textures`, which frees what is made (null is allowed).
+        unsafe {
+            textures.sets = device.create_descriptor_pool(&pool, None).context(|| "create a descriptor pool".into())?;
+            textures.sampler = device.create_sampler(&sampler, None).context(|| "create sampler".into())?;
+        }
+        Ok(textures)
+    }
+
+    /// Takes added and changed textures, and frees those that the last call listed as freed. Nothing drawn with them may be in flight.
+    pub(super) fn take(
+        &mut self,
+        renderer: &mut Renderer<DefaultAllocator>,
+        mut changes: egui::TexturesDelta,
+    ) -> Result<(), GpuError> {
+        self.in_flight.clear();
+        for id in std::mem::take(&mut self.freed) {
+            self.remove(renderer, id);
+        }
+        for (id, deltas) in changes.set.drain() {
+            for delta in deltas {
+                self.set(renderer, id, &delta)?;
+            }
+        }
+        self.freed.extend(changes.free.drain());
+        Ok(())
+    }
+
+    fn set(
+        &mut self,
+        renderer: &mut Renderer<DefaultAllocator>,
+        id: egui::TextureId,
+        delta: &ImageDelta,
+    ) -> Result<(), GpuError> {
+        let ImageData::Color(image) = &delta.image;
+        let size = [image.width() as u32, image.height() as u32];
+        let bytes: Vec<u8> = image.pixels.iter().flat_map(|colour| colour.to_array()).collect();
+        let at = match delta.pos {
+            Some(at) => at.map(|n| n as u32),
+            None => {
+                self.remove(renderer, id);
+                let texture = self.create(renderer, size)?;
+                self.textures.insert(id, texture);
+                [0; 2]
+            }
+        };
+        let mut staging = Buffer::new(&self.context, "panel texture", bytes.len() as u64, Purpose::Staging)?;
+        staging.bytes_mut().copy_from_slice(&bytes);
+        self.pending.push(Upload { texture: id, staging, at, size });
+        Ok(())
+    }
+
+    fn create(&self, renderer: &mut Renderer<DefaultAllocator>, size: [u32; 2]) -> Result<Texture, GpuError> {
+        let device = &self.context.device;
+        let operation = || format!("create a texture of the panels ({}x{})", size[0], size[1]);
+        let create = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(FORMAT)
+            .extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED);
+        // SAFETY: the create structure is complete.
+        let image = unsafe { device.create_image(&create, None) }.context(operation)?;
+        // From here on, dropping `texture` cleans up after a failure.
+        let mut texture = Texture {
+            context: self.context.clone(),
+            image,
+            view: vk::ImageView::null(),
+            allocation: None,
+            set: vk::DescriptorSet::null(),
+            drawn_as: egui::TextureId::default(),
+            is_filled: false,
+        };
+        // SAFETY: the image was just made by this device.
+        let needs = unsafe { device.get_image_memory_requirements(image) };
+        let allocation =
+            resources::allocate(&self.context, "panel texture", needs, MemoryLocation::GpuOnly, false, &operation)?;
+        // SAFETY: the allocation fits the requirements and lives as long as the image.
+        let bound = unsafe { device.bind_image_memory(image, allocation.memory(), allocation.offset()) };
+        texture.allocation = Some(allocation);
+        bound.context(operation)?;
+        let create = vk::ImageViewCreateInfo::default()
+            .image(image)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(FORMAT)
+            .subresource_range(WHOLE);
+        // SAFETY: the image is bound to memory and alive.
+        texture.view = unsafe { device.create_image_view(&create, None) }.context(operation)?;
+        texture.set =
+            create_vulkan_descriptor_set(device, self.layout, self.sets, texture.view, self.sampler).map_err(failed)?;
+        texture.drawn_as = renderer.add_user_texture(texture.set);
+        self.context.name(image, "panel texture");
+        Ok(texture)
+    }
+
+    fn remove(&mut self, renderer: &mut Renderer<DefaultAllocator>, id: egui::TextureId) {
+        self.pending.retain(|upload| upload.texture != id);
+        if let Some(texture) = self.textures.remove(&id) {
+            renderer.remove_user_texture(texture.drawn_as);
+            // SAFETY: nothing drawn with the set is in flight. Freeing a set of such a pool cannot fail.
+            let _ = unsafe { self.context.device.free_descriptor_sets(self.sets, &[texture.set]) };
+        }
+    }
+
+    /// Puts the numbers under which the renderer draws textures into the place of egui's.
+    pub(super) fn translate(&self, shapes: &mut [egui::ClippedPrimitive]) {
+        for shape in shapes {
+            if let Primitive::Mesh(mesh) = &mut shape.primitive
+                && let Some(texture) = self.textures.get(&mesh.texture_id)
+            {
+                mesh.texture_id = texture.drawn_as;
+            }
+        }
+    }
+
+    /// Records the copies of all changes, outside dynamic rendering.
+    pub(super) fn record(&mut self, commands: vk::CommandBuffer) {
+        let device = &self.context.device;
+        for Upload { texture, staging, at, size } in self.pending.drain(..) {
+            let Some(texture) = self.textures.get_mut(&texture) else { continue };
+            let read = (vk::PipelineStageFlags2::FRAGMENT_SHADER, vk::AccessFlags2::SHADER_SAMPLED_READ);
+            let written = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
+            let (shown, copied) = (vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+            let before = if texture.is_filled { shown } else { vk::ImageLayout::UNDEFINED };
+            let turn = |(from, to), (stage, access), (next_stage, next_access)| {
+                let barrier = [vk::ImageMemoryBarrier2::default()
+                    .src_stage_mask(stage)
+                    .src_access_mask(access)
+                    .dst_stage_mask(next_stage)
+                    .dst_access_mask(next_access)
+                    .old_layout(from)
+                    .new_layout(to)
+                    .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                    .image(texture.image)
+                    .subresource_range(WHOLE)];
+                let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+                // SAFETY: the command buffer is being recorded, outside dynamic rendering; the image is alive.
+                unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
+            };
+            let layers = vk::ImageSubresourceLayers {
+                aspect_mask: vk::ImageAspectFlags::COLOR,
+                layer_count: 1,
+                ..Default::default()
+            };
+            let region = vk::BufferImageCopy::default()
+                .image_subresource(layers)
+                .image_offset(vk::Offset3D { x: at[0] as i32, y: at[1] as i32, z: 0 })
+                .image_extent(vk::Extent3D { width: size[0], height: size[1], depth: 1 });
+            turn((before, copied), (read.0, vk::AccessFlags2::NONE), written);
+            // SAFETY: the staging buffer holds the bytes of the region, which egui places inside its texture; both live until the device
+            // is done.
+            unsafe {
+                device.cmd_copy_buffer_to_image(commands, staging.handle, texture.image, copied, &[region]);
+            }
+            turn((copied, shown), written, read);
+            texture.is_filled = true;
+            self.in_flight.push(staging);
+        }
+    }
+}
+
+impl Drop for PanelTextures {
+    fn drop(&mut self) {
+        self.textures.clear();
+        // SAFETY: the owner waited for the device; null handles are allowed. The pool frees its sets.
+        unsafe {
+            self.context.device.destroy_descriptor_pool(self.sets, None);
+            self.context.device.destroy_descriptor_set_layout(self.layout, None);
+            self.context.device.destroy_sampler(self.sampler, None);
+        }
+    }
+}
+
+impl Drop for Texture {
+    fn drop(&mut self) {
+        // SAFETY: nothing drawn with the texture is in flight; null handles are allowed.
+        unsafe {
+            self.context.device.destroy_image_view(self.view, None);
+            self.context.device.destroy_image(self.image, None);
+        }
+        resources::free(&self.context, self.allocation.take());
+    }
+}

@@ -1,0 +1,187 @@
+//! Dispatches in bands: the same texels as in one piece, in any band, on any number of queues; and no band where none is needed.
+
+use crate::common::gpu::*;
+use echolume::gpu::{Bands, Renderer, RendererOptions};
+use echolume::passes::{DispatchArgs, Frequency, PASSES, Slot, Texels, by_name};
+use echolume::probe::{Axis, Geometry, Probe};
+use echolume::queues::oracle::Event;
+use echolume::scene::Scene;
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+
+/// One workgroup: bands are as small as they can be, a row of workgroups.
+const INVOCATIONS: u64 = 64;
+
+/// Together they need every pass, each with several rows of workgroups.
+const SCENES: [&str; 12] = [
+    ALL_FILTERS,
+    "mode = 'vr'\nray = { brick = 4 }",
+    "mode = 'sr'\nray = { brick = 4 }",
+    "mode = 'mip'",
+    "mode = 'orthogonal'",
+    "mode = 'orthogonal'\npost = { floats = true }",
+    "mode = 'cube'",
+    "mode = 'mixed'\nlayout = 'four'",
+    "mode = 'sr'\nlayout = 'pair'",
+    "mode = 'sr'\nlight = { shadow = {}, occlusion = {}, skin = {} }\nslices = { smooth = { elevation = 1.0 } }\n\
+     ray = { sampling = 'quads' }",
+    "mode = 'sr'\nslices = { smooth = { lateral = 1.0, depth = 1.0, elevation = 1.0 } }\n\
+     distance = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }\n\
+     post = { enhanced_sigma = {}, perona_malik = { repeat = 2 } }",
+    "mode = 'sr'\npost = { perona_malik = { scheme = 'aos', step = 2.0, repeat = 1 } }",
+];
+
+fn band_scenes() -> Vec<Scene> {
+    let probe = Probe {
+        lines: Axis::centred(1.1 / 95.0, 96),
+        slices: Axis::centred(0.8 / 32.0, 33),
+        sample_pitch: 0.25,
+        samples: 240,
+        ..wobbler()
+    };
+    let build = |toml: &&str| {
+        let mut built = scene(Geometry::Sweep(probe.clone()), BYTES, toml);
+        built.settings.picture.size = [84, 76];
+        built.settings.slices.pixels = 200;
+        Scene::new(built.geometry, built.input, built.settings).expect("scene")
+    };
+    SCENES.iter().map(build).collect()
+}
+
+fn frames_of(scene: &Scene) -> Vec<Texels> {
+    let mut noise = Noise(5);
+    let speckle: Vec<f64> = (0..4096).map(|_| noise.next()).collect();
+    let at = |p: f64| (p * 37.0).abs() as usize;
+    body_frames(scene, |p| {
+        let level = if p.y > 40.0 { 0.8 } else { 0.2 };
+        level * (0.5 + 0.5 * speckle[(at(p.x) + 61 * at(p.y) + 977 * at(p.z)) % 4096])
+    })
+}
+
+fn renderer(device: &Device, scene: &Scene, options: &RendererOptions) -> Renderer {
+    let mut renderer = Renderer::new(device, scene.clone(), options).expect("renderer");
+    send(&mut renderer, &frames_of(scene), 0);
+    renderer
+}
+
+/// All that the passes over volume and picture left, by slot, and the dispatches that made it.
+fn made(renderer: &mut Renderer) -> (Vec<(Slot, Vec<u64>)>, Vec<(&'static str, [u32; 3])>) {
+    let dispatched = renderer.dispatch_extents(|r| r.picture()).expect("picture");
+    let slots = renderer.plan().slots.clone();
+    let read = slots.into_iter().filter_map(|slot| {
+        let texels = renderer.read(slot).expect("read")?;
+        Some((slot, texels.values.iter().map(|v| v.to_bits()).collect()))
+    });
+    (read.collect(), dispatched)
+}
+
+fn invocations(extent: [u32; 3]) -> u64 {
+    extent.iter().map(|n| u64::from(*n)).product()
+}
+
+/// Every pass over the volume or the picture leaves the same bits in bands as in one piece, with as many invocations.
+#[test]
+fn bands_leave_the_bits_of_one_dispatch_in_every_pass() {
+    let device = Device::new();
+    let mut divided: BTreeMap<&str, bool> = BTreeMap::new();
+    for (name, scene) in SCENES.iter().zip(band_scenes()) {
+        let (whole, dispatched) = made(&mut renderer(&device, &scene, &RendererOptions::default()));
+        let bands = Bands::Fixed(INVOCATIONS);
+        let (parts, in_bands) = made(&mut renderer(&device, &scene, &RendererOptions { bands, ..Default::default() }));
+        for ((slot, whole), (_, parts)) in whole.iter().zip(&parts) {
+            assert!(whole == parts, "{name}: {} differs", slot.name());
+        }
+        let sum = |list: &[(&'static str, [u32; 3])]| {
+            let mut sums: BTreeMap<&str, (u64, usize)> = BTreeMap::new();
+            for (pass, extent) in list {
+                let sum = sums.entry(*pass).or_default();
+                *sum = (sum.0 + invocations(*extent), sum.1 + 1);
+            }
+            sums
+        };
+        let (one, many) = (sum(&dispatched), sum(&in_bands));
+        assert_eq!(one.keys().collect::<Vec<_>>(), many.keys().collect::<Vec<_>>(), "{name}");
+        for (pass, (total, count)) in &one {
+            let (in_parts, parts) = many[pass];
+            assert_eq!(in_parts, *total, "{name}: {pass} has other invocations in bands");
+            assert!(parts >= *count, "{name}: {pass}");
+            *divided.entry(*pass).or_default() |= parts > *count;
+        }
+    }
+    let over_all = PASSES.iter().filter(|p| p.frequency != Frequency::Frame);
+    let never: Vec<_> = over_all.filter(|p| divided.get(p.name) != Some(&true)).map(|p| p.name).collect();
+    assert!(never.is_empty(), "no scene divides {never:?}");
+}
+
+fn shaded() -> Scene {
+    let toml = "mode = 'sr'\npicture = { size = [40, 52] }\nslices = { pixels = 40, smooth = { elevation = 0.7 } }\n\
+                distance = { median = 3 }\nlight = { shadow = {}, occlusion = {} }";
+    scene(Geometry::Sweep(wobbler()), BYTES, toml)
+}
+
+/// Where nothing has to be divided, each step of the plan is one dispatch and a picture one submission.
+#[test]
+fn a_picture_that_needs_no_bands_has_none() {
+    let device = Device::new();
+    let mut renderer = renderer(&device, &shaded(), &RendererOptions { log: true, ..Default::default() });
+    let steps = renderer.plan().steps.iter().filter(|s| s.pass.frequency != Frequency::Frame).count();
+    let submitted = renderer.log().expect("log").submissions.len();
+    let before = device.counts.dispatches.load(Ordering::Relaxed);
+    renderer.picture().expect("picture");
+    if device.candidate.is_software() {
+        assert_eq!(device.counts.dispatches.load(Ordering::Relaxed) - before, steps as u64);
+        assert_eq!(renderer.log().expect("log").submissions.len() - submitted, 1);
+    }
+    // Its passes are measured now, also on a GPU: none of so few invocations takes long.
+    let submitted = renderer.log().expect("log").submissions.len();
+    renderer.show(0).expect("show");
+    let before = device.counts.dispatches.load(Ordering::Relaxed);
+    renderer.picture().expect("picture");
+    let pictures = renderer.plan().steps.iter().filter(|s| s.pass.frequency == Frequency::Picture).count() as u64;
+    assert_eq!(device.counts.dispatches.load(Ordering::Relaxed) - before, pictures);
+    assert_eq!(renderer.log().expect("log").submissions.len() - submitted, 1);
+}
+
+/// Each band is a submission of its own, so that a watchdog counts it alone, and it is as large as asked for; the last one also holds
+/// what follows. On any number of queues every conflict stays ordered.
+#[test]
+fn each_band_is_a_submission_and_all_are_ordered() {
+    let device = Device::new();
+    let bands = Bands::Fixed(INVOCATIONS);
+    let scene = shaded();
+    for queues in 1..=device.queue_count() {
+        let options = RendererOptions { bands, queues: Some(queues), log: true, ..Default::default() };
+        let mut renderer = renderer(&device, &scene, &options);
+        let submitted = renderer.log().expect("log").submissions.len();
+        let steps: Vec<_> = renderer
+            .plan()
+            .steps
+            .iter()
+            .filter(|s| s.pass.frequency != Frequency::Frame)
+            .map(|s| s.pass.name)
+            .collect();
+        renderer.take_times().expect("idle");
+        let dispatched = renderer.dispatch_extents(|r| r.picture()).expect("picture");
+        let times = renderer.take_times().expect("times");
+        let pictures: Vec<_> = times.iter().map(|t| (t.name, t.runs)).collect();
+        assert_eq!(pictures, [("picture", 1)], "one run, in whatever submissions");
+        let log = renderer.log().expect("log");
+        let cuts = dispatched.len() - steps.len();
+        assert!(cuts > 20, "{cuts}");
+        assert_eq!(log.submissions.len() - submitted, cuts + 1);
+        for submission in &log.submissions[submitted..submitted + cuts] {
+            let works = submission.events.iter().filter(|e| matches!(e, Event::Operation(_))).count();
+            assert!((1..=steps.len()).contains(&works), "{works}");
+        }
+        assert_eq!(log.find_hazard(&scene), None, "{queues} queues");
+        let pass = by_name("raycast_surface").expect("pass");
+        let [width, height, _] = pass.invocations(renderer.scene(), &DispatchArgs::default());
+        let rays: Vec<_> = dispatched.iter().filter(|(name, _)| *name == "raycast_surface").collect();
+        assert!(rays.len() > 2);
+        for (_, extent) in &rays {
+            // A row of workgroups is the least.
+            assert!(extent[0] == width && invocations(*extent) <= INVOCATIONS.max(8 * u64::from(width)), "{extent:?}");
+        }
+        assert_eq!(rays.iter().map(|(_, extent)| extent[1]).sum::<u32>(), height);
+    }
+}

@@ -1,0 +1,34 @@
+//! Pictures for a window of 10 bits a channel: more levels, and the same picture wherever 8 bits are asked for.
+
+use crate::common::gpu::*;
+use echolume::gpu::{Renderer, RendererOptions};
+use echolume::passes::Slot;
+use echolume::probe::Geometry;
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+
+/// Prevents a deep window that shows pictures of 256 levels, and saved pictures that differ because of it.
+#[test]
+fn a_deep_window_gets_more_levels_and_files_the_same_picture() {
+    let (plain, deep) = (Device::new(), Device::new());
+    deep.is_deep.store(true, Ordering::Relaxed);
+    let toml = "mode = 'mip'\npicture = { size = [64, 48] }\nslices = { pixels = 64, format = 'r32f' }";
+    let scene = scene(Geometry::Sweep(wobbler()), FLOATS, toml);
+    let frames = body_frames(&scene, |p| (0.3 + 0.004 * p.x + 0.0007 * p.y).clamp(0.0, 1.0));
+    for readback in [true, false] {
+        let drawn = |device: &Device| {
+            let options = RendererOptions { readback, ..RendererOptions::default() };
+            let mut renderer = Renderer::new(device, scene.clone(), &options).expect("renderer");
+            send(&mut renderer, &frames, 0);
+            let picture = renderer.picture().expect("picture");
+            let screen = renderer.read(Slot::Screen).expect("read").expect("an image");
+            let levels: BTreeSet<u64> = screen.values.chunks_exact(4).map(|c| c[0].to_bits()).collect();
+            (picture, levels.len())
+        };
+        let ((usual, levels), (same, more)) = (drawn(&plain), drawn(&deep));
+        assert!(levels > 20 && more > 2 * levels, "{levels} levels in 8 bits, {more} for a deep window");
+        // Half-way values, rounded twice, may be off by a level.
+        assert!(difference(&usual, &same).1 <= 1.0);
+        assert_eq!(usual.rgba.len(), same.rgba.len());
+    }
+}
