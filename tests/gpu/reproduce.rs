@@ -203,7 +203,7 @@ fn amber_holds(folder: &Path, about: &Value) {
             ["EXPECT", name, "IDX", at, "TOLERANCE", ref rest @ ..] => {
                 let (bytes_each, channels, values) = declared[name];
                 assert!(ran == 1 && rest.len() == 2 * channels + 1 && rest[channels] == "EQ", "{line}");
-                assert!(number(at) % (bytes_each * channels) == 0 && number(at) < bytes_each * values, "{line}");
+                assert!(number(at).is_multiple_of(bytes_each * channels) && number(at) < bytes_each * values, "{line}");
                 expectations += 1;
             }
             _ => panic!("{line} is no command of Amber that this script should have"),
