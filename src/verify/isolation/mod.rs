@@ -1,10 +1,10 @@
 //! Checks in a process of their own. A worker process runs one check after another; if it crashes or does not come back, the check that it
 //! ran has failed, and a new worker goes on with the next. This process loads no driver.
 
-mod crash;
+mod injection;
 mod worker;
 
-pub use crash::InjectedCrash;
+pub use injection::InjectedCrash;
 pub use worker::{Ready, refuse, serve};
 
 use crate::files::signals;
