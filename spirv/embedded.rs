@@ -40,6 +40,7 @@
     ("filter/sigma.distance", include_bytes!("filter/sigma.distance.spv")),
     ("filter/sigma.picture", include_bytes!("filter/sigma.picture.spv")),
     ("measure/copy", include_bytes!("measure/copy.spv")),
+    ("measure/positions.plain", include_bytes!("measure/positions.plain.spv")),
     ("measure/sampling.plain", include_bytes!("measure/sampling.plain.spv")),
     ("postprocess/assemble.alone", include_bytes!("postprocess/assemble.alone.spv")),
     ("postprocess/assemble.four", include_bytes!("postprocess/assemble.four.spv")),

@@ -27,13 +27,17 @@ pub enum Failure {
     Failed(String),
     /// `verify` found no device to test: exit code 3.
     NoDevice(String),
+    /// A signal ended `verify` before all checks were run, and none of those that were has failed: exit code 4.
+    Interrupted(String),
 }
 
 impl Failure {
     /// The message without its kind.
-    #[cfg(feature = "view")]
     pub fn message(self) -> String {
-        let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = self;
+        let (Failure::Input(message)
+        | Failure::Failed(message)
+        | Failure::NoDevice(message)
+        | Failure::Interrupted(message)) = self;
         message
     }
 
@@ -43,6 +47,7 @@ impl Failure {
             Failure::Failed(_) => 1,
             Failure::Input(_) => 2,
             Failure::NoDevice(_) => 3,
+            Failure::Interrupted(_) => 4,
         }
     }
 }
@@ -75,7 +80,10 @@ pub fn remark(message: &str) {
 
 /// Prints the failure on standard error as one line.
 pub fn print_failure(failure: &Failure) {
-    let (Failure::Input(message) | Failure::Failed(message) | Failure::NoDevice(message)) = failure;
+    let (Failure::Input(message)
+    | Failure::Failed(message)
+    | Failure::NoDevice(message)
+    | Failure::Interrupted(message)) = failure;
     let _ = writeln!(std::io::stderr(), "echolume: {}", single_line(message));
 }
 

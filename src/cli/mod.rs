@@ -1,6 +1,6 @@
 //! The command line: subcommands, logging and exit codes.
 //!
-//! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device.
+//! Exit codes: 0 done, 1 failed, 2 bad input or usage; `verify` also 3, no device, and 4, interrupted.
 
 mod filter;
 mod machine;

@@ -94,6 +94,19 @@ impl Handlers {
     }
 }
 
+/// The name of a signal, such as SIGSEGV; None if it has none.
+pub fn name_of(signal: i32) -> Option<&'static str> {
+    low_level::signal_name(signal)
+}
+
+/// Sends this process a segmentation fault, as a driver that writes where it must not.
+pub fn raise_segmentation_fault() {
+    // The first one only removes the handler of the standard library, which looks for an exhausted stack.
+    for _ in 0..2 {
+        let _ = low_level::raise(signal_hook::consts::SIGSEGV);
+    }
+}
+
 /// The last signal that arrived while a [`Held`] existed, if any. For work that can end early.
 pub fn received() -> Option<&'static str> {
     handlers().signal().map(|(_, name)| name)

@@ -94,8 +94,7 @@ fn features(context: &Context, slot: Slot, scene: &Scene) -> vk::FormatFeatureFl
 /// The scene with the fields that the device resolves: the fastest sampling, which reads eight texels if texels are loaded or the
 /// device cannot filter the volume's format; no packed neighbours if the device cannot hold them; and a deep picture for a deep window.
 pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -> Scene {
-    let there = context.format_features(vulkan(Slot::Volume.format(&scene)));
-    let filters = there.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    let filters = filters(context, Slot::Volume.format(&scene));
     let mut scene = scene.sampled(if filters { texel_access.sampling() } else { Sampling::Exact });
     // It is copied to the window by a blit.
     let wide = context.format_features(vulkan(Format::Rgba16f));
@@ -107,6 +106,11 @@ pub fn adapt_scene(context: &Context, texel_access: TexelAccess, scene: Scene) -
         Slot::PackedNeighbours.bytes(&scene) <= l.max_resource_size.min(context.candidate.max_allocation)
     });
     if fits { scene } else { scene.without_quads() }
+}
+
+/// True if the device has a linear filter of images in this format.
+pub fn filters(context: &Context, format: Format) -> bool {
+    context.format_features(vulkan(format)).contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR)
 }
 
 /// Checks that the device can hold the slots of a plan, before anything is allocated.

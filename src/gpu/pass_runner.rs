@@ -4,7 +4,7 @@ use super::buffers::{Readback, Upload};
 use super::context::Context;
 use super::error::GpuError;
 use super::formats::{self, TexelAccess};
-use super::pipelines::{Pipeline, Pipelines, embedded};
+use super::pipelines::{Pipeline, Pipelines, Prepared, embedded};
 use super::recorder::{BarrierRecorder, Dispatch, Recorder, SlotParts};
 use super::resources::SlotResources;
 use super::timeline::Timelines;
@@ -46,6 +46,19 @@ impl PassRunner {
         self.context.limits.sub_texel_precision_bits
     }
 
+    /// The scene as [`PassRunner::run`] runs it: with what the device resolves.
+    pub fn adapted(&self, scene: &Scene) -> Scene {
+        formats::adapt_scene(&self.context, self.texel_access, scene.clone())
+    }
+
+    /// The shader of a pass in an adapted scene as the driver gets it.
+    ///
+    /// # Errors
+    /// A shader that does not exist, or that disagrees with the declaration of the pass.
+    pub fn shader(&self, scene: &Scene, pass: &Pass, args: &DispatchArgs) -> Result<Prepared, GpuError> {
+        self.pipelines.prepare(&Pipelines::key(pass, scene, args), pass, scene, args)
+    }
+
     /// Dispatches `pass` once and returns its outputs. `inputs` have the names of the shader's bindings; slots that the scene computes
     /// may be missing. Every texel of the outputs holds `poison` before, which shows the texels that the pass does not write.
     ///
@@ -59,7 +72,7 @@ impl PassRunner {
         inputs: &Arrays,
         poison: f64,
     ) -> Result<Arrays, GpuError> {
-        let scene = &formats::adapt_scene(&self.context, self.texel_access, scene.clone());
+        let scene = &self.adapted(scene);
         let (reads, writes) = (pass.reads(scene, args), pass.writes(scene, args));
         let plan = Plan { steps: Vec::new(), slots: reads.iter().chain(&writes).map(|b| b.slot).collect() };
         let mut slots = SlotResources::new(&self.context, args.image + 1);

@@ -73,6 +73,34 @@ pub const COPY: Pass = Pass {
     ..FILTERED
 };
 
+/// One sample for each texel of the output, at [`sample_position`]: to judge a device's filter. No profile times it.
+pub const POSITIONS: Pass = Pass {
+    name: "measure_positions",
+    shader: |_, _| "measure/positions.plain",
+    writes: |_, _| vec![whole("values", Slot::Distance)],
+    extent: ray_extent,
+    constants: no_constants,
+    reference: |_, _, reads, writes| {
+        let volume = reads.get("volume");
+        let values = writes.get_mut("values");
+        let [width, height, _] = values.size;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let share = sample_position([x, y], [width, height]);
+            let at = std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5);
+            values.set([x, y, 0], &[volume.trilinear(at)]);
+        }
+    },
+    ..FILTERED
+};
+
+/// Where [`POSITIONS`] samples for a texel of its output of this size: shares of the volume's size, from an eighth before its border to an
+/// eighth behind it. The same as in glsl/measure/positions.comp.
+pub fn sample_position(texel: [usize; 2], size: [usize; 2]) -> [f64; 3] {
+    let turn = (13 * texel[0] + 29 * texel[1]) % 61;
+    let across = |axis: usize| (texel[axis] as f64 + 0.5) / size[axis] as f64;
+    [across(0), across(1), (turn as f64 + 0.5) / 61.0].map(|share| 1.25 * share - 0.125)
+}
+
 fn mean(reads: &Arrays, writes: &mut Arrays, sample: impl Fn(&Texels, [f64; 3]) -> f64) {
     let volume = reads.get("volume");
     let picture = writes.get_mut("picture");

@@ -433,7 +433,7 @@ impl Format {
         }
     }
 
-    pub(super) fn channel_bytes(self) -> usize {
+    pub(crate) fn channel_bytes(self) -> usize {
         match self {
             Format::R8 | Format::Rgba8 => 1,
             Format::R16 | Format::Rg16 | Format::R16f | Format::Rg16f | Format::Rgba16f => 2,

@@ -78,7 +78,7 @@ impl Texels {
     }
 
     /// The part of a slot's array ([`Slot::array_size`]) that the device stores.
-    pub(crate) fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
+    pub fn stored_part(&self, slot: Slot, scene: &Scene) -> Texels {
         match slot {
             Slot::Volume | Slot::SharpVolume => {
                 self.part(slot.first_texel(scene).map(|n| n as usize), slot.shape(scene).size())
@@ -88,7 +88,7 @@ impl Texels {
     }
 
     /// The slot's array of which the device stores this part; `outside` is all of the rest.
-    pub(crate) fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
+    pub fn with_outside(self, slot: Slot, scene: &Scene, outside: f64) -> Texels {
         if self.size == slot.array_size(scene) {
             return self;
         }

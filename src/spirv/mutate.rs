@@ -8,6 +8,10 @@ use std::collections::HashSet;
 pub const FMIN: u32 = 37;
 pub const FMAX: u32 = 40;
 
+/// Opcodes of float arithmetic.
+pub const F_ADD: u32 = op::F_ADD;
+pub const F_SUB: u32 = op::F_SUB;
+
 /// The module with the last instruction `from` of the extended set replaced by `to`, which takes the same operands.
 ///
 /// # Errors
@@ -23,6 +27,20 @@ pub fn replace_last(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, Spirv
             operands[3] = to;
         }
         out.extend(encode(i.opcode, &operands));
+    }
+    Ok(out)
+}
+
+/// The module with the last instruction of opcode `from` replaced by `to`, which takes the same operands.
+///
+/// # Errors
+/// A module that breaks the format or has no such instruction.
+pub fn replace_last_opcode(words: &[u32], from: u32, to: u32) -> Result<Vec<u32>, SpirvError> {
+    let instructions = decode(words)?;
+    let Some(last) = instructions.iter().rposition(|i| i.opcode == from) else { return error("no such instruction") };
+    let mut out = words[..HEADER_WORDS].to_vec();
+    for (n, i) in instructions.iter().enumerate() {
+        out.extend(encode(if n == last { to } else { i.opcode }, i.operands));
     }
     Ok(out)
 }
@@ -121,6 +139,10 @@ mod tests {
         let median = words(embedded("filter/median.slice").unwrap());
         let after = replace_last(&median, FMAX, FMIN).unwrap();
         assert_eq!(after.iter().zip(&median).filter(|(a, b)| a != b).count(), 1);
+        let light = words(embedded("shade/light.plain").unwrap());
+        let after = replace_last_opcode(&light, F_ADD, F_SUB).unwrap();
+        assert_eq!(after.iter().zip(&light).filter(|(a, b)| a != b).count(), 1);
+        assert!(replace_last_opcode(&light, 0xffff, F_SUB).is_err());
     }
 
     #[test]

@@ -4,12 +4,21 @@ use crate::args::{check_outputs, write_report};
 use crate::files::read_text;
 use crate::files::signals::Held;
 use crate::gpu::{Context, ContextOptions, DeviceChoice, GpuError};
+use crate::machine;
 use crate::terminal::{Failure, failed, input, say};
+use crate::verify::gtest::{self, Filter};
+use crate::verify::isolation::{self, InjectedCrash, Workers};
+use crate::verify::progress::{self, Progress, Style};
 use crate::verify::report::baseline::{BaselineComparison, BaselineOptions, compare};
-use crate::verify::report::{self, Level, Outcome, Run, Verdict, html, junit};
+use crate::verify::report::prometheus::prometheus;
+use crate::verify::report::{self, CheckName, Level, Outcome, Run, Verdict, html, junit};
+use crate::verify::reproduce::{ReproduceError, reproduce};
 use crate::verify::self_test::{self, Detection};
 use crate::verify::{self, Check, DeviceUnderTest};
+use indicatif::ProgressBar;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -19,7 +28,7 @@ const MAX_BASELINE: u64 = 256 << 20;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device.\n\nExamples:\n  \
+    after_help = "Exit codes: 0 all checks passed, 1 a check failed or a report could not be written, 2 usage or an input, 3 no device, 4 interrupted by a signal before all checks were run and none had failed.\n\nExamples:\n  \
                         echolume verify                                         (some minutes on a CPU, less on a GPU)\n  \
                         echolume verify --full --json before.json               (before the driver is updated)\n  \
                         echolume verify --full --baseline before.json --html after.html\n  \
@@ -50,6 +59,9 @@ pub struct Verify {
     /// Write an HTML page with pictures side by side
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Write metrics in Prometheus' text format, for the textfile collector of its node exporter (name it *.prom)
+    #[arg(long, value_name = "FILE")]
+    prometheus: Option<PathBuf>,
     /// Folder for the pictures of failures: actual, expected, difference. Created when needed
     #[arg(long, value_name = "FOLDER", default_value = "echolume-verify")]
     pictures: PathBuf,
@@ -65,12 +77,42 @@ pub struct Verify {
     /// List the checks and exit
     #[arg(long)]
     list: bool,
+    /// Write one dispatch of this check's pass for a bug report: shader, inputs, expected values, and a script for Amber. The smallest
+    /// that fails, or the smallest
+    #[arg(long, value_name = "CHECK", requires = "output")]
+    reproduce: Option<String>,
+    /// Folder for --reproduce. Created when needed
+    #[arg(short, long, value_name = "FOLDER", requires = "reproduce")]
+    output: Option<PathBuf>,
+    /// Run each check in a process of its own, so that one that crashes or hangs is a failed check and the rest goes on (the default
+    /// with --full)
+    #[arg(long, conflicts_with_all = ["no_isolate", "self_test"])]
+    isolate: bool,
+    /// Run all checks in this process, with --full too
+    #[arg(long)]
+    no_isolate: bool,
+    /// Time limit of a check in a process of its own, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 1200, value_parser = clap::value_parser!(u64).range(1..=86400))]
+    check_timeout: u64,
+    /// List the checks as a GoogleTest program lists its tests, and exit
+    #[arg(long = "gtest_list_tests")]
+    gtest_list_tests: bool,
+    /// Run the checks that a GoogleTest filter selects (POSITIVE-NEGATIVE, patterns separated by ':'), and print what such a program
+    /// prints: for deqp-runner
+    #[arg(long = "gtest_filter", value_name = "PATTERNS", conflicts_with = "self_test")]
+    gtest_filter: Option<Filter>,
     /// Do not use the validation layer even if it is installed
     #[arg(long)]
     no_validation: bool,
     /// Print only a digest of all pictures
     #[arg(long, hide = true)]
     digest: bool,
+    /// Run checks for another process
+    #[arg(long, hide = true)]
+    worker: bool,
+    /// Let a check crash: KIND:GROUP / NAME, where KIND is segv, abort, hang or exit
+    #[arg(long, hide = true, value_name = "KIND:CHECK")]
+    inject_crash: Option<InjectedCrash>,
 }
 
 impl Verify {
@@ -82,21 +124,37 @@ impl Verify {
             return Ok(());
         }
         let level = if self.full { Level::Full } else { Level::Quick };
-        if self.list {
-            let checks = self.chosen(verify::checks(level))?;
-            checks.iter().for_each(|check| say!("{} / {}", check.group, check.name));
+        if self.worker {
+            return self.serve(level);
+        }
+        if self.list || self.gtest_list_tests {
+            let names: Vec<CheckName> = verify::checks(level).iter().map(Check::title).collect();
+            let names: Vec<CheckName> = self.chosen(&names)?.into_iter().map(|n| names[n].clone()).collect();
+            match self.gtest_list_tests {
+                true if names.is_empty() => {}
+                true => say!("{}", gtest::list(&names).trim_end()),
+                false => names.iter().for_each(|check| say!("{} / {}", check.group, check.name)),
+            }
             return Ok(());
         }
+        if let (Some(check), Some(folder)) = (&self.reproduce, &self.output) {
+            return self.reproduce(level, check, folder);
+        }
         let options = BaselineOptions::new(self.threshold).map_err(|e| input(format!("--{e}")))?;
-        let files = [("--json", &self.json), ("--junit", &self.junit), ("--html", &self.html)];
+        let files = [
+            ("--json", &self.json),
+            ("--junit", &self.junit),
+            ("--html", &self.html),
+            ("--prometheus", &self.prometheus),
+        ];
         check_outputs(&files.map(|(flag, file)| (flag, file.as_deref())), self.baseline.as_deref())?;
         let mut earlier = self.baseline.as_deref().map(read).transpose()?;
         // Checks that were not requested are not missing.
         earlier.iter_mut().for_each(|run| run.outcomes.retain(|o| self.is_selected(o)));
-        let mut dut = self.open(level)?;
-        let (mut run, stopped) = match self.self_test {
-            true => (self.run_self_test(&dut)?, None),
-            false => self.run_checks(&mut dut)?,
+        let (mut run, stopped) = match () {
+            _ if self.self_test => (self.run_self_test(level)?, None),
+            _ if self.isolate || (self.full && !self.no_isolate) => self.run_isolated(level)?,
+            _ => self.run_here(level)?,
         };
         self.save_pictures(&mut run);
         let compared = earlier.map(|earlier| compare(&earlier, &run, &options));
@@ -104,54 +162,190 @@ impl Verify {
         self.judge(&run, compared.as_ref(), stopped)
     }
 
-    /// Runs the checks on the device. Returns the outcomes, and the signal if one ended the run early.
-    fn run_checks(&self, dut: &mut DeviceUnderTest) -> Result<(Run, Option<&'static str>), Failure> {
+    /// Runs the checks in this process. Returns the outcomes, and the signal if one ended the run early.
+    fn run_here(&self, level: Level) -> Result<(Run, Option<&'static str>), Failure> {
+        let begun = Instant::now();
+        let mut lines = Vec::new();
+        let mut dut = self.open(level, &mut lines)?;
         let held = Held::first();
-        announce(dut);
-        let checks = match &self.against {
+        announce(&dut, &mut lines);
+        let checks = self.checks(&dut, &mut lines)?;
+        lines.iter().for_each(|line| say!("{line}"));
+        let names: Vec<CheckName> = checks.iter().map(Check::title).collect();
+        let chosen = self.chosen(&names)?;
+        let mut group = None;
+        let what = "stopping after this check; a second signal stops at once and writes nothing";
+        let outcomes = announcing_signals(&held, what, || {
+            self.run_each(&names, &chosen, progress::bar(), &held, |n| checks[n].run_after(&mut group, &mut dut))
+        });
+        let device = machine::device(&dut.context);
+        Ok((verify::run_on(device, dut.watched(), level, outcomes, begun), held.signal()))
+    }
+
+    /// Runs the checks in processes of their own. Returns the outcomes, and the signal if one ended the run early.
+    fn run_isolated(&self, level: Level) -> Result<(Run, Option<&'static str>), Failure> {
+        let (begun, held) = (Instant::now(), Held::first());
+        let program = this_program()?;
+        let command = || self.worker_command(&program);
+        let signal = || held.signal();
+        let limit = Duration::from_secs(self.check_timeout);
+        let what = "ending; the running check is interrupted";
+        announcing_signals(&held, what, || {
+            let bar = progress::bar();
+            let (mut workers, ready) = Workers::start(&command, limit, &signal, progress::echo(&bar))?;
+            ready.lines.iter().for_each(|line| say!("{line}"));
+            let chosen = self.chosen(&ready.checks)?;
+            let names = &ready.checks;
+            let outcomes = self.run_each(names, &chosen, bar, &held, |n| workers.run(n, &names[n]));
+            Ok((verify::run_on(ready.device, ready.validation, level, outcomes, begun), held.signal()))
+        })
+    }
+
+    /// Runs the chosen checks by `one`, which is given their places in `names`, and says so.
+    fn run_each(
+        &self,
+        names: &[CheckName],
+        chosen: &[usize],
+        bar: ProgressBar,
+        held: &Held,
+        mut one: impl FnMut(usize) -> Outcome,
+    ) -> Vec<Outcome> {
+        let selected: Vec<CheckName> = chosen.iter().map(|n| names[*n].clone()).collect();
+        let style = if self.gtest_filter.is_some() { Style::GoogleTest } else { Style::Groups };
+        if style == Style::GoogleTest {
+            say!("{}", gtest::begins_run(&selected));
+        }
+        let progress = RefCell::new(Progress::new(style, &selected, bar));
+        let outcomes = verify::run_each(
+            &selected,
+            || held.signal(),
+            |at| {
+                progress.borrow_mut().begins(&selected[at]);
+                one(chosen[at])
+            },
+            |outcome| progress.borrow_mut().ends(outcome),
+        );
+        progress.into_inner().finish();
+        outcomes
+    }
+
+    /// Writes a dispatch as files.
+    fn reproduce(&self, level: Level, check: &str, folder: &Path) -> Result<(), Failure> {
+        let mut lines = Vec::new();
+        let mut dut = self.open(level, &mut lines)?;
+        announce(&dut, &mut lines);
+        lines.iter().for_each(|line| say!("{line}"));
+        let made = reproduce(&mut dut, check, folder).map_err(|error| match error {
+            ReproduceError::NoPass(_) => input(format!("--reproduce {error}")),
+            other => failed(other),
+        })?;
+        say!("{}: {}", made.title, if made.fails { "differs from its reference" } else { "as its reference" });
+        if let Some(why) = &made.without_script {
+            say!("no script for Amber: {why}");
+        }
+        say!("written: {} files in {}", made.files.len(), folder.display());
+        Ok(())
+    }
+
+    /// Runs checks for another process, which asks for them on standard input.
+    fn serve(&self, level: Level) -> Result<(), Failure> {
+        let mut lines = Vec::new();
+        let opened = self.open(level, &mut lines).and_then(|dut| {
+            announce(&dut, &mut lines);
+            let checks = self.checks(&dut, &mut lines)?;
+            Ok((dut, checks))
+        });
+        let (mut dut, checks) = match opened {
+            Ok(opened) => opened,
+            Err(failure) => return isolation::refuse(failure).map_err(failed),
+        };
+        let names = checks.iter().map(Check::title).collect();
+        let device = machine::device(&dut.context);
+        let ready = isolation::Ready { device, validation: dut.watched(), lines, checks: names };
+        isolation::serve(&mut dut, &checks, ready).map_err(failed)
+    }
+
+    /// The command of a worker: the same device and checks, and nothing that writes files.
+    fn worker_command(&self, program: &Path) -> Command {
+        let mut command = Command::new(program);
+        command.args(["verify", "--worker"]);
+        for (flag, choice) in [("--device", &self.device), ("--against", &self.against)] {
+            match choice {
+                None | Some(DeviceChoice::Best) => {}
+                Some(DeviceChoice::Number(n)) => drop(command.arg(flag).arg(n.to_string())),
+                Some(DeviceChoice::Name(name)) => drop(command.arg(flag).arg(name)),
+            }
+        }
+        let flags = [("--full", self.full), ("--no-validation", self.no_validation)];
+        command.args(flags.iter().filter(|(_, is_set)| *is_set).map(|(flag, _)| flag));
+        if let Some(crash) = &self.inject_crash {
+            command.args(["--inject-crash", crash.text()]);
+        }
+        // As much log as this process writes.
+        match () {
+            _ if tracing::enabled!(tracing::Level::DEBUG) => drop(command.arg("-vv")),
+            _ if tracing::enabled!(tracing::Level::INFO) => drop(command.arg("-v")),
+            _ => {}
+        }
+        command
+    }
+
+    /// All checks of this command, chosen or not. Adds what to print of them to `lines`.
+    fn checks(&self, dut: &DeviceUnderTest, lines: &mut Vec<String>) -> Result<Vec<Check>, Failure> {
+        let mut checks = match &self.against {
             Some(other) => {
                 let other = context(&ContextOptions { device: other.clone(), ..dut.options().clone() })?;
-                say!("against: {}, {}", other.candidate.name, other.candidate.driver.trim());
+                lines.push(format!("against: {}, {}", other.candidate.name, other.candidate.driver.trim()));
                 verify::modes::against(dut.level, &other).map_err(failed)?
             }
             None => verify::checks(dut.level),
         };
-        let checks = self.chosen(checks)?;
-        let (mut ran, mut group) = (0, Vec::<Outcome>::new());
-        let on_outcome = |outcome: &Outcome| {
-            if group.first().is_some_and(|first| first.group != outcome.group) {
-                print_group(&std::mem::take(&mut group));
-            }
-            // One line per group; a failure is printed at once.
-            if outcome.verdict == Verdict::Failed {
-                say!("{}", report::failure(outcome).trim_end());
-            }
-            group.push(Outcome { pictures: Vec::new(), ..outcome.clone() });
-            ran += 1;
-        };
-        let mut run = announcing_signals(&held, || verify::run(dut, &checks, || held.signal(), on_outcome));
-        print_group(&group);
-        let stopped = held.signal().filter(|_| ran < checks.len());
-        // Readers of the report files must see it, too.
-        run.outcomes.extend(stopped.map(|signal| verify::stopped(signal, checks.len() - ran)));
-        Ok((run, stopped))
+        match &self.inject_crash {
+            Some(crash) if !crash.inject(&mut checks) => Err(input("--inject-crash: no check has this name")),
+            _ => Ok(checks),
+        }
     }
 
     /// Runs the self-test: which check detects each injected fault.
-    fn run_self_test(&self, dut: &DeviceUnderTest) -> Result<Run, Failure> {
-        announce(dut);
+    fn run_self_test(&self, level: Level) -> Result<Run, Failure> {
+        let mut lines = Vec::new();
+        let dut = self.open(level, &mut lines)?;
+        announce(&dut, &mut lines);
+        lines.iter().for_each(|line| say!("{line}"));
         let begun = Instant::now();
-        let tell = |detection: &Detection| match &detection.by {
-            _ if detection.left_out => say!("{}: left out\n    {}", detection.fault, detection.message),
-            Some(by) => say!("{}: caught by {by}\n    {}", detection.fault, detection.message),
-            None => say!("{}: NOT CAUGHT ({})\n    {}", detection.fault, detection.what, detection.message),
+        let tell = |detection: &Detection| {
+            match &detection.by {
+                _ if detection.left_out => say!("{}: left out\n    {}", detection.fault, detection.message),
+                Some(by) => say!("{}: caught by {by}\n    {}", detection.fault, detection.message),
+                None => say!("{}: NOT CAUGHT ({})\n    {}", detection.fault, detection.what, detection.message),
+            }
+            detection.history().for_each(|line| say!("    {line}"));
         };
-        let detection = self_test::run(dut.options(), tell).map_err(failed)?;
-        Ok(dut.run_of(detection.iter().map(Detection::outcome).collect(), begun))
+        let mut detections = self_test::run(dut.options(), tell).map_err(failed)?;
+        let crash = self.crash()?;
+        tell(&crash);
+        detections.push(crash);
+        Ok(dut.run_of(detections.iter().map(Detection::outcome).collect(), begun))
     }
 
-    /// Opens the device, with validation if its layer is installed.
-    fn open(&self, level: Level) -> Result<DeviceUnderTest, Failure> {
+    /// Lets the process of a check crash, as a faulty driver does.
+    fn crash(&self) -> Result<Detection, Failure> {
+        let program = this_program()?;
+        let crash = "segv:known answers / every level of a picture";
+        let command = || {
+            let mut command = self.worker_command(&program);
+            command.args(["--inject-crash", crash]);
+            command
+        };
+        let (mut workers, ready) =
+            Workers::start(&command, Duration::from_secs(self.check_timeout), &|| None, Arc::new(|_| ()))?;
+        let is_chosen = |check: &CheckName| crash.ends_with(&format!(":{} / {}", check.group, check.name));
+        let place = ready.checks.iter().position(is_chosen).ok_or_else(|| failed("there is no check to crash"))?;
+        Ok(self_test::crash(&workers.run(place, &ready.checks[place])))
+    }
+
+    /// Opens the device, with validation if its layer is installed. Adds what to print of it to `lines`.
+    fn open(&self, level: Level, lines: &mut Vec<String>) -> Result<DeviceUnderTest, Failure> {
         let device = self.device.clone().unwrap_or(DeviceChoice::Best);
         let with = |validation| {
             DeviceUnderTest::new(
@@ -166,32 +360,35 @@ impl Verify {
         .map_err(no_device)
         .and_then(|mut dut| {
             if dut.watched() && !dut.prove_validation().map_err(failed)? {
-                say!(
-                    "validation sees nothing here: the layer is active and did not notice a missing barrier; its silence proves nothing"
-                );
+                let blind = "validation sees nothing here: the layer is active and did not notice a missing barrier; its silence proves nothing";
+                lines.push(blind.into());
             }
             Ok(dut)
         })
     }
 
-    fn chosen(&self, mut checks: Vec<Check>) -> Result<Vec<Check>, Failure> {
-        checks.retain(|check| self.wants(check.group, &check.name));
-        match checks.is_empty() {
+    /// The places of the checks that the flags select.
+    fn chosen(&self, checks: &[CheckName]) -> Result<Vec<usize>, Failure> {
+        let wanted = |n: &usize| self.wants(&checks[*n]);
+        let chosen: Vec<usize> = (0..checks.len()).filter(wanted).collect();
+        // A filter that selects nothing is no error in a GoogleTest program.
+        match chosen.is_empty() && self.gtest_filter.is_none() {
             true => {
                 Err(input(format!("--only {}: no check has this name; --list prints all names", self.only.join(", "))))
             }
-            false => Ok(checks),
+            false => Ok(chosen),
         }
     }
 
     /// True if this run includes a check of an earlier one.
     fn is_selected(&self, earlier: &Outcome) -> bool {
-        (earlier.group == "against") == self.against.is_some() && self.wants(&earlier.group, &earlier.name)
+        (earlier.group == "against") == self.against.is_some() && self.wants(&earlier.check())
     }
 
-    fn wants(&self, group: &str, name: &str) -> bool {
-        self.only.is_empty()
-            || self.only.iter().any(|part| group.contains(part.as_str()) || name.contains(part.as_str()))
+    fn wants(&self, check: &CheckName) -> bool {
+        let has = |part: &String| check.group.contains(part.as_str()) || check.name.contains(part.as_str());
+        let is_filtered = self.gtest_filter.as_ref().is_none_or(|filter| filter.selects(&gtest::full_name(check)));
+        is_filtered && (self.only.is_empty() || self.only.iter().any(has))
     }
 
     /// Writes the pictures of each failure and stores their file names in it. If the folder cannot be written, only the pictures are lost.
@@ -219,29 +416,33 @@ impl Verify {
     fn write(&self, run: &Run, compared: Option<&BaselineComparison>) -> Result<(), Failure> {
         put(&self.json, || report::to_json(run).map_err(|e| e.to_string()))?;
         put(&self.junit, || junit::junit(run, compared))?;
-        put(&self.html, || html::html(run, compared))
+        put(&self.html, || html::html(run, compared))?;
+        put(&self.prometheus, || Ok(prometheus(run)))
     }
 
     fn judge(&self, run: &Run, compared: Option<&BaselineComparison>, stopped: Option<&str>) -> Result<(), Failure> {
         if let Some(compared) = compared {
             say!("{}", report::comparison(compared).trim_end());
         }
+        if self.gtest_filter.is_some() {
+            say!("{}", gtest::ends_run(run).trim_end());
+        }
         say!("{}", report::summary(run));
         let files: Vec<_> = run.failures().flat_map(|o| &o.faults).flat_map(|f| &f.files).collect();
         if !files.is_empty() {
             say!("pictures of failures: {} in {}", files.len(), self.pictures.display());
         }
-        if let Some(signal) = stopped {
-            return Err(failed(format!(
-                "{signal} ended the run before all {} checks were done",
-                run.outcomes.len() - 1
-            )));
-        }
         let worse = compared.filter(|c| c.is_worse()).map_or(0, BaselineComparison::worse_checks);
+        let (all, interrupted) = (run.outcomes.len(), run.count(Verdict::Interrupted));
+        let rest = if interrupted > 0 { format!("; {interrupted} were not run") } else { String::new() };
         match (run.count(Verdict::Failed), worse) {
-            (0, 0) => Ok(()),
-            (0, worse) => Err(failed(format!("{worse} checks became worse since the baseline"))),
-            (count, _) => Err(failed(format!("{count} of {} checks failed", run.outcomes.len()))),
+            (0, 0) if interrupted == 0 => Ok(()),
+            (0, 0) => {
+                let signal = stopped.unwrap_or("a signal");
+                Err(Failure::Interrupted(format!("{signal} ended the run: {interrupted} of {all} checks were not run")))
+            }
+            (0, worse) => Err(failed(format!("{worse} checks became worse since the baseline{rest}"))),
+            (count, _) => Err(failed(format!("{count} of {all} checks failed{rest}"))),
         }
     }
 }
@@ -252,34 +453,33 @@ fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String, String>) ->
     write_report(file, &text().map_err(failed)?)
 }
 
-fn announce(dut: &DeviceUnderTest) {
+/// The file of this program, which workers run.
+fn this_program() -> Result<PathBuf, Failure> {
+    std::env::current_exe().map_err(|e| failed(format!("this program's file is not known: {e}")))
+}
+
+fn announce(dut: &DeviceUnderTest, lines: &mut Vec<String>) {
     let device = &dut.context.candidate;
     let note = if device.is_software() { " (software: no GPU is used)" } else { "" };
     let watched = if dut.watched() { "" } else { "; without the validation layer" };
-    say!("device: {}{note}, {}{watched}", device.name, device.driver.trim());
+    lines.push(format!("device: {}{note}, {}{watched}", device.name, device.driver.trim()));
 }
 
-/// Reports a signal at once: the running check may take a minute.
-fn announcing_signals<T>(held: &Held, work: impl FnOnce() -> T) -> T {
+/// Reports a signal at once, and `what` it does: the running check may take a minute.
+fn announcing_signals<T>(held: &Held, what: &str, work: impl FnOnce() -> T) -> T {
     const OFTEN: Duration = Duration::from_millis(100);
     let (working, works) = mpsc::channel::<()>();
     std::thread::scope(|scope| {
         scope.spawn(move || {
             while held.signal().is_none() && works.recv_timeout(OFTEN) == Err(RecvTimeoutError::Timeout) {}
             if let Some(signal) = held.signal() {
-                say!("{signal}: stopping after this check; a second signal stops at once and writes nothing");
+                say!("{signal}: {what}");
             }
         });
         let done = work();
         drop(working);
         done
     })
-}
-
-fn print_group(group: &[Outcome]) {
-    if let Some(first) = group.first() {
-        say!("{}", report::group_line(&first.group, &group.iter().collect::<Vec<_>>()).trim_end());
-    }
 }
 
 fn context(options: &ContextOptions) -> Result<Arc<Context>, Failure> {

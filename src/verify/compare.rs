@@ -34,6 +34,9 @@ fn is_float(format: Format) -> bool {
     floats.contains(&format)
 }
 
+/// Passes whose outputs differ by no more than their samples: their largest, smallest and mean, and sections.
+const SMOOTH: [&str; 3] = ["raycast_projection", "raycast_planes", "raycast_planes_toned"];
+
 /// Tolerance in addition to that of the pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExtraTolerance {
@@ -47,12 +50,16 @@ pub struct ExtraTolerance {
 
 impl ExtraTolerance {
     /// For a pass that samples with the device's texture filter: weights of `bits` bits, possibly truncated, along three axes, between
-    /// neighbours that differ by at most 1. A threshold may then be reached a step earlier or later, and rarely in another voxel.
+    /// neighbours that differ by at most 1. Where a pass compares samples with a threshold or looks them up in a transfer function, a small
+    /// difference may become a large one, and a share of the texels may be off: a threshold is reached a step earlier or later, and rarely
+    /// in another voxel. Single samples are judged by the group "sampling".
     pub fn of(pass: &Pass, scene: &Scene, args: &DispatchArgs, bits: u32) -> ExtraTolerance {
-        match pass.reads(scene, args).iter().any(|bind| bind.filtered) {
-            true => ExtraTolerance { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers: 0.02 },
-            false => ExtraTolerance::default(),
+        if !pass.reads(scene, args).iter().any(|bind| bind.filtered) {
+            return ExtraTolerance::default();
         }
+        let is_smooth = SMOOTH.contains(&pass.name);
+        let outliers = if is_smooth { 0.0 } else { 0.02 };
+        ExtraTolerance { value: 3.0 * (-f64::from(bits)).exp2(), distance: scene.step, outliers }
     }
 
     fn at(&self, slot: Slot) -> f64 {
@@ -61,6 +68,13 @@ impl ExtraTolerance {
             _ => self.value,
         }
     }
+}
+
+/// The largest error that is allowed of a value of an output, in its units: the tolerance of the pass, the rounding of the format, and
+/// what the device's filter may add.
+pub(super) fn tolerance_of(pass: &Pass, extra: ExtraTolerance, slot: Slot, format: Format, expected: f64) -> f64 {
+    let tolerance = pass.tolerance.absolute.max(pass.tolerance.relative * expected.abs());
+    tolerance + 1.01 * Texels::spacing(format, expected) + extra.at(slot)
 }
 
 /// Compares all outputs of a dispatch with those of the reference. `poison`: value of the outputs before it; where the reference leaves
@@ -85,11 +99,11 @@ pub fn compare_outputs(
         for (i, (e, g)) in expected.values.iter().zip(&got.values).enumerate() {
             let untouched = e.is_nan();
             let e = if untouched { poison } else { *e };
-            let rounding = 1.01 * Texels::spacing(format, e);
-            let tolerance =
-                if untouched { 0.0 } else { pass.tolerance.absolute.max(pass.tolerance.relative * e.abs()) };
-            let loose = if untouched { 0.0 } else { extra.at(bind.slot) };
-            let (error, allowed) = ((e - g).abs(), tolerance + rounding + loose);
+            let allowed = match untouched {
+                true => 1.01 * Texels::spacing(format, e),
+                false => tolerance_of(pass, extra, bind.slot, format, e),
+            };
+            let error = (e - g).abs();
             if error <= allowed {
                 if !untouched {
                     all.largest = all.largest.max(error);

@@ -12,13 +12,18 @@ mod compare;
 pub mod determinism;
 pub mod failures;
 pub mod formats;
+pub mod gtest;
 pub mod hazards;
+mod isolation;
 mod known_answers;
 pub mod memory;
 pub mod modes;
 pub mod passes;
+mod progress;
 pub mod render;
 pub mod report;
+pub mod reproduce;
+pub mod sampling;
 pub mod self_test;
 mod speed;
 pub mod stress;
@@ -32,7 +37,7 @@ use crate::machine;
 use crate::passes::fault_injection::Change;
 use crate::scene::Scene;
 use render::Drawn;
-use report::{FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
+use report::{CheckName, FORMAT, Fault, Figure, Level, Outcome, PictureComparison, Run, Verdict};
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -42,6 +47,7 @@ use std::time::Instant;
 pub fn checks(level: Level) -> Vec<Check> {
     let groups = [
         passes::checks,
+        sampling::checks,
         known_answers::checks,
         modes::checks,
         determinism::checks,
@@ -56,39 +62,56 @@ pub fn checks(level: Level) -> Vec<Check> {
     groups.into_iter().flat_map(|group| group(level)).collect()
 }
 
-/// Runs checks one after the other and calls `tell` after each. Once `stop` returns a reason, the remaining checks are left out.
+/// Runs checks one after the other in this process and calls `tell` after each. Once `stop` returns a reason, the remaining checks are
+/// interrupted.
 pub fn run(
     dut: &mut DeviceUnderTest,
     checks: &[Check],
     stop: impl Fn() -> Option<&'static str>,
-    mut tell: impl FnMut(&Outcome),
+    tell: impl FnMut(&Outcome),
 ) -> Run {
     let begun = Instant::now();
-    let mut outcomes = Vec::new();
-    let mut group = checks.first().map_or("", |check| check.group);
-    for check in checks {
-        if let Some(why) = stop() {
-            outcomes.push(check.stopped(why));
-            continue;
-        }
-        // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
-        if dut.options.validation && std::mem::replace(&mut group, check.group) != check.group {
-            let renewed = dut.renew();
-            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
-        }
-        // Logged first, because a driver that crashes ends the process.
-        tracing::info!("check: {} / {}", check.group, check.name);
-        let outcome = check.run(dut);
-        tell(&outcome);
-        outcomes.push(outcome);
-    }
+    let names: Vec<CheckName> = checks.iter().map(Check::title).collect();
+    let mut group = None;
+    let outcomes = run_each(&names, stop, |n| checks[n].run_after(&mut group, dut), tell);
     dut.run_of(outcomes, begun)
 }
 
-/// The outcome for the checks that a signal left out: an incomplete run must not pass.
-pub fn stopped(signal: &str, left: usize) -> Outcome {
-    Check::new("run", "every check was run", |_| Ok(Findings::default()))
-        .failed(format!("{signal}: {left} checks were not"))
+/// Runs checks one after the other by `one`, which is given their places, and calls `tell` after each. Once `stop` returns a reason,
+/// the remaining checks are interrupted, so that there is one outcome for each name.
+fn run_each(
+    names: &[CheckName],
+    stop: impl Fn() -> Option<&'static str>,
+    mut one: impl FnMut(usize) -> Outcome,
+    mut tell: impl FnMut(&Outcome),
+) -> Vec<Outcome> {
+    let mut outcomes = Vec::new();
+    for (n, name) in names.iter().enumerate() {
+        if let Some(why) = stop() {
+            outcomes.push(Outcome::unrun(name, Verdict::Interrupted, format!("not run: {why}")));
+            continue;
+        }
+        // Logged first, because a driver that crashes may end the process.
+        tracing::info!("check: {} / {}", name.group, name.name);
+        let outcome = one(n);
+        tell(&outcome);
+        outcomes.push(outcome);
+    }
+    outcomes
+}
+
+/// A run of these outcomes that ends now. `device`: what they are of; `validation`: whether the validation layer watched.
+fn run_on(device: machine::Device, validation: bool, level: Level, outcomes: Vec<Outcome>, begun: Instant) -> Run {
+    Run {
+        format: FORMAT.into(),
+        program: machine::program(),
+        date: machine::date(),
+        device,
+        level,
+        validation,
+        seconds: begun.elapsed().as_secs_f64(),
+        outcomes,
+    }
 }
 
 /// What a check measured and detected.
@@ -100,6 +123,8 @@ pub struct Findings {
     pub pictures: Vec<PictureComparison>,
     /// Set if the check was skipped: what this device or system lacks.
     pub left_out: Option<String>,
+    /// Set if a signal ended the check before it had seen everything: which.
+    pub interrupted: Option<&'static str>,
 }
 
 impl Findings {
@@ -155,12 +180,14 @@ impl Check {
         });
         let complaints = dut.complaints();
         findings.faults.extend(complaints.iter().map(|message| Fault::new(format!("validation: {message}"))));
-        let verdict = match (findings.faults.is_empty(), &findings.left_out) {
-            (false, _) => Verdict::Failed,
-            (true, Some(_)) => Verdict::LeftOut,
-            (true, None) => Verdict::Passed,
+        let verdict = match (findings.faults.is_empty(), &findings.left_out, findings.interrupted) {
+            (false, _, _) => Verdict::Failed,
+            (true, _, Some(_)) => Verdict::Interrupted,
+            (true, Some(_), None) => Verdict::LeftOut,
+            (true, None, None) => Verdict::Passed,
         };
         findings.notes.extend(findings.left_out.take());
+        findings.notes.extend(findings.interrupted.map(|signal| format!("not to its end: {signal}")));
         self.outcome(verdict, findings, begun)
     }
 
@@ -172,16 +199,20 @@ impl Check {
         (self.work)(dut)
     }
 
-    /// The outcome of a check that was not run.
-    fn stopped(&self, why: &str) -> Outcome {
-        let findings = Findings { notes: vec![format!("not run: {why}")], ..Findings::default() };
-        self.outcome(Verdict::LeftOut, findings, Instant::now())
+    /// Runs the check after one of `group`, which becomes this check's group. None: nothing was run before.
+    fn run_after(&self, group: &mut Option<&'static str>, dut: &mut DeviceUnderTest) -> Outcome {
+        // State that the validation layer keeps of one group must not affect the next: see `IsolatedContext`.
+        let is_other = group.replace(self.group).is_some_and(|before| before != self.group);
+        if dut.options.validation && is_other {
+            let renewed = dut.renew();
+            renewed.unwrap_or_else(|error| tracing::warn!("the old device goes on: {error}"));
+        }
+        self.run(dut)
     }
 
-    /// The outcome of a check that failed for this reason.
-    fn failed(&self, why: String) -> Outcome {
-        let findings = Findings { faults: vec![Fault::new(why)], ..Findings::default() };
-        self.outcome(Verdict::Failed, findings, Instant::now())
+    /// Group and name.
+    pub fn title(&self) -> CheckName {
+        CheckName { group: self.group.into(), name: self.name.clone() }
     }
 
     fn outcome(&self, verdict: Verdict, findings: Findings, begun: Instant) -> Outcome {
@@ -337,16 +368,7 @@ impl DeviceUnderTest {
 
     /// A run of these outcomes that ends now.
     pub(crate) fn run_of(&self, outcomes: Vec<Outcome>, begun: Instant) -> Run {
-        Run {
-            format: FORMAT.into(),
-            program: machine::program(),
-            date: machine::date(),
-            device: machine::device(&self.context),
-            level: self.level,
-            validation: self.watched(),
-            seconds: begun.elapsed().as_secs_f64(),
-            outcomes,
-        }
+        run_on(machine::device(&self.context), self.watched(), self.level, outcomes, begun)
     }
 
     fn renew(&mut self) -> Result<(), GpuError> {

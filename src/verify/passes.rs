@@ -65,7 +65,7 @@ pub fn checks(_: Level) -> Vec<Check> {
 }
 
 /// The seed of a pass's inputs. It follows from the name, so that another pass in the list changes no input.
-fn seed_of(pass: &Pass, kind: usize) -> u64 {
+pub(super) fn seed_of(pass: &Pass, kind: usize) -> u64 {
     let hashed =
         pass.name.bytes().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
     hashed ^ kind as u64

@@ -115,7 +115,7 @@ pub fn stress(dut: &mut DeviceUnderTest, seconds: f64, before_picture: &BeforePi
     while goes_on(&stress) && findings.faults.len() < 8 && signals::received().is_none() {
         stress.step(&mut findings)?;
     }
-    findings.left_out = signals::received().map(|signal| format!("not to its end: {signal}"));
+    findings.interrupted = signals::received();
     let (made, most) = ((pipelines() - before) as usize, stress.pipelines);
     findings.expect(made <= most, || format!("{made} pipelines were made, {most} different ones were needed"));
     let done = [("pictures", stress.pictures), ("renderers", stress.made), ("pipelines", made)];

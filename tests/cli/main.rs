@@ -22,6 +22,8 @@ mod signals;
 mod stream;
 mod support_bundle;
 mod verify;
+mod verify_gtest;
+mod verify_isolated;
 #[cfg(feature = "view")]
 mod view;
 mod watchdog;

@@ -92,18 +92,37 @@ fn a_signal_ends_verify_with_what_it_found() {
     let said: Vec<String> = lines.collect();
     let mut error = String::new();
     child.stderr.take().expect("its errors").read_to_string(&mut error).expect("text");
-    assert_eq!(child.wait().expect("it ends").code(), Some(1), "{said:?}");
+    assert_eq!(child.wait().expect("it ends").code(), Some(4), "{said:?}");
     assert!(said.iter().any(|line| line.starts_with("SIGINT: stopping after this check")), "{said:?}");
     let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
-    let all = run.outcomes.len() - 1;
-    let last = &run.outcomes[all];
-    assert_eq!((last.name.as_str(), last.verdict), ("every check was run", Verdict::Failed));
-    assert_eq!(error.trim_end(), format!("echolume: SIGINT ended the run before all {all} checks were done"));
-    let stopped = run.outcomes.iter().filter(|o| o.verdict == Verdict::LeftOut && o.notes == ["not run: SIGINT"]);
-    assert!(stopped.count() > 20, "{:?}", run.outcomes);
+    let (all, left) = (run.outcomes.len(), run.count(Verdict::Interrupted));
+    assert_eq!(error.trim_end(), format!("echolume: SIGINT ended the run: {left} of {all} checks were not run"));
+    let stopped = run.outcomes.iter().filter(|o| o.verdict == Verdict::Interrupted && o.notes == ["not run: SIGINT"]);
+    assert!(stopped.count() == left && left > 20, "{:?}", run.outcomes);
+    assert_eq!(Verdict::ALL.map(|verdict| run.count(verdict)).iter().sum::<usize>(), all);
+    let last = said.last().expect("a summary");
+    assert!(last.contains(&format!(", interrupted {left} in ")), "{last}");
     let document = fs::read_to_string(&junit).expect("written");
-    assert_eq!(document.matches("<skipped").count(), run.count(Verdict::LeftOut));
-    assert_eq!(document.matches("<failure").count(), 1, "a CI that reads nothing else is to see it");
+    assert_eq!(document.matches("<failure").count(), 0, "no check has failed");
+    assert_eq!(document.matches("<error").count(), left, "a CI that reads nothing else is to see it");
+}
+
+/// The check that runs is not waited for: its process is killed, and it has not failed.
+#[test]
+fn a_signal_ends_an_isolated_run_at_once() {
+    let folder = Folder::new("verify-isolated-stopped");
+    let json = folder.path("run.json");
+    let hang = ["--inject-crash", "hang:known answers / every level of a picture", "--json", &json];
+    let chosen = ["verify", "--isolate", "--only", "every level of a picture", "--only", "a sphere in a sweep"];
+    let mut child = start(with_default_signals().args(chosen).args(hang));
+    let mut lines = BufReader::new(child.stdout.take().expect("its output")).lines().map_while(Result::ok);
+    assert!(lines.next().expect("a line").starts_with("device: "));
+    signal(&child, Signal::INT);
+    let said: Vec<String> = lines.collect();
+    assert_eq!(child.wait().expect("it ends").code(), Some(4), "{said:?}");
+    let run = report::from_json(&fs::read_to_string(&json).expect("written")).expect("read back");
+    assert_eq!((run.count(Verdict::Interrupted), run.outcomes.len()), (2, 2), "{:?}", run.outcomes);
+    assert!(run.outcomes.iter().all(|o| o.faults.is_empty() && o.notes[0].ends_with("SIGINT")), "{:?}", run.outcomes);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `echolume verify` as CI and a cart call it: its exit codes, its files, and the comparison with an earlier run.
 
+use crate::common::files::repository;
 use crate::common::program::*;
 use echolume::verify::report::{self, Run, Unit, Verdict};
 use echolume::verify::self_test;
@@ -21,8 +22,18 @@ fn kept(folder: &Folder, name: &str, more: &[&str]) -> (String, Run) {
 }
 
 /// All groups but the passes, which are checked one by one by tests/gpu: they would take half of the gate's time for this command.
-const GROUPS: [&str; 9] =
-    ["determinism", "failures", "formats", "hazards", "known answers", "memory", "modes", "speed", "stress"];
+const GROUPS: [&str; 10] = [
+    "determinism",
+    "failures",
+    "formats",
+    "hazards",
+    "known answers",
+    "memory",
+    "modes",
+    "sampling",
+    "speed",
+    "stress",
+];
 
 /// All quick checks of these groups pass on this device, and every report file says so.
 #[test]
@@ -56,8 +67,8 @@ fn every_injected_fault_and_every_dropped_barrier_is_caught() {
     let folder = Folder::new("verify-self-test");
     let (_, run) = kept(&folder, "run.json", &["--self-test"]);
     let planted = self_test::faults().count();
-    // In addition: barriers checked by the oracle, barriers checked by the layer, and no fault.
-    assert!(planted >= 24 && run.outcomes.len() == planted + 3, "{planted} of {}", run.outcomes.len());
+    // In addition: barriers checked by the oracle, barriers checked by the layer, no fault, and a crash.
+    assert!(planted >= 24 && run.outcomes.len() == planted + 4, "{planted} of {}", run.outcomes.len());
     let caught: Vec<String> = run.outcomes.iter().map(|o| format!("{}: {}", o.name, o.notes.join("; "))).collect();
     println!("{}", caught.join("\n"));
     assert_eq!(run.count(Verdict::Passed), run.outcomes.len());
@@ -65,6 +76,26 @@ fn every_injected_fault_and_every_dropped_barrier_is_caught() {
     let by = |group: &str| caught.iter().filter(|c| c.contains(&format!("caught by {group}"))).count();
     assert!(by("passes") > 10 && by("known answers") > 3 && by("the barrier oracle") == 1, "{caught:?}");
     assert_eq!(by("synchronization validation"), 1, "{caught:?}");
+    // Every bug of the history was recreated, and says where it was met.
+    let bugs = self_test::known_bugs();
+    assert!(bugs.len() >= 10, "{}", bugs.len());
+    for bug in bugs {
+        let outcome = run.outcomes.iter().find(|o| o.name == bug.fault).unwrap_or_else(|| panic!("{}", bug.fault));
+        assert!(outcome.notes.iter().any(|note| note.contains(bug.source)), "{:?}", outcome.notes);
+    }
+}
+
+/// The page names each public bug with its source and the fault that recreates it, and no other.
+#[test]
+fn the_page_lists_every_known_bug() {
+    let page = fs::read_to_string(repository("docs/verify.md")).expect("the page");
+    let section = page.split("\n## ").find(|section| section.starts_with("Known bugs\n")).expect("the section");
+    let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).collect();
+    assert_eq!(rows.len(), self_test::known_bugs().len() + 1, "a head, and a row for each");
+    for (row, bug) in rows[1..].iter().zip(self_test::known_bugs()) {
+        let source = bug.source.strip_prefix("https://").map_or(bug.source.into(), |_| format!("<{}>", bug.source));
+        assert_eq!(*row, format!("| {} | {} | {} | {source} |", bug.fault, bug.driver, bug.what));
+    }
 }
 
 #[test]

@@ -16,5 +16,6 @@ mod plan;
 mod profile;
 mod references;
 mod rules;
+mod sampling;
 mod supply;
 mod verify_report;

@@ -275,7 +275,7 @@ fn every_pass_agrees_with_every_shader_it_may_use() {
         }
     }
     let scene = measure::scene(8, 8).expect("scene");
-    for pass in measure::MEASURES {
+    for pass in measure::MEASURES.iter().chain([&measure::POSITIONS]) {
         let shader = pass.shader(&scene, &DispatchArgs::default());
         let module = spirv::reflect(&spirv::words(spirv::embedded(shader).expect("embedded"))).expect("reflection");
         interface_check::check(pass, &scene, &DispatchArgs::default(), &module).expect("agreement");

@@ -189,6 +189,7 @@ fn was(verdict: Verdict) -> &'static str {
         Verdict::Passed => "passed",
         Verdict::Failed => "failed",
         Verdict::LeftOut => "was left out",
+        Verdict::Interrupted => "was interrupted",
     }
 }
 
@@ -203,7 +204,8 @@ fn arrived(outcome: &Outcome, same_level: bool) -> Option<Change> {
 /// The first fault or note, after a colon.
 fn reason(outcome: &Outcome) -> String {
     let fault = outcome.faults.first().map(|f| &f.what);
-    let note = outcome.notes.first().filter(|_| outcome.verdict == Verdict::LeftOut);
+    let is_unrun = matches!(outcome.verdict, Verdict::LeftOut | Verdict::Interrupted);
+    let note = outcome.notes.first().filter(|_| is_unrun);
     fault.or(note).map_or_else(String::new, |what| format!(": {}", escaped(what)))
 }
 
@@ -212,7 +214,7 @@ fn verdict(old: &Outcome, new: &Outcome) -> Option<Change> {
         (a, b) if a == b => return None,
         (_, Verdict::Failed) => Class::Worse,
         (_, Verdict::Passed) => Class::Better,
-        (_, Verdict::LeftOut) => Class::Changed,
+        (_, Verdict::LeftOut | Verdict::Interrupted) => Class::Changed,
     };
     Some(Change::new(class, new, format!("{} -> {}{}", old.verdict.word(), new.verdict.word(), reason(new))))
 }

@@ -24,8 +24,12 @@ pub fn html(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, 
     run.check().map_err(|e| e.to_string())?;
     let mut embedded = EmbeddedPictures::default();
     let failures: Vec<&Outcome> = run.failures().collect();
-    let passed = Verdict::Failed != overall(run, compared);
-    let title = format!("echolume verify: {}, {}", if passed { "passed" } else { "failed" }, escaped(&run.device.name));
+    let result = match overall(run, compared) {
+        Verdict::Failed => "failed",
+        Verdict::Interrupted => "interrupted",
+        Verdict::Passed | Verdict::LeftOut => "passed",
+    };
+    let title = format!("echolume verify: {result}, {}", escaped(&run.device.name));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -68,6 +72,7 @@ pub fn html(run: &Run, compared: Option<&BaselineComparison>) -> Result<String, 
 fn overall(run: &Run, compared: Option<&BaselineComparison>) -> Verdict {
     match run.count(Verdict::Failed) > 0 || compared.is_some_and(BaselineComparison::is_worse) {
         true => Verdict::Failed,
+        false if run.count(Verdict::Interrupted) > 0 => Verdict::Interrupted,
         false if run.count(Verdict::Passed) == 0 => Verdict::LeftOut,
         false => Verdict::Passed,
     }
@@ -82,7 +87,8 @@ fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Passed => "passed",
         Verdict::Failed => "failed",
-        Verdict::LeftOut => "left-out",
+        // Coloured alike: neither says anything about the device.
+        Verdict::LeftOut | Verdict::Interrupted => "left-out",
     }
 }
 
@@ -92,6 +98,9 @@ fn head(run: &Run, compared: Option<&BaselineComparison>) -> Markup {
     let verdict = match (overall, failed) {
         (Verdict::LeftOut, _) => "Nothing was checked".into(),
         (Verdict::Passed, _) => "Passed".into(),
+        (Verdict::Interrupted, _) => {
+            format!("Interrupted: {} of {checks} checks were not run", run.count(Verdict::Interrupted))
+        }
         (Verdict::Failed, 0) => "Worse than before".into(),
         (Verdict::Failed, 1) => format!("1 of {checks} checks failed"),
         (Verdict::Failed, _) => format!("{failed} of {checks} checks failed"),
@@ -113,7 +122,7 @@ fn head(run: &Run, compared: Option<&BaselineComparison>) -> Markup {
             p class="program" { "echolume verify" }
             h1 { (verdict) }
             ul class="counts" {
-                @for verdict in [Verdict::Passed, Verdict::Failed, Verdict::LeftOut] {
+                @for verdict in Verdict::ALL.into_iter().filter(|v| *v != Verdict::Interrupted || run.count(*v) > 0) {
                     li { strong { (run.count(verdict)) } " " (verdict.word()) }
                 }
                 li { "in " strong { (seconds(run.seconds)) } }
@@ -160,14 +169,19 @@ fn baseline(compared: &BaselineComparison) -> Markup {
 fn notes(run: &Run) -> Markup {
     /// A reason and its checks.
     type Reasons = Vec<(String, Vec<String>)>;
-    let mut parts: [(&str, Reasons); 2] = [("Left out", Vec::new()), ("Notes", Vec::new())];
+    let mut parts: [(&str, Reasons); 3] =
+        [("Interrupted", Vec::new()), ("Left out", Vec::new()), ("Notes", Vec::new())];
     let mut places = std::collections::HashMap::new();
     for outcome in &run.outcomes {
-        let left_out = outcome.verdict == Verdict::LeftOut;
-        let unexplained = (left_out && outcome.notes.is_empty()).then(|| "no reason was given".to_string());
+        let part = match outcome.verdict {
+            Verdict::Interrupted => 0,
+            Verdict::LeftOut => 1,
+            Verdict::Passed | Verdict::Failed => 2,
+        };
+        let unexplained = (part < 2 && outcome.notes.is_empty()).then(|| "no reason was given".to_string());
         for note in outcome.notes.iter().map(|note| escaped(note)).chain(unexplained) {
-            let reasons = &mut parts[usize::from(!left_out)].1;
-            let place = *places.entry((left_out, note.clone())).or_insert_with(|| {
+            let reasons = &mut parts[part].1;
+            let place = *places.entry((part, note.clone())).or_insert_with(|| {
                 reasons.push((note, Vec::new()));
                 reasons.len() - 1
             });
@@ -245,8 +259,7 @@ fn bar(used: f64) -> Markup {
 
 /// A group: counts, table, and pictures of checks that did not fail. Expanded if something failed or the group is short.
 fn group_section(at: usize, name: &str, outcomes: &[&Outcome], embedded: &mut EmbeddedPictures) -> Markup {
-    let counts = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut]
-        .map(|verdict| (verdict, outcomes.iter().filter(|o| o.verdict == verdict).count()));
+    let counts = Verdict::ALL.map(|verdict| (verdict, outcomes.iter().filter(|o| o.verdict == verdict).count()));
     let open = outcomes.len() <= MAX_OPEN || counts[1].1 > 0;
     let shown: Vec<&&Outcome> =
         outcomes.iter().filter(|o| o.verdict != Verdict::Failed && !o.pictures.is_empty()).collect();
@@ -300,7 +313,7 @@ fn check_row(outcome: &Outcome) -> Markup {
                         }
                     }
                 }
-                @if outcome.verdict == Verdict::LeftOut {
+                @if matches!(outcome.verdict, Verdict::LeftOut | Verdict::Interrupted) {
                     @for note in &outcome.notes { div class="dim" { (escaped(note)) } }
                 }
             }

@@ -71,13 +71,22 @@ fn case(outcome: &Outcome) -> TestCase {
             status.set_message(if why.is_empty() { "left out".into() } else { why.join("; ") });
             status
         }
+        // An error, because a run that was ended early must not pass, and no failure, because the device is not at fault.
+        Verdict::Interrupted => {
+            let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
+            let why: Vec<String> = outcome.notes.iter().map(|note| escaped(note)).collect();
+            status.set_message(if why.is_empty() { "interrupted".into() } else { why.join("; ") });
+            status.set_type("interrupted");
+            status
+        }
     };
     let mut case = TestCase::new(escaped(&outcome.name), status);
     case.set_classname(escaped(&outcome.group));
     case.time = duration(outcome.seconds);
     let figures = outcome.figures.iter().map(|f| format!("{}: {}", escaped(&f.what), value_of_limit(f)));
-    // Notes of a skipped check are its message.
-    let notes = outcome.notes.iter().filter(|_| outcome.verdict != Verdict::LeftOut).map(|note| escaped(note));
+    // Notes of a check that was not run are its message.
+    let was_run = matches!(outcome.verdict, Verdict::Passed | Verdict::Failed);
+    let notes = outcome.notes.iter().filter(|_| was_run).map(|note| escaped(note));
     let lines: Vec<String> = figures.chain(notes).collect();
     if !lines.is_empty() {
         case.set_system_out(lines.join("\n"));

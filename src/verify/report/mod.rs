@@ -7,6 +7,7 @@
 pub mod baseline;
 pub mod html;
 pub mod junit;
+pub mod prometheus;
 
 use crate::machine::Device;
 use crate::picture::Picture;
@@ -113,6 +114,15 @@ pub struct Outcome {
     pub pictures: Vec<PictureComparison>,
 }
 
+/// Group and name of a check.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CheckName {
+    pub group: String,
+    /// Unique in its group.
+    pub name: String,
+}
+
 /// Verdict of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -121,6 +131,8 @@ pub enum Verdict {
     Failed,
     /// Not run, because this device or system lacks something; the notes say what.
     LeftOut,
+    /// Not run, or not to its end, because a signal ended the run. It says nothing about the device.
+    Interrupted,
 }
 
 /// A number that a check measured.
@@ -257,10 +269,33 @@ impl Figure {
 }
 
 impl Outcome {
+    /// The outcome of a check that measured nothing. `why`: the fault of a failed check, otherwise a note.
+    pub fn unrun(check: &CheckName, verdict: Verdict, why: String) -> Outcome {
+        let (faults, notes) = match verdict {
+            Verdict::Failed => (vec![Fault::new(why)], Vec::new()),
+            _ => (Vec::new(), vec![why]),
+        };
+        Outcome {
+            group: check.group.clone(),
+            name: check.name.clone(),
+            verdict,
+            seconds: 0.0,
+            figures: Vec::new(),
+            faults,
+            notes,
+            pictures: Vec::new(),
+        }
+    }
+
     /// The figure that is closest to its limit, or furthest beyond.
     pub fn tightest(&self) -> Option<&Figure> {
         let used = self.figures.iter().filter_map(|f| Some((f, f.used()?)));
         used.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(figure, _)| figure)
+    }
+
+    /// The check that it is the outcome of.
+    pub fn check(&self) -> CheckName {
+        CheckName { group: self.group.clone(), name: self.name.clone() }
     }
 
     /// Group and name.
@@ -270,11 +305,15 @@ impl Outcome {
 }
 
 impl Verdict {
+    /// All verdicts, in the order in which reports count them. Every outcome has exactly one, so that the counts add up.
+    pub const ALL: [Verdict; 4] = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut, Verdict::Interrupted];
+
     pub fn word(self) -> &'static str {
         match self {
             Verdict::Passed => "passed",
             Verdict::Failed => "failed",
             Verdict::LeftOut => "left out",
+            Verdict::Interrupted => "interrupted",
         }
     }
 }
@@ -457,8 +496,7 @@ const MAX_CHANGES: usize = 40;
 /// One line on a group, without line break: verdicts, duration, and the check that is closest to its tolerance.
 pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     let count = |verdict| outcomes.iter().filter(|o| o.verdict == verdict).count();
-    let mut line =
-        format!("{:<18} {}", escaped(group), counts([Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(count)));
+    let mut line = format!("{:<18} {}", escaped(group), counts(Verdict::ALL.map(count)));
     let _ = write!(line, " in {}", seconds(outcomes.iter().map(|o| o.seconds).sum()));
     let passed = outcomes.iter().filter(|o| o.verdict == Verdict::Passed);
     let used = passed.filter_map(|o| Some((o, o.tightest()?.used()?))).filter(|(_, used)| *used > 0.0);
@@ -468,10 +506,13 @@ pub fn group_line(group: &str, outcomes: &[&Outcome]) -> String {
     line
 }
 
-/// Numbers of passed, failed and left out checks; zeros are omitted.
-fn counts(of: [usize; 3]) -> String {
-    let words = [Verdict::Passed, Verdict::Failed, Verdict::LeftOut].map(Verdict::word);
-    let texts = of.iter().zip(words).filter(|(count, _)| **count > 0).map(|(count, word)| format!("{count} {word}"));
+/// Numbers of checks by verdict, in the order of [`Verdict::ALL`]; zeros are omitted.
+fn counts(of: [usize; 4]) -> String {
+    let texts = of
+        .iter()
+        .zip(Verdict::ALL.map(Verdict::word))
+        .filter(|(count, _)| **count > 0)
+        .map(|(count, word)| format!("{count} {word}"));
     let texts: Vec<String> = texts.collect();
     if texts.is_empty() { "no checks".into() } else { texts.join(", ") }
 }
@@ -529,8 +570,12 @@ fn beyond(worst: &Worst) -> String {
 pub fn summary(run: &Run) -> String {
     let device = &run.device;
     let validation = if run.validation { ", validation layer watching" } else { "" };
+    let interrupted = match run.count(Verdict::Interrupted) {
+        0 => String::new(),
+        count => format!(", interrupted {count}"),
+    };
     format!(
-        "passed {}, failed {}, left out {} in {} on {}, {}, Vulkan {} ({}{validation})",
+        "passed {}, failed {}, left out {}{interrupted} in {} on {}, {}, Vulkan {} ({}{validation})",
         run.count(Verdict::Passed),
         run.count(Verdict::Failed),
         run.count(Verdict::LeftOut),

@@ -4,7 +4,7 @@
 use crate::passes::fault_injection::{Change, InjectedFault};
 use crate::passes::{DispatchArgs, Params, Slot, Value};
 use crate::scene::Scene;
-use crate::spirv::mutate::{FMAX, FMIN, add_to_writes, replace_last, round_to_half};
+use crate::spirv::mutate::{F_ADD, F_SUB, FMAX, FMIN, add_to_writes, replace_last, replace_last_opcode, round_to_half};
 use half::f16;
 
 const LSB: f32 = 1.0 / 255.0;
@@ -322,6 +322,25 @@ pub(super) const FAULTS: &[InjectedFault] = &[
         name: "ambient and diffuse swapped",
         what: "two numbers in the wrong order",
         change: Change::Numbers { pass: "light", by: |_, params| swap(params, "ambient", "diffuse") },
+    },
+    InjectedFault {
+        name: "parameters of the dispatch before",
+        what: "a dispatch reads the uniform block that lies before its own",
+        change: Change::Numbers {
+            pass: "scan_convert",
+            by: |_, params| {
+                number(params, "slice", |value| {
+                    if let Value::I32(slice) = value {
+                        *slice = (*slice - 1).max(0);
+                    }
+                });
+            },
+        },
+    },
+    InjectedFault {
+        name: "lost register",
+        what: "the compiler mixes up an operand where many values are alive",
+        change: Change::Shader { pass: "light", by: |words| replace_last_opcode(words, F_ADD, F_SUB) },
     },
     InjectedFault {
         name: "shadow softness",

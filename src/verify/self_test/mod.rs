@@ -1,7 +1,10 @@
 //! Group "self-test": fault injection. Faults are injected on the device's side one at a time, and one of the checks of `echolume verify`
 //! must detect each. The same check must pass without the fault, otherwise it proves nothing.
 
+mod history;
 mod injected_faults;
+
+pub use history::KnownBug;
 
 use super::built_in::{ALL_FILTERS, BYTES, frames, scene, wobbler};
 use crate::gpu::{Context, ContextOptions, GpuError, Renderer, RendererOptions};
@@ -11,7 +14,7 @@ use crate::probe::Geometry;
 use crate::queues::oracle::SubmissionLog;
 use crate::scene::Scene;
 use crate::verify::report::{Fault, Level, Outcome, Verdict};
-use crate::verify::{Check, DeviceUnderTest, Findings, credible_messages, known_answers, passes, render};
+use crate::verify::{Check, DeviceUnderTest, Findings, credible_messages, known_answers, passes, render, sampling};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -36,6 +39,11 @@ pub struct Detection {
 }
 
 impl Detection {
+    /// The public bugs that the fault recreates, one line each.
+    pub fn history(&self) -> impl Iterator<Item = String> {
+        history::of(&self.fault).map(|bug| format!("as in {}: {} ({})", bug.driver, bug.what, bug.source))
+    }
+
     /// The outcome as of other checks: an undetected fault is a failure.
     pub fn outcome(&self) -> Outcome {
         let (verdict, faults, note) = match &self.by {
@@ -50,9 +58,28 @@ impl Detection {
             seconds: self.seconds,
             figures: Vec::new(),
             faults,
-            notes: [Some(self.what.clone()), note].into_iter().flatten().collect(),
+            notes: [Some(self.what.clone()), note].into_iter().flatten().chain(self.history()).collect(),
             pictures: Vec::new(),
         }
+    }
+}
+
+/// Public bugs, each with the name of the fault that recreates it.
+pub fn known_bugs() -> &'static [KnownBug] {
+    history::KNOWN_BUGS
+}
+
+/// A check whose process was made to crash, as the run of other checks reports it.
+pub fn crash(outcome: &Outcome) -> Detection {
+    let said = outcome.faults.first().map(|fault| fault.what.clone());
+    let is_named = outcome.verdict == Verdict::Failed && said.as_ref().is_some_and(|said| said.contains("signal"));
+    Detection {
+        fault: "driver crash".into(),
+        what: "the driver ends the process of a check".into(),
+        by: is_named.then(|| format!("{}, {}", outcome.group, outcome.name)),
+        message: said.unwrap_or_else(|| "the check has no fault".into()),
+        left_out: false,
+        seconds: outcome.seconds,
     }
 }
 
@@ -88,7 +115,9 @@ pub fn run_faults<'a>(
     // Validation does not affect results, and would take most of the time.
     let options = ContextOptions { validation: false, ..options.clone() };
     let sound = DeviceUnderTest::new(&options, Level::Quick)?;
-    let mut search = DetectionSearch { sound, answers: known_answers::checks(Level::Quick), alarms: BTreeMap::new() };
+    let mut answers = known_answers::checks(Level::Quick);
+    answers.extend(sampling::checks(Level::Quick));
+    let mut search = DetectionSearch { sound, answers, alarms: BTreeMap::new() };
     let mut all = Vec::new();
     for fault in faults {
         let detection = search.detection(fault)?;

@@ -131,6 +131,12 @@ fn a_run_without_failures_says_so_and_an_empty_run_does_not() {
     let mut nothing = run(1);
     nothing.outcomes.retain(|o| o.verdict == Verdict::LeftOut);
     assert_eq!(text(all(&checked(&page(&nothing, None)), "h1")[0]), "Nothing was checked");
+    let mut interrupted = run(1);
+    interrupted.outcomes.iter_mut().skip(18).for_each(|o| o.verdict = Verdict::Interrupted);
+    let ended = checked(&page(&interrupted, None));
+    assert_eq!(text(all(&ended, "h1")[0]), "Interrupted: 3 of 21 checks were not run");
+    assert!(text(all(&ended, "title")[0]).starts_with("echolume verify: interrupted"));
+    assert!(text(all(&ended, ".counts")[0]).contains("3 interrupted"));
     let mut slow = run(1);
     slower(&mut slow, "tone", 2.0);
     assert_eq!(text(all(&checked(&page(&slow, Some(&run(1)))), "h1")[0]), "Worse than before");

@@ -32,12 +32,13 @@ fn has_the_shape(text: &str) {
         ),
         ("properties", &[], &["property"]),
         ("property", &["name", "value"], &[]),
-        ("testcase", &["name", "classname", "time"], &["failure", "skipped", "system-out"]),
+        ("testcase", &["name", "classname", "time"], &["failure", "error", "skipped", "system-out"]),
         ("failure", &["message", "type"], &[]),
+        ("error", &["message", "type"], &[]),
         ("skipped", &["message"], &[]),
         ("system-out", &[], &[]),
     ];
-    let mut totals = [0; 3];
+    let mut totals = [0; 4];
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name().name();
         let (_, attributes, within) =
@@ -51,26 +52,41 @@ fn has_the_shape(text: &str) {
             "testsuite" => {
                 let of =
                     |what: &str| children(node, "testcase").filter(|c| children(*c, what_is(what)).count() > 0).count();
-                let counted = [children(node, "testcase").count(), of("failure"), of("skipped")];
-                assert_eq!(counted, ["tests", "failures", "skipped"].map(|what| number(node, what)));
+                let counted = [children(node, "testcase").count(), of("failure"), of("error"), of("skipped")];
+                assert_eq!(counted, ["tests", "failures", "errors", "skipped"].map(|what| number(node, what)));
                 totals = std::array::from_fn(|i| totals[i] + counted[i]);
             }
             "testcase" => {
                 assert!(node.attribute("name").is_some() && node.attribute("classname").is_some(), "{node:?}");
-                let results = node.children().filter(|c| c.has_tag_name("failure") || c.has_tag_name("skipped"));
+                let is_result = |c: &Node| ["failure", "error", "skipped"].iter().any(|name| c.has_tag_name(*name));
+                let results = node.children().filter(is_result);
                 assert!(results.count() <= 1, "{node:?}");
             }
+            "error" => assert_eq!(node.attribute("type"), Some("interrupted"), "{node:?}"),
             "failure" => assert!(node.attribute("message").is_some() && node.text().is_some(), "{node:?}"),
             _ => {}
         }
     }
     let top = document.root_element();
     assert_eq!(top.tag_name().name(), "testsuites");
-    assert_eq!(totals, ["tests", "failures", "skipped"].map(|what| number(top, what)));
+    // The format has no skipped in its head: readers sum over the suites.
+    assert_eq!(totals[..3], ["tests", "failures", "errors"].map(|what| number(top, what)));
 }
 
 fn what_is(name: &str) -> &'static str {
-    if name == "failure" { "failure" } else { "skipped" }
+    ["failure", "error", "skipped"].into_iter().find(|known| *known == name).expect("a result")
+}
+
+/// Prevents a run that was ended early from passing, and from being taken for a faulty device.
+#[test]
+fn an_interrupted_check_is_an_error_and_no_failure() {
+    let mut run = run(1);
+    let tone = check(&mut run, "passes", "tone");
+    (tone.verdict, tone.notes) = (Verdict::Interrupted, vec!["not run: SIGINT".into()]);
+    let text = written(&run, None);
+    has_the_shape(&text);
+    assert_eq!([text.matches("<failure").count(), text.matches("<error").count()], [0, 1], "{text}");
+    assert!(text.contains("message=\"not run: SIGINT\""), "{text}");
 }
 
 #[test]

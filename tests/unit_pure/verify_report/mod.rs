@@ -2,9 +2,11 @@
 //! Needs no GPU.
 
 mod baseline;
+mod gtest;
 mod html;
 mod json;
 mod junit;
+mod prometheus;
 mod simulated;
 mod words;
 

@@ -176,7 +176,7 @@ pub fn any_run() -> impl Strategy<Value = Run> {
     let files = prop::collection::vec(nasty(), 0..3);
     let fault = (nasty(), prop::option::of(nasty()), nasty(), prop::option::of(worst), files)
         .prop_map(|(what, pass, input, worst, files)| Fault { what, pass, input, worst, files });
-    let verdict = prop::sample::select(vec![Verdict::Passed, Verdict::Failed, Verdict::LeftOut]);
+    let verdict = prop::sample::select(Verdict::ALL.to_vec());
     let lists =
         (prop::collection::vec(figure, 0..4), prop::collection::vec(fault, 0..3), prop::collection::vec(nasty(), 0..3));
     let outcome = (nasty(), nasty(), verdict, 0.0..1e4f64, lists);

@@ -47,6 +47,9 @@ fn a_group_and_a_run_have_one_line_each() {
     assert_eq!(report::summary(&run), expected);
     run.validation = false;
     assert!(report::summary(&run).ends_with("Vulkan 1.3.0 (quick)"));
+    run.outcomes[3].verdict = Verdict::Interrupted;
+    assert!(report::summary(&run).starts_with("passed 18, failed 1, left out 1, interrupted 1 in 48 s"));
+    assert!(report::group_line("passes", &run.groups()[0].1).contains("6 passed, 1 failed, 1 interrupted in "));
     assert!(report::summary(&empty()).starts_with("passed 0, failed 0, left out 0 in 48 s"));
 }
 

@@ -1,0 +1,289 @@
+//! Checks in a process of their own. A worker process runs one check after another; if it crashes or does not come back, the check that it
+//! ran has failed, and a new worker goes on with the next. This process loads no driver.
+
+mod injection;
+mod worker;
+
+pub use injection::InjectedCrash;
+pub use worker::{Ready, refuse, serve};
+
+use crate::files::signals;
+use crate::terminal::Failure;
+use crate::text::single_line;
+use crate::verify::report::{CheckName, Outcome, Verdict};
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use worker::Message;
+
+/// Time limit of the start of a worker: it opens the device and proves that validation sees something.
+const START: Duration = Duration::from_secs(600);
+/// How often a wait looks for signals.
+const OFTEN: Duration = Duration::from_millis(50);
+/// How long a worker that is not needed any more may take to end.
+const FAREWELL: Duration = Duration::from_secs(5);
+/// How long the output of a worker that has ended may take to arrive.
+const LAST_WORDS: Duration = Duration::from_millis(500);
+/// How many lines of a crashed worker's output the report quotes.
+const LINES: usize = 4;
+/// How many workers in a row may fail to start before no more are started.
+const MAX_STARTS: u32 = 3;
+
+/// The first signal that asks this process to end, if any.
+pub type Signal<'a> = &'a dyn Fn() -> Option<&'static str>;
+/// Prints a line of a worker's own output.
+pub type Echo = Arc<dyn Fn(&str) + Send + Sync>;
+
+/// Starts workers and gives them checks.
+pub struct Workers<'a> {
+    /// The command of a worker.
+    command: &'a dyn Fn() -> Command,
+    /// Time limit of a check.
+    limit: Duration,
+    signal: Signal<'a>,
+    echo: Echo,
+    current: Option<Worker>,
+    failed_starts: u32,
+}
+
+impl<'a> Workers<'a> {
+    /// Starts the first worker.
+    ///
+    /// # Errors
+    /// The program cannot be started, there is no device, or the driver crashes when it is opened.
+    pub fn start(
+        command: &'a dyn Fn() -> Command,
+        limit: Duration,
+        signal: Signal<'a>,
+        echo: Echo,
+    ) -> Result<(Workers<'a>, Ready), Failure> {
+        let mut workers = Workers { command, limit, signal, echo, current: None, failed_starts: 0 };
+        let ready = workers.renew()?;
+        Ok((workers, ready))
+    }
+
+    fn renew(&mut self) -> Result<Ready, Failure> {
+        let failed = |why: String| Failure::Failed(format!("the process that runs the checks {why}"));
+        let mut worker = Worker::spawn(&mut (self.command)(), &self.echo).map_err(failed)?;
+        match worker.receive(START, self.signal) {
+            Ok(Message::Ready(ready)) => {
+                self.current = Some(worker);
+                Ok(*ready)
+            }
+            Ok(Message::Refused { code: 2, message }) => Err(Failure::Input(message)),
+            Ok(Message::Refused { code: 3, message }) => Err(Failure::NoDevice(message)),
+            Ok(Message::Refused { message, .. }) => Err(Failure::Failed(message)),
+            Ok(Message::Done(_)) => Err(failed("answered before it was asked".into())),
+            Err(Ended::BySignal(signal)) => Err(Failure::Interrupted(format!("{signal} ended the run"))),
+            Err(Ended::Late) => Err(failed(format!("had no device after {} s", START.as_secs()))),
+            Err(Ended::Itself { how, .. }) => Err(failed(format!("{how} before the first check"))),
+        }
+    }
+
+    /// Runs the check at this place of [`Ready::checks`].
+    pub fn run(&mut self, place: usize, name: &CheckName) -> Outcome {
+        let begun = Instant::now();
+        let failed = |why: String| Outcome::unrun(name, Verdict::Failed, why);
+        if self.current.is_none() {
+            if self.failed_starts >= MAX_STARTS {
+                return failed(format!("not run: {MAX_STARTS} processes in a row had no device"));
+            }
+            match self.renew() {
+                Ok(_) => self.failed_starts = 0,
+                Err(Failure::Interrupted(why)) => {
+                    return Outcome::unrun(name, Verdict::Interrupted, format!("not run: {why}"));
+                }
+                Err(why) => {
+                    self.failed_starts += 1;
+                    return failed(format!("not run: {}", why.message()));
+                }
+            }
+        }
+        let Some(mut worker) = self.current.take() else { return failed("not run: there is no process".into()) };
+        let reply = worker.ask(place).and_then(|()| worker.receive(self.limit, self.signal));
+        let outcome = match reply {
+            Ok(Message::Done(done)) => {
+                self.current = Some(worker);
+                return done.received();
+            }
+            Ok(_) => failed("the process that ran it answered something else".into()),
+            Err(Ended::BySignal(signal)) => {
+                Outcome::unrun(name, Verdict::Interrupted, format!("not to its end: {signal}"))
+            }
+            Err(Ended::Late) => {
+                failed(format!("did not end within {} s; its process was killed", self.limit.as_secs()))
+            }
+            // Whoever ends all processes of a service ends the worker, too.
+            Err(Ended::Itself { by: Some(signal @ ("SIGINT" | "SIGTERM" | "SIGHUP")), .. }) => {
+                Outcome::unrun(name, Verdict::Interrupted, format!("its process was ended by {signal}"))
+            }
+            Err(Ended::Itself { how, said, .. }) => {
+                let mut outcome = failed(format!("its process {how}"));
+                outcome.notes.extend(said.iter().map(|line| format!("it said: {line}")));
+                outcome
+            }
+        };
+        Outcome { seconds: begun.elapsed().as_secs_f64(), ..outcome }
+    }
+}
+
+/// Why a worker gave no answer.
+enum Ended {
+    /// This process was asked to end; the worker was killed.
+    BySignal(&'static str),
+    /// The time limit passed; the worker was killed.
+    Late,
+    /// The worker ended.
+    Itself {
+        /// In words, after "the process".
+        how: String,
+        by: Option<&'static str>,
+        /// Its last lines.
+        said: Vec<String>,
+    },
+}
+
+struct Worker {
+    child: Child,
+    requests: Option<ChildStdin>,
+    replies: Receiver<Message>,
+    said: Arc<Mutex<VecDeque<String>>>,
+    readers: Vec<JoinHandle<()>>,
+}
+
+impl Worker {
+    fn spawn(command: &mut Command, echo: &Echo) -> Result<Worker, String> {
+        #[cfg(unix)]
+        {
+            // Ctrl-C reaches all processes of a group: this one decides what it means.
+            use std::os::unix::process::CommandExt;
+            command.process_group(0);
+        }
+        let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = piped.spawn().map_err(|e| format!("cannot be started: {e}"))?;
+        let (send, replies) = mpsc::channel();
+        let said = Arc::new(Mutex::new(VecDeque::new()));
+        let other = |said: &Arc<Mutex<VecDeque<String>>>| {
+            let (said, echo) = (said.clone(), echo.clone());
+            move |line: &str| {
+                echo(line);
+                let mut said = said.lock().unwrap_or_else(|e| e.into_inner());
+                said.push_back(single_line(line));
+                if said.len() > LINES {
+                    said.pop_front();
+                }
+            }
+        };
+        let (of_stdout, of_stderr) = (other(&said), other(&said));
+        let mut readers = Vec::new();
+        readers.extend(child.stdout.take().map(|out| {
+            read_lines(out, move |line| match Message::parse(line) {
+                // Nobody listens any more once the worker is given up.
+                Some(message) => drop(send.send(message)),
+                None if line.trim().is_empty() => {}
+                None => of_stdout(line),
+            })
+        }));
+        readers.extend(child.stderr.take().map(|err| read_lines(err, of_stderr)));
+        Ok(Worker { requests: child.stdin.take(), child, replies, said, readers })
+    }
+
+    fn ask(&mut self, place: usize) -> Result<(), Ended> {
+        let requests = self.requests.as_mut();
+        match requests.map(|to| writeln!(to, "{place}").and_then(|()| to.flush())) {
+            Some(Ok(())) => Ok(()),
+            _ => Err(self.ended()),
+        }
+    }
+
+    fn receive(&mut self, limit: Duration, signal: Signal) -> Result<Message, Ended> {
+        let begun = Instant::now();
+        loop {
+            match self.replies.recv_timeout(OFTEN) {
+                Ok(message) => return Ok(message),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(match signal() {
+                        Some(signal) => self.killed(Ended::BySignal(signal)),
+                        None => self.ended(),
+                    });
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            if let Some(signal) = signal() {
+                return Err(self.killed(Ended::BySignal(signal)));
+            }
+            if begun.elapsed() > limit {
+                return Err(self.killed(Ended::Late));
+            }
+        }
+    }
+
+    fn killed(&mut self, why: Ended) -> Ended {
+        self.end(Duration::ZERO);
+        why
+    }
+
+    /// How the worker ended by itself.
+    fn ended(&mut self) -> Ended {
+        // Its output is closed, so it has ended or will at once.
+        let status = self.end(LAST_WORDS);
+        let begun = Instant::now();
+        while begun.elapsed() < LAST_WORDS && !self.readers.iter().all(JoinHandle::is_finished) {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let said = self.said.lock().unwrap_or_else(|e| e.into_inner()).iter().cloned().collect();
+        let (how, by) = status.map_or(("ended".into(), None), in_words);
+        Ended::Itself { how, by, said }
+    }
+
+    /// Waits so long for the worker to end, then kills it.
+    fn end(&mut self, patience: Duration) -> Option<ExitStatus> {
+        self.requests = None;
+        let begun = Instant::now();
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return Some(status),
+                Ok(None) if begun.elapsed() < patience => std::thread::sleep(Duration::from_millis(5)),
+                _ => break,
+            }
+        }
+        // An error means that it has ended.
+        let _ = self.child.kill();
+        self.child.wait().ok()
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.end(FAREWELL);
+    }
+}
+
+/// Calls `each` with every line of a stream, on a thread of its own.
+fn read_lines(from: impl Read + Send + 'static, each: impl Fn(&str) + Send + 'static) -> JoinHandle<()> {
+    std::thread::spawn(move || {
+        let mut from = BufReader::new(from);
+        let mut line = Vec::new();
+        while from.read_until(b'\n', &mut line).is_ok_and(|length| length > 0) {
+            each(String::from_utf8_lossy(&line).trim_end_matches(['\n', '\r']));
+            line.clear();
+        }
+    })
+}
+
+/// How a process ended, and the name of the signal that ended it.
+fn in_words(status: ExitStatus) -> (String, Option<&'static str>) {
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::ExitStatusExt;
+        if let Some(signal) = status.signal() {
+            let name = signals::name_of(signal);
+            return (format!("was ended by signal {signal} ({})", name.unwrap_or("no name")), name);
+        }
+    }
+    (format!("ended with exit code {}", status.code().unwrap_or(-1)), None)
+}

@@ -1,0 +1,166 @@
+//! The worker: a process that runs checks for another one and reports each on its standard output, as one line of JSON behind a mark.
+//! A driver may print there too; lines without the mark are its own.
+//!
+//! The worker reads the places of checks from its standard input, one a line, and ends with it: when the process that asked has ended,
+//! even if a check hangs.
+
+use crate::machine::Device;
+use crate::picture::Picture;
+use crate::terminal::Failure;
+use crate::verify::report::{CheckName, Outcome, PictureComparison};
+use crate::verify::{Check, DeviceUnderTest};
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use serde::{Deserialize, Serialize};
+use std::io::{BufRead, Write};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Begins each line that is a message.
+const MARK: &str = "echolume-verify-worker: ";
+
+/// Time for an idle worker to end by itself once nobody asks any more.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// What a worker says.
+#[derive(Serialize, Deserialize)]
+pub(super) enum Message {
+    /// First: it has a device.
+    Ready(Box<Ready>),
+    /// First: it has none. The exit code says why; see [`Failure::exit_code`].
+    Refused { code: u8, message: String },
+    /// A check was run.
+    Done(Box<Done>),
+}
+
+/// The device of a worker and the checks that it can run.
+#[derive(Serialize, Deserialize)]
+pub struct Ready {
+    pub device: Device,
+    /// The validation layer is active and sees something.
+    pub validation: bool,
+    /// What to print before the first check.
+    pub lines: Vec<String>,
+    pub checks: Vec<CheckName>,
+}
+
+/// An outcome with its pictures, which JSON reports leave out.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Done {
+    outcome: Outcome,
+    pictures: Vec<SentComparison>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct SentComparison {
+    what: String,
+    /// Actual, expected, difference.
+    pictures: [SentPicture; 3],
+    gain: u32,
+    fault: Option<usize>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct SentPicture {
+    width: u32,
+    height: u32,
+    /// In base64.
+    rgba: String,
+}
+
+impl SentPicture {
+    fn new(picture: &Picture) -> SentPicture {
+        let Picture { width, height, .. } = *picture;
+        SentPicture { width, height, rgba: BASE64_STANDARD.encode(&picture.rgba) }
+    }
+
+    /// None if it was damaged on its way.
+    fn received(self) -> Option<Picture> {
+        let rgba = BASE64_STANDARD.decode(self.rgba).ok()?;
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        (rgba.len() as u64 == 4 * pixels).then_some(Picture { width: self.width, height: self.height, rgba })
+    }
+}
+
+impl Done {
+    fn new(mut outcome: Outcome) -> Done {
+        let sent = |shown: PictureComparison| SentComparison {
+            pictures: [&shown.actual, &shown.expected, &shown.difference].map(SentPicture::new),
+            what: shown.what,
+            gain: shown.gain,
+            fault: shown.fault,
+        };
+        let pictures = std::mem::take(&mut outcome.pictures).into_iter().map(sent).collect();
+        Done { outcome, pictures }
+    }
+
+    /// The outcome as the worker had it.
+    pub(super) fn received(self) -> Outcome {
+        let received = |sent: SentComparison| {
+            let [actual, expected, difference] = sent.pictures.map(SentPicture::received);
+            Some(PictureComparison {
+                what: sent.what,
+                actual: actual?,
+                expected: expected?,
+                difference: difference?,
+                gain: sent.gain,
+                fault: sent.fault,
+            })
+        };
+        Outcome { pictures: self.pictures.into_iter().filter_map(received).collect(), ..self.outcome }
+    }
+}
+
+impl Message {
+    /// The message in a line, if it has the mark.
+    pub(super) fn parse(line: &str) -> Option<Message> {
+        let (_, json) = line.split_once(MARK)?;
+        serde_json::from_str(json).inspect_err(|fault| tracing::warn!("a message of a worker: {fault}")).ok()
+    }
+
+    fn send(&self) -> Result<(), String> {
+        let json = serde_json::to_string(self).map_err(|e| e.to_string())?;
+        // A line break first: the driver may have left its line unfinished.
+        let line = format!("\n{MARK}{json}\n");
+        let mut out = std::io::stdout().lock();
+        out.write_all(line.as_bytes()).and_then(|()| out.flush()).map_err(|e| e.to_string())
+    }
+}
+
+/// Reports that there is nothing to run checks on.
+pub fn refuse(failure: Failure) -> Result<(), String> {
+    let code = failure.exit_code();
+    Message::Refused { code, message: failure.message() }.send()
+}
+
+/// Runs the checks that standard input asks for until it ends.
+///
+/// # Errors
+/// One line: standard output is closed.
+pub fn serve(dut: &mut DeviceUnderTest, checks: &[Check], ready: Ready) -> Result<(), String> {
+    Message::Ready(Box::new(ready)).send()?;
+    let mut group = None;
+    for place in requests() {
+        let Some(check) = checks.get(place) else { return Err(format!("there is no check {place}")) };
+        let outcome = check.run_after(&mut group, dut);
+        Message::Done(Box::new(Done::new(outcome))).send()?;
+    }
+    Ok(())
+}
+
+/// The numbers on standard input. When it ends the process does, too, even if its main thread hangs in the driver.
+fn requests() -> mpsc::Receiver<usize> {
+    let (send, receive) = mpsc::channel();
+    std::thread::spawn(move || {
+        let lines = std::io::stdin().lock().lines().map_while(Result::ok);
+        for place in lines.filter_map(|line| line.trim().parse().ok()) {
+            if send.send(place).is_err() {
+                return;
+            }
+        }
+        drop(send);
+        std::thread::sleep(GRACE);
+        std::process::exit(0);
+    });
+    receive
+}

@@ -1,0 +1,335 @@
+//! One dispatch of a pass as files for a bug report, which need nothing of this program: the shader as the driver gets it, the inputs, the
+//! numbers, what is expected within which tolerance, and a script for Amber where it can express the dispatch.
+
+mod amber;
+
+use super::DeviceUnderTest;
+use super::compare::{ExtraTolerance, tolerance_of};
+use super::passes::{KINDS, POISON, dispatch_args_of, inputs_of, run_with_reference, seed_of};
+use crate::files;
+use crate::gpu::GpuError;
+use crate::machine;
+use crate::passes::slots::Format;
+use crate::passes::{Arrays, Bind, PASSES, Part, Pass, Texels, interface_check};
+use crate::scene::Scene;
+use crate::spirv::{Access, Dimension, Kind};
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Minimum number of texels of the outputs of a dispatch that does not fail: fewer say little.
+const MIN_TEXELS: u64 = 64;
+
+/// A dispatch with everything that it depends on.
+struct Case {
+    /// One line: pass, scene and input.
+    title: String,
+    pass: &'static str,
+    scene: String,
+    iteration: u32,
+    words: Vec<u32>,
+    /// Specialization constants by id, and their names.
+    constants: Vec<(u32, i32)>,
+    constant_names: Vec<String>,
+    /// The uniform block.
+    params: Vec<u8>,
+    params_binding: Option<u32>,
+    groups: [u32; 3],
+    arrays: Vec<Array>,
+    /// Share of the texels of an output that may be beyond their tolerance.
+    outliers: f64,
+    why: &'static str,
+}
+
+/// What is bound to the shader under one name.
+struct Array {
+    name: String,
+    binding: u32,
+    kind: Kind,
+    access: Access,
+    dimension: Dimension,
+    format: Format,
+    /// Texels along x, y and z; of a buffer, floats.
+    size: [usize; 3],
+    /// Before the dispatch.
+    bytes: Vec<u8>,
+    /// Of an output.
+    expected: Option<Expected>,
+}
+
+/// What an output must hold, value by value.
+struct Expected {
+    /// By the f64 reference; NaN where the pass writes nothing.
+    values: Vec<f64>,
+    tolerances: Vec<f64>,
+}
+
+impl Array {
+    /// The bytes as values.
+    fn stored(&self) -> Texels {
+        Texels::decode(self.size, self.format, &self.bytes)
+    }
+
+    fn file(&self) -> String {
+        format!("{}.raw", self.name)
+    }
+}
+
+/// What was written.
+pub struct Reproduction {
+    pub title: String,
+    /// The dispatch differs from its reference on this device.
+    pub fails: bool,
+    /// Why there is no script for Amber.
+    pub without_script: Option<String>,
+    pub files: Vec<String>,
+}
+
+/// Writes a dispatch of a pass into a folder, which is created when needed: the smallest that fails, otherwise the smallest of at least
+/// [`MIN_TEXELS`] texels.
+///
+/// # Errors
+/// No pass has this name, the device fails, or a file cannot be written.
+pub fn reproduce(dut: &mut DeviceUnderTest, check: &str, folder: &Path) -> Result<Reproduction, ReproduceError> {
+    let name = check.rsplit(" / ").next().unwrap_or(check).trim();
+    let pass = PASSES.iter().find(|pass| pass.name == name).ok_or_else(|| ReproduceError::NoPass(check.into()))?;
+    let (case, fails) = find(dut, pass)?;
+    let (written, without_script) =
+        write(&case, &machine::device(&dut.context), folder).map_err(ReproduceError::File)?;
+    Ok(Reproduction { title: case.title, fails, without_script, files: written })
+}
+
+/// Why nothing was reproduced.
+#[derive(Debug, thiserror::Error)]
+pub enum ReproduceError {
+    #[error("'{0}' compares no pass with its reference; those of the group 'passes' do (--list)")]
+    NoPass(String),
+    #[error(transparent)]
+    Device(#[from] GpuError),
+    #[error("{0}")]
+    File(String),
+}
+
+/// The smallest dispatch of the pass that fails, otherwise the smallest that tells something; and whether it fails.
+fn find(dut: &mut DeviceUnderTest, pass: &'static Pass) -> Result<(Case, bool), ReproduceError> {
+    let scenes = dut.scenes();
+    let size = |scene: &Scene| -> u64 {
+        let args = dispatch_args_of(scene, 0);
+        pass.reads(scene, &args).iter().chain(&pass.writes(scene, &args)).map(|bind| bind.slot.bytes(scene)).sum()
+    };
+    let mut needed: Vec<&(String, Scene)> = scenes.iter().filter(|(_, scene)| pass.is_needed(scene)).collect();
+    needed.sort_by_key(|(_, scene)| size(scene));
+    let mut tried = Vec::new();
+    for (name, scene) in &needed {
+        for (k, kind) in KINDS.iter().enumerate() {
+            for iteration in 0..(pass.repeat)(scene) {
+                tried.push(Choice { name, scene, kind, iteration, seed: seed_of(pass, k) });
+            }
+        }
+    }
+    for choice in &tried {
+        let Choice { scene, kind, iteration, seed, .. } = *choice;
+        let worst = run_with_reference(dut.pass_runner()?, scene, pass, iteration, kind, seed)?.comparison.worst;
+        if worst.is_some() {
+            return Ok((case(dut, pass, choice)?, true));
+        }
+    }
+    let is_telling = |choice: &&Choice| {
+        let writes = pass.writes(choice.scene, &dispatch_args_of(choice.scene, choice.iteration));
+        writes.iter().map(|bind| bind.slot.shape(choice.scene).texels()).sum::<u64>() >= MIN_TEXELS
+    };
+    let first = tried.iter().find(is_telling).or(tried.first());
+    let first = first.ok_or_else(|| ReproduceError::NoPass(pass.name.into()))?;
+    Ok((case(dut, pass, first)?, false))
+}
+
+/// The input of a dispatch.
+struct Choice<'a> {
+    name: &'a str,
+    scene: &'a Scene,
+    kind: &'static str,
+    iteration: u32,
+    seed: u64,
+}
+
+fn case(dut: &mut DeviceUnderTest, pass: &'static Pass, choice: &Choice) -> Result<Case, GpuError> {
+    let runner = dut.pass_runner()?;
+    let scene = &runner.adapted(choice.scene);
+    let args = dispatch_args_of(scene, choice.iteration);
+    // The inputs of the check, which come from the scene before it is adapted.
+    let inputs = inputs_of(choice.scene, pass, &args, choice.kind, choice.seed);
+    let mut expected = Arrays::default();
+    let writes = pass.writes(scene, &args);
+    for bind in &writes {
+        let channels = bind.slot.format(scene).channels();
+        expected.insert(bind.name, Texels::untouched(bind.slot.array_size(scene), channels));
+    }
+    pass.expected(choice.scene, &args, &inputs, &mut expected);
+    let shader = runner.shader(scene, pass, &args)?;
+    let extra = ExtraTolerance::of(pass, scene, &args, runner.filter_bits());
+    let (mut arrays, mut params_binding) = (Vec::new(), None);
+    for binding in &shader.module.bindings {
+        if binding.kind == Kind::Params {
+            params_binding = Some(binding.binding);
+            continue;
+        }
+        let reads = pass.reads(scene, &args);
+        let is_output = writes.iter().find(|bind| bind.name == binding.name);
+        let Some(bind) = is_output.or_else(|| reads.iter().find(|bind| bind.name == binding.name)) else { continue };
+        let (bytes, size) = before(scene, bind, &inputs, is_output.is_some());
+        let format = bind.slot.format(scene);
+        let expected = is_output.map(|bind| {
+            let values = expected.get(bind.name).stored_part(bind.slot, scene).values;
+            let tolerances = values.iter().map(|e| tolerance_of(pass, extra, bind.slot, format, *e)).collect();
+            Expected { values, tolerances }
+        });
+        arrays.push(Array {
+            name: binding.name.clone(),
+            binding: binding.binding,
+            kind: binding.kind,
+            access: binding.access,
+            dimension: binding.dimension,
+            format,
+            size,
+            bytes,
+            expected,
+        });
+    }
+    let params = interface_check::pack(&shader.module, &pass.numbers(scene, &args));
+    let extent = pass.invocations(scene, &args);
+    let groups = std::array::from_fn(|axis| extent[axis].div_ceil(shader.module.local_size[axis]));
+    let ids = shader.module.constants.iter().filter_map(|constant| {
+        let (_, value) = shader.constants.iter().find(|(name, _)| *name == constant.name)?;
+        Some(((constant.id, *value), constant.name.clone()))
+    });
+    let (constants, constant_names) = ids.unzip();
+    Ok(Case {
+        pass: pass.name,
+        scene: choice.name.to_string(),
+        iteration: choice.iteration,
+        title: format!("pass {}, scene '{}', iteration {}, {}", pass.name, choice.name, choice.iteration, choice.kind),
+        words: shader.words,
+        constants,
+        constant_names,
+        params,
+        params_binding,
+        groups,
+        arrays,
+        outliers: pass.tolerance.outliers + extra.outliers,
+        why: pass.tolerance.why,
+    })
+}
+
+/// What a slot holds before the dispatch, and its size in texels.
+fn before(scene: &Scene, bind: &Bind, inputs: &Arrays, is_output: bool) -> (Vec<u8>, [usize; 3]) {
+    let format = bind.slot.format(scene);
+    let given = inputs.iter().find(|(name, _)| *name == bind.name).filter(|_| !is_output);
+    let texels = match given {
+        Some((_, texels)) => texels.stored_part(bind.slot, scene),
+        None => {
+            let filler = if is_output { POISON } else { 0.0 };
+            Texels::from_fn(bind.slot.shape(scene).size(), format.channels(), |_, _| filler)
+        }
+    };
+    let mut size = texels.size;
+    if bind.part == Part::Layer {
+        size[2] = 1;
+    }
+    (texels.encode(format), size)
+}
+
+/// Writes the files. Returns their names, and why there is no script.
+fn write(case: &Case, device: &machine::Device, folder: &Path) -> Result<(Vec<String>, Option<String>), String> {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: cannot be made: {e}", folder.display()))?;
+    let mut written = Vec::new();
+    let mut put = |name: &str, bytes: &[u8]| {
+        written.push(name.to_string());
+        files::replace(&folder.join(name), bytes)
+    };
+    let of_f64 = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    put("shader.spv", &case.words.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>())?;
+    put("params.raw", &case.params)?;
+    for array in &case.arrays {
+        put(&array.file(), &array.bytes)?;
+        if let Some(expected) = &array.expected {
+            put(&format!("{}.expected.f64", array.name), &of_f64(&expected.values))?;
+            put(&format!("{}.tolerance.f64", array.name), &of_f64(&expected.tolerances))?;
+        }
+    }
+    let without_script = match amber::script(case) {
+        Ok(script) => put(amber::FILE, script.as_bytes()).map(|()| None)?,
+        Err(why) => Some(why),
+    };
+    put("dispatch.json", (described(case, device) + "\n").as_bytes())?;
+    put("README.md", readme(case, device, without_script.as_deref()).as_bytes())?;
+    Ok((written, without_script))
+}
+
+/// The dispatch for programs: what is bound where, in which file.
+fn described(case: &Case, device: &machine::Device) -> String {
+    let array = |array: &Array| {
+        json!({
+            "name": array.name,
+            "binding": array.binding,
+            "kind": format!("{:?}", array.kind),
+            "format": format!("{:?}", array.format),
+            "dimension": format!("{:?}", array.dimension),
+            "size": array.size,
+            "is_output": array.expected.is_some(),
+            "file": array.file(),
+            "bytes": array.bytes.len(),
+        })
+    };
+    let constants = case.constants.iter().zip(&case.constant_names);
+    let constants: Vec<_> =
+        constants.map(|((id, value), name)| json!({ "id": id, "name": name, "value": value })).collect();
+    let all = json!({
+        "title": case.title,
+        "pass": case.pass,
+        "scene": case.scene,
+        "iteration": case.iteration,
+        "device": device.name,
+        "driver": device.driver,
+        "vulkan": device.api,
+        "workgroups": case.groups,
+        "constants": constants,
+        "params_binding": case.params_binding,
+        "arrays": case.arrays.iter().map(array).collect::<Vec<_>>(),
+        "outliers": case.outliers,
+    });
+    format!("{all:#}")
+}
+
+fn readme(case: &Case, device: &machine::Device, without_script: Option<&str>) -> String {
+    let mut text = format!(
+        "# One compute dispatch and its expected result\n\n{}. Written by {} on {}, {}, Vulkan {}.\n\n",
+        case.title,
+        machine::program(),
+        device.name,
+        device.driver,
+        device.api
+    );
+    let [x, y, z] = case.groups;
+    let _ = writeln!(
+        text,
+        "`shader.spv` (entry point `main`) runs once with {x} x {y} x {z} workgroups, descriptor set 0 and the specialization constants of \
+         `dispatch.json`, which also lists all bindings. `params.raw` is the uniform block, `NAME.raw` the content of each binding before the \
+         dispatch, rows from the top, without padding. `NAME.expected.f64` holds what an output must hold after it (little-endian doubles; NaN \
+         where nothing is written), `NAME.tolerance.f64` the largest error of each value ({}).",
+        case.why
+    );
+    if case.outliers > 0.0 {
+        let _ = writeln!(text, "At most {} % of the texels may be further off.", 100.0 * case.outliers);
+    }
+    text.push('\n');
+    let _ = match without_script {
+        None => writeln!(
+            text,
+            "With Amber (google/amber): `amber -t spv1.5 -v 1.3 {}`. The shader's uniform block has scalar layout, for which Amber enables no \
+             feature.",
+            amber::FILE
+        ),
+        Some(why) => writeln!(text, "There is no Amber script: {why}."),
+    };
+    text
+}

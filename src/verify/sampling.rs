@@ -1,0 +1,186 @@
+//! Group "sampling": the device's linear filter, sample by sample. Vulkan leaves a device some freedom: positions are converted to fixed
+//! point, with as many fractional bits as the device states, and a result has the precision of its format. All results that this allows
+//! are an interval; a single sample outside is a fault.
+
+use super::built_in::{BYTES, Noise, cartesian, scene};
+use super::compare::{count_figure, texel_comparison};
+use super::passes::POISON;
+use super::{Check, DeviceUnderTest, Findings};
+use crate::gpu::{GpuError, formats};
+use crate::passes::measure::{POSITIONS, sample_position};
+use crate::passes::slots::Format;
+use crate::passes::{Arrays, DispatchArgs, Slot, Texels};
+use crate::verify::report::{Fault, Figure, Level, PictureComparison, Unit, Worst};
+
+/// Volume formats by the words of the settings.
+const FORMATS: [&str; 4] = ["r8", "r16", "r16f", "r32f"];
+
+/// Sizes of the volumes: even and odd, and one texel thick.
+const SIZES: [[usize; 3]; 3] = [[7, 5, 4], [16, 16, 16], [9, 6, 1]];
+
+/// Relative rounding of a coordinate that a shader computes in single precision, with a few operations.
+const COORDINATE_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
+
+/// Rounding of sums and products in single precision, of values up to 1.
+const SUM_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
+
+pub fn checks(_: Level) -> Vec<Check> {
+    let check = |format| Check::new("sampling", format!("linear filter of {format}"), move |dut| check(dut, format));
+    FORMATS.into_iter().map(check).collect()
+}
+
+/// The precision with which a device filters.
+#[derive(Clone, Copy, Debug)]
+pub struct FilterPrecision {
+    /// Fractional bits of a position (`subTexelPrecisionBits`).
+    pub bits: u32,
+    /// Of the texels and of the result.
+    pub format: Format,
+}
+
+impl FilterPrecision {
+    /// The smallest and largest result that is allowed at a position given in shares of the volume's size, clamped to the edge.
+    pub fn bounds(self, volume: &Texels, share: [f64; 3]) -> [f64; 2] {
+        let step = (-f64::from(self.bits)).exp2();
+        // Along each axis the pairs of texels that may be blended, and the range of the upper one's weight.
+        let axes: [Vec<Cell>; 3] = std::array::from_fn(|axis| {
+            let size = volume.size[axis] as f64;
+            let at = share[axis] * size - 0.5;
+            let error = step + COORDINATE_ROUNDING * (share[axis].abs() * size + 1.0);
+            cells(at - error, at + error)
+        });
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for x in &axes[0] {
+            for y in &axes[1] {
+                for z in &axes[2] {
+                    // Within a cell the result is linear in each weight, so that its extremes are at the corners.
+                    for corner in 0..8 {
+                        let weight = |cell: &Cell, axis: usize| cell.weights[corner >> axis & 1];
+                        let at = [(x, 0), (y, 1), (z, 2)].map(|(cell, axis)| cell.low as f64 + weight(cell, axis));
+                        let value = blend(volume, [x.low, y.low, z.low], at);
+                        (low, high) = (low.min(value), high.max(value));
+                    }
+                }
+            }
+        }
+        let rounding = |value: f64| Texels::spacing(self.format, value) + SUM_ROUNDING;
+        [low - rounding(low), high + rounding(high)]
+    }
+}
+
+/// A pair of neighbouring texels, the lower one by its place, and the smallest and largest weight of the upper one.
+struct Cell {
+    low: i64,
+    weights: [f64; 2],
+}
+
+/// The cells between texel centres that a range of positions touches.
+fn cells(from: f64, to: f64) -> Vec<Cell> {
+    let cell = |low: i64| Cell { low, weights: [(from - low as f64).max(0.0), (to - low as f64).min(1.0)] };
+    (from.floor() as i64..=to.floor() as i64).map(cell).collect()
+}
+
+/// Trilinear interpolation within the cell of `low`, at its far corners too.
+fn blend(volume: &Texels, low: [i64; 3], at: [f64; 3]) -> f64 {
+    let mut sum = 0.0;
+    for corner in 0..8usize {
+        let upper = [0, 1, 2].map(|axis| (corner >> axis & 1) as i64);
+        let weight = |axis: usize| {
+            let share = at[axis] - low[axis] as f64;
+            if upper[axis] == 1 { share } else { 1.0 - share }
+        };
+        let product = weight(0) * weight(1) * weight(2);
+        if product != 0.0 {
+            sum += product * volume.clamped(low[0] + upper[0], low[1] + upper[1], low[2] + upper[2]);
+        }
+    }
+    sum
+}
+
+/// The samples that are outside of what is allowed: the worst, their number, and the largest share of the allowed interval's half that
+/// the others use.
+#[derive(Debug, Default)]
+pub struct Judged {
+    pub outside: usize,
+    pub used: f64,
+    /// Place in the output, nearest allowed value, and actual value.
+    pub worst: Option<([usize; 2], f64, f64)>,
+}
+
+/// Judges every sample of an output of [`POSITIONS`].
+pub fn judge(precision: FilterPrecision, volume: &Texels, got: &Texels) -> Judged {
+    let [width, height, _] = got.size;
+    let (mut judged, mut largest) = (Judged::default(), 0.0);
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let [low, high] = precision.bounds(volume, sample_position([x, y], [width, height]));
+        let value = got.one(x, y, 0);
+        let middle = 0.5 * (low + high);
+        let used = (value - middle).abs() / (0.5 * (high - low));
+        if used <= 1.0 {
+            judged.used = judged.used.max(used);
+            continue;
+        }
+        judged.outside += 1;
+        let nearest = if value < low { low } else { high };
+        let beyond = (value - nearest).abs();
+        // NaN is worse than any number.
+        if judged.worst.is_none() || beyond.is_nan() || beyond > largest {
+            largest = beyond;
+            judged.worst = Some(([x, y], nearest, value));
+        }
+    }
+    judged
+}
+
+fn check(dut: &mut DeviceUnderTest, format: &str) -> Result<Findings, GpuError> {
+    let mut findings = Findings::default();
+    let (mut samples, mut outside, mut used) = (0, 0, 0.0f64);
+    for (n, size) in SIZES.into_iter().enumerate() {
+        let toml = format!("mode = 'mip'\npicture = {{ size = [64, 48] }}\nslices = {{ format = '{format}' }}");
+        let scene = scene(cartesian(size), BYTES, &toml).map_err(GpuError::Broken)?;
+        let stored = Slot::Volume.format(&scene);
+        if !formats::filters(&dut.context, stored) {
+            return Ok(Findings::left_out(format!("the device has no linear filter of {format}")));
+        }
+        // Mostly extremes: a wrong weight between 0 and 1 changes the result by as much.
+        let mut noise = Noise(91 + n as u64);
+        let mut texel = || match noise.next() {
+            share if share < 0.35 => 0.0,
+            share if share < 0.7 => 1.0,
+            _ => noise.next(),
+        };
+        let mut volume = Texels::untouched(Slot::Volume.array_size(&scene), 1);
+        volume.values.iter_mut().for_each(|value| *value = texel());
+        let volume = Texels::decode(volume.size, stored, &volume.encode(stored));
+        let mut inputs = Arrays::default();
+        inputs.insert("volume", volume.clone());
+        let precision = FilterPrecision { bits: dut.pass_runner()?.filter_bits(), format: stored };
+        let outputs = dut.pass_runner()?.run(&scene, &POSITIONS, &DispatchArgs::default(), &inputs, POISON)?;
+        let got = outputs.get("values");
+        let judged = judge(precision, &volume, got);
+        let [width, height, _] = got.size;
+        samples += width * height;
+        (outside, used) = (outside + judged.outside, used.max(judged.used));
+        let Some(([x, y], expected, value)) = judged.worst else { continue };
+        let (beyond, texels) = (judged.outside, width * height);
+        let worst = Worst { output: "values".into(), at: [x, y, 0], channel: 0, expected, got: value, beyond, texels };
+        let exact = Texels::from_fn([width, height, 1], 1, |[x, y, _], _| {
+            let share = sample_position([x, y], [width, height]);
+            volume.trilinear(std::array::from_fn(|axis| share[axis] * volume.size[axis] as f64 - 0.5))
+        });
+        let fault = Some(findings.faults.len());
+        findings.pictures.push(PictureComparison { fault, ..texel_comparison("samples", &exact, got, 0) });
+        let position = sample_position([x, y], [width, height]).map(|share| format!("{share:.6}")).join(", ");
+        findings.faults.push(Fault {
+            what: format!("{beyond} of {texels} samples are not what {} bits of position allow", precision.bits),
+            pass: Some(POSITIONS.name.into()),
+            input: format!("a volume of {size:?} texels in {format}, at ({position}) of its size"),
+            worst: Some(worst),
+            files: Vec::new(),
+        });
+    }
+    findings.figures.push(count_figure("samples", samples));
+    findings.figures.push(Figure::error("samples outside of what is allowed", outside as f64, 0.0, Unit::Count));
+    findings.figures.push(Figure::error("share of the interval", used, 1.0, Unit::Share));
+    Ok(findings)
+}

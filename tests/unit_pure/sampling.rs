@@ -1,0 +1,100 @@
+//! The bounds of the device's linear filter hold for every sampler that Vulkan allows, and for no wrong one.
+
+use echolume::passes::Texels;
+use echolume::passes::measure::sample_position;
+use echolume::passes::slots::Format;
+use echolume::verify::built_in::Noise;
+use echolume::verify::sampling::{FilterPrecision, Judged, judge};
+
+fn volume(size: [usize; 3], format: Format) -> Texels {
+    let mut noise = Noise(5);
+    let mut values = Texels::untouched(size, 1);
+    values.values.iter_mut().for_each(|value| *value = if noise.next() < 0.5 { 0.0 } else { noise.next() });
+    Texels::decode(size, format, &values.encode(format))
+}
+
+/// What a simulated sampler returns. `place`: its position along an axis, in texels; `round`: its result.
+fn sampled(volume: &Texels, place: impl Fn(f64, usize) -> f64, round: impl Fn(f64) -> f64) -> Texels {
+    Texels::from_fn([64, 48, 1], 1, |[x, y, _], _| {
+        let share = sample_position([x, y], [64, 48]);
+        let at = std::array::from_fn(|axis| place(share[axis] * volume.size[axis] as f64 - 0.5, volume.size[axis]));
+        round(volume.trilinear(at))
+    })
+}
+
+fn judged(format: Format, place: impl Fn(f64, usize) -> f64, round: impl Fn(f64) -> f64) -> Judged {
+    let volume = volume([7, 5, 4], format);
+    judge(FilterPrecision { bits: 8, format }, &volume, &sampled(&volume, place, round))
+}
+
+/// Positions cut to fixed point.
+fn cut(bits: u32) -> impl Fn(f64, usize) -> f64 {
+    let steps = f64::from(bits).exp2();
+    move |at, _| (at * steps).floor() / steps
+}
+
+const FORMATS: [Format; 4] = [Format::R8, Format::R16, Format::R16f, Format::R32f];
+
+#[test]
+fn every_sampler_that_vulkan_allows_is_within_the_bounds() {
+    for format in FORMATS {
+        let steps = 256.0;
+        for (name, outside) in [
+            ("exact", judged(format, |at, _| at, |v| v).outside),
+            ("cut", judged(format, cut(8), |v| v).outside),
+            ("rounded", judged(format, |at, _| (at * steps).round() / steps, |v| v).outside),
+            ("finer", judged(format, cut(12), |v| v).outside),
+            (
+                "in the format",
+                judged(format, cut(8), |v| {
+                    Texels::decode([1; 3], format, &Texels::from_fn([1; 3], 1, |_, _| v).encode(format)).values[0]
+                })
+                .outside,
+            ),
+        ] {
+            assert_eq!(outside, 0, "{name}, {format:?}");
+        }
+    }
+}
+
+#[test]
+fn a_wrong_sampler_is_outside_of_them() {
+    for format in FORMATS {
+        let share = |at: f64| at - at.floor();
+        for (name, least, judged) in [
+            ("6 bits", 100, judged(format, cut(6), |v| v)),
+            ("half a texel aside", 2000, judged(format, |at, _| at + 0.5, |v| v)),
+            ("nearest", 2000, judged(format, |at, _| at.round(), |v| v)),
+            (
+                "smooth weights",
+                1000,
+                judged(format, |at, _| at.floor() + share(at).powi(2) * (3.0 - 2.0 * share(at)), |v| v),
+            ),
+            ("repeat instead of clamp", 500, judged(format, |at, size| at.rem_euclid(size as f64), |v| v)),
+            (
+                "a border of 0",
+                100,
+                judged(
+                    format,
+                    |at, size| if at < -0.5 || at > size as f64 - 0.5 { f64::NAN } else { at },
+                    |v| if v.is_nan() { 0.0 } else { v },
+                ),
+            ),
+            ("NaN", 3072, judged(format, |at, _| at, |_| f64::NAN)),
+        ] {
+            assert!(judged.outside >= least, "{name}, {format:?}: only {} samples", judged.outside);
+            assert!(judged.worst.is_some(), "{name}");
+        }
+    }
+}
+
+/// One sample suffices: no share of outliers is allowed.
+#[test]
+fn a_single_wrong_sample_is_outside() {
+    let volume = volume([16, 16, 16], Format::R16);
+    let mut got = sampled(&volume, |at, _| at, |v| v);
+    let value = got.one(30, 20, 0);
+    got.set([30, 20, 0], &[value + 0.05]);
+    let judged = judge(FilterPrecision { bits: 8, format: Format::R16 }, &volume, &got);
+    assert_eq!((judged.outside, judged.worst.map(|w| w.0)), (1, Some([30, 20])));
+}
