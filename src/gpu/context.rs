@@ -42,7 +42,6 @@ pub struct ContextOptions {
 /// A Vulkan device, opened. Everything that runs on it is made from an `Arc` of this.
 pub struct Context {
     /// The loader stays loaded as long as anything made from it lives.
-    #[cfg_attr(not(feature = "view"), expect(dead_code))]
     pub(super) entry: ash::Entry,
     pub(super) instance: ash::Instance,
     /// For a context that presents pictures.
