@@ -65,9 +65,9 @@ pub(super) const KNOWN_BUGS: &[KnownBug] = &[
     },
     KnownBug {
         fault: "nearest neighbour",
-        driver: "lavapipe, Mesa 26.2.6",
-        what: "the immutable sampler of a pushed descriptor set was lost; found by this project, which binds its samplers",
-        source: "no report known; Mesa's tracker, search for: lavapipe push descriptor immutable sampler",
+        driver: "lavapipe, Mesa 25.0.7 and 26.2.6",
+        what: "the immutable sampler of a pushed descriptor set was lost, and that of an earlier push was used",
+        source: "tools/drivers.d/pushed_immutable_sampler.c",
     },
     KnownBug {
         fault: "driver crash",
