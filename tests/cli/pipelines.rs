@@ -1,6 +1,6 @@
 //! Compiled pipelines: what `profile --pipelines` tells of them, and the file that keeps them between runs.
 
-use crate::common::layer::{downloaded_drivers, reports, under_layer};
+use crate::common::layer::{on_drivers_of_other_vendors, reports, under_layer};
 use crate::common::program::*;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -86,15 +86,10 @@ fn what_cannot_be_compared_is_refused_and_files_are_checked() {
 /// The statistics of the drivers that other machines have, with the baselines that are kept: as `tools/drivers check` does it.
 #[test]
 fn drivers_of_other_vendors_tell_registers_occupancy_and_spills() {
-    if downloaded_drivers().is_none() {
-        return;
-    }
     let folder = Folder::new("vendors");
-    for driver in ["ada", "navi31", "adreno"] {
-        let file = folder.path("p.json");
-        let on = ["on", driver, PROGRAM, "profile", "--pipelines", "--size", "64x64", "--json", &file];
-        let (code, out, err) = finish(Command::new(repository("tools/drivers")).args(on));
-        assert_eq!(code, Some(0), "{driver}: {err}");
+    let file = folder.path("p.json");
+    let arguments = ["profile", "--pipelines", "--size", "64x64", "--json", &file];
+    on_drivers_of_other_vendors(&arguments, |driver, out| {
         assert_eq!(json(&file)["has_statistics"], true, "{driver}");
         let rows: Vec<Vec<&str>> = out.lines().map(|line| line.split_whitespace().collect()).collect();
         let row = rows.iter().find(|row| row.iter().any(|cell| cell.starts_with("raycast/surface")));
@@ -104,7 +99,7 @@ fn drivers_of_other_vendors_tell_registers_occupancy_and_spills() {
             let value: f64 = cell.parse().unwrap_or_else(|_| panic!("{driver}: {cell} in {row:?}"));
             assert!(value >= least, "{driver}: {row:?}");
         }
-    }
+    });
 }
 
 /// A run of the program with a pipeline cache, into a picture of its own.

@@ -1,6 +1,7 @@
 //! The program under the layer of tools/drivers.d, which counts what it asks of a device and injects failures.
 
 use super::files::repository;
+use super::program::{PROGRAM, finish};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -33,13 +34,22 @@ pub fn reports(path: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("the report is JSON")).collect()
 }
 
-/// The drivers of `tools/drivers setup`, if they were downloaded; otherwise says that they were not.
-pub fn downloaded_drivers() -> Option<PathBuf> {
+/// Of the drivers of `tools/drivers`, one for each vendor's way to compile and to queue.
+const VENDORS: [&str; 3] = ["ada", "navi31", "adreno"];
+
+/// Runs the program on drivers of other vendors, which must succeed, and hands the driver's name and the standard output to `check`. Where
+/// the drivers were not downloaded, it says so and runs nothing.
+pub fn on_drivers_of_other_vendors(arguments: &[&str], check: impl Fn(&str, &str)) {
     let home = || std::env::var_os("HOME").map(|home| Path::new(&home).join(".cache/echolume-drivers"));
-    let folder = std::env::var_os("ECHOLUME_DRIVERS").map(PathBuf::from).or_else(home)?;
-    let is_there = folder.join("sid/.done").exists();
-    if !is_there {
-        eprintln!("left out: no drivers in {} (tools/drivers setup)", folder.display());
+    let folder = std::env::var_os("ECHOLUME_DRIVERS").map(PathBuf::from).or_else(home);
+    if !folder.is_some_and(|folder| folder.join("sid/.done").exists()) {
+        eprintln!("left out: no drivers were downloaded (tools/drivers setup)");
+        return;
     }
-    is_there.then_some(folder)
+    for driver in VENDORS {
+        let mut command = Command::new(repository("tools/drivers"));
+        let (code, out, err) = finish(command.args(["on", driver, PROGRAM]).args(arguments));
+        assert_eq!(code, Some(0), "{driver}: {err}");
+        check(driver, &out);
+    }
 }
